@@ -1,0 +1,33 @@
+"""All errors that Airflock raises on purpose: one line each, ready for a person to read."""
+
+
+class AirflockError(Exception):
+    """Root of every error that the command line prints as one line before it exits with status 2."""
+
+
+class ParameterError(AirflockError):
+    """A number, a choice or a key is not acceptable; names key, value, unit and allowed range."""
+
+
+class ScenarioError(AirflockError):
+    """A scenario file or a set of its keys cannot be used; carries every fault that was found."""
+
+    def __init__(self, faults: list[str]):
+        self.faults = list(faults)
+        super().__init__("\n".join(self.faults))
+
+
+class RuleError(AirflockError):
+    """A rule breaks the contract of `airflock.core.contract`."""
+
+
+class RecordingError(AirflockError):
+    """A file or a dataset is no recording, or cannot be written."""
+
+
+class FlightError(AirflockError):
+    """A flight could not be started or went wrong: says which world, agent and step."""
+
+
+class SceneError(AirflockError):
+    """A scene cannot be used: a mesh that is open, inverted, in a wrong unit or damaged, or one without free room."""
