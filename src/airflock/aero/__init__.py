@@ -1,0 +1,1 @@
+"""Layer 1: aerodynamics as plain scalar text."""

@@ -1,0 +1,16 @@
+"""The bodies that a scenario can name: the key body.kind."""
+
+from airflock.body import direct, motion, steered, turning
+from airflock.core.contract import Body, body
+
+BODIES: dict[str, Body] = {
+    "multirotor": body(motion, "multirotor"),
+    "direct": body(direct, "direct"),
+    "steered": body(steered, "steered"),
+    "heading": body(turning, "heading"),
+}
+
+
+def body_for(command: str) -> str:
+    """Name of the first body that accepts a COMMAND: what a scenario without body.kind flies."""
+    return next(name for name, found in BODIES.items() if found.accepts == command)

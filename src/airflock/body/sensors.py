@@ -1,0 +1,39 @@
+"""Sensors: how often an agent measures, and how wrong it is."""
+
+import math
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+
+S5 = "Vásárhelyi et al. 2018, Table S5"
+PROGRAM = "authors' program of Vásárhelyi et al. 2018"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """Satellite navigation with a slowly wandering error. Stationary per axis: SD of the velocity error sqrt(noise),
+    of the position error sqrt(scale · sqrt(noise / (2 damping))), 0.69 m with the defaults.
+    """
+
+    period: float = quantity(
+        0.2, "s", low=0.0, high=60.0, source=S5, meaning="time between decisions; 0: at every step dt"
+    )
+    noise: float = quantity(
+        0.005, "m^2/s^2", low=0.0, high=100.0, source=S5, meaning="variance of the velocity error (S5: noise level)"
+    )
+    damping: float = quantity(0.1, "1/s", low=0.001, high=10.0, source=PROGRAM, meaning="damping of the error's swing")
+    scale: float = quantity(
+        3.0, "m", low=0.01, high=1000.0, source=PROGRAM, meaning="sets the spring: sqrt(2 damping noise)/scale"
+    )
+
+
+def langevin(q, u, g, h, s):
+    """One step h (s) of an error: position q (m), velocity u (m/s), normal number g → new q, u.
+
+    A damped oscillator with a random push (authors' program; the paper says only "Langevin, parabolic potential").
+    """
+    push = math.sqrt(2.0 * s.damping * h * s.noise)
+    spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale
+    new_u = u + push * g - spring * h * q - s.damping * h * u
+    return q + h * new_u, new_u

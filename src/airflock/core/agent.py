@@ -1,0 +1,167 @@
+"""One agent, one decision, as plain Python: what a drone runs on board, and what the tests trust.
+
+A `Model` and what one agent perceives go in, a command comes out. Rules are called by the names that they ask for, in
+the order of the drivers: all neighbours, all surfaces, then the decision. In a plane every z is zero.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from airflock.core.contract import Model
+from airflock.core.maths import FAR, TINY, norm
+from airflock.core.vocabulary import Own, Percept, asks
+from airflock.errors import RuleError
+
+START = {"sum": 0.0, "min": FAR, "max": -FAR}  # what a reduction gives where nothing is reduced
+
+
+class State(NamedTuple):
+    """Position (m) and velocity (m/s), as whoever holds the record knows them; local east-north-up."""
+
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+
+
+class Heard(NamedTuple):
+    """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s."""
+
+    who: int
+    state: State
+    age: float
+
+
+class Decision(NamedTuple):
+    """What one agent decides: its command (m/s, m/s² or a heading, as Model.command says) and its new Memory."""
+
+    command: tuple[float, float, float]
+    memory: Any
+
+
+def decide(
+    model: Model,
+    p: Any,
+    own: State,
+    neighbours: Iterable[Heard],
+    surfaces: Iterable[tuple[float, float, float, float]],
+    memory: Any = None,
+    *,
+    time: float,
+    period: float,
+    index: int = 0,
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    percept: Percept | None = None,
+) -> Decision:
+    """Decision of one agent.
+
+    model, p   : flocking law and its parameters
+    own        : own state as measured
+    neighbours : everybody who is heard now, without the agent itself; model.reach is applied here
+    surfaces   : distance (m, negative on the far side) and unit normal of every wall and obstacle
+    memory     : Memory from the last decision; None before the first
+    time       : since the start of the flight, s; period : between two decisions, s
+    index      : own index in the flock; centre : of the arena, m
+    percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
+
+    Raises RuleError where a rule asks for what the model does not provide.
+    """
+    vx, vy, vz = own.vx, own.vy, own.vz
+    f = 1.0 / norm(vx, vy, vz)
+    given: dict[str, Any] = {
+        "own": Own(vx, vy, vz, f * vx, f * vy, f * vz),
+        "sums": meet_neighbours(model, p, own, neighbours, index),
+        "walls": meet_surfaces(model, p, own, surfaces),
+        "memory": first_memory(model) if memory is None else memory,
+        "percept": percept or Percept(time, centre[0] - own.x, centre[1] - own.y, centre[2] - own.z),
+        "period": period,
+        "p": p,
+    }
+    result = answer(model.decide, "decide", given, model.name)
+    x, y, z = result[:3]
+    return Decision((x, y, z), result[3] if len(result) > 3 else memory)
+
+
+def first_memory(model: Model) -> Any:
+    """Memory of an agent before its first decision; None if the model keeps none."""
+    return model.Memory() if model.Memory is not None else None
+
+
+def meet_neighbours(model: Model, p: Any, own: State, neighbours: Iterable[Heard], index: int) -> Any:
+    """The model's Sums over all neighbours within its reach; None without Sums."""
+    if model.Sums is None:
+        return None
+    if model.neighbour is None:
+        return _zeros(model.Sums)
+    near = answer(model.reach, "reach", {"p": p}, model.name) if model.reach is not None else FAR
+    terms = []
+    for heard in neighbours:
+        given = pair_percept(own, heard, index)
+        if given["r2"] <= near * near:
+            terms.append(answer(model.neighbour, "neighbour", given | {"p": p}, model.name))
+    return reduced(model.Sums, model.reduce, terms)
+
+
+def meet_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[float, float, float, float]]) -> Any:
+    """The model's Walls, summed over all surfaces; None without Walls."""
+    if model.Walls is None:
+        return None
+    if model.boundary is None:
+        return _zeros(model.Walls)
+    terms = []
+    for distance, nx, ny, nz in surfaces:
+        given = {"distance": distance, "nx": nx, "ny": ny, "nz": nz, "vx": own.vx, "vy": own.vy, "vz": own.vz, "p": p}
+        terms.append(answer(model.boundary, "boundary", given, model.name))
+    return reduced(model.Walls, {}, terms)
+
+
+def pair_percept(own: State, heard: Heard, index: int) -> dict[str, float]:
+    """Everything that a neighbour rule may ask for, SI; differences are neighbour minus own."""
+    other = heard.state
+    dx, dy, dz = other.x - own.x, other.y - own.y, other.z - own.z
+    dvx, dvy, dvz = other.vx - own.vx, other.vy - own.vy, other.vz - own.vz
+    f = 1.0 / norm(own.vx, own.vy, own.vz)
+    g = 1.0 / norm(other.vx, other.vy, other.vz)
+    return {
+        "dx": dx, "dy": dy, "dz": dz, "r": norm(dx, dy, dz), "r2": dx * dx + dy * dy + dz * dz + TINY,
+        "dvx": dvx, "dvy": dvy, "dvz": dvz, "dv": norm(dvx, dvy, dvz),
+        "vx": own.vx, "vy": own.vy, "vz": own.vz, "hx": f * own.vx, "hy": f * own.vy, "hz": f * own.vz,
+        "nhx": g * other.vx, "nhy": g * other.vy, "nhz": g * other.vz,
+        "age": heard.age, "lower": 1.0 if heard.who < index else 0.0,
+    }  # fmt: skip
+
+
+def reduced(record: type, how: Mapping[str, str], terms: Iterable[tuple[float, ...]]) -> Any:
+    """One record from many: each field summed, or its least or greatest value where `how` says so."""
+    fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
+    ways = [how.get(name, "sum") for name in fields]
+    totals = [START[way] for way in ways]
+    for term in terms:
+        totals = [combined(way, total, value) for way, total, value in zip(ways, totals, term, strict=True)]
+    return record(*totals)
+
+
+def combined(how: str, total: float, value: float) -> float:
+    """A total with one more value: sum, min or max."""
+    return total + value if how == "sum" else (min(total, value) if how == "min" else max(total, value))
+
+
+def answer(rule: Callable[..., Any], kind: str, given: Mapping[str, Any], owner: str = "") -> Any:
+    """Call a rule with what it asks for by name."""
+    names = _asked(rule, kind, owner)
+    for name in names:
+        if given.get(name) is None:
+            raise RuleError(f"{owner}.{kind} asks for {name}, which {owner} does not provide".lstrip("."))
+    return rule(*(given[name] for name in names))
+
+
+@cache
+def _asked(rule: Callable[..., Any], kind: str, owner: str) -> tuple[str, ...]:
+    return asks(rule, kind, owner)
+
+
+def _zeros(record: type) -> Any:
+    return record(*([0.0] * len(record._fields)))  # type: ignore[attr-defined]

@@ -1,0 +1,171 @@
+"""The rule contract: what a model, a body and an order parameter consist of.
+
+A rule is a plain function of floats. Its argument names are the declaration: a driver computes and supplies only what
+is asked for, in any order. `core.vocabulary` lists the names.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
+from airflock.errors import RuleError
+
+
+@dataclass(frozen=True)
+class Model:
+    """A published flocking law: parameters and rules, gathered from a module or any namespace.
+
+    name         : how scenarios refer to it
+    Parameters   : record of parameters (`core.parameters.Parameters`)
+    command      : "velocity" (m/s), "acceleration" (m/s²) or "heading" (unit vector)
+    reach        : `reach(p)`, largest interaction radius, m; without it the radio alone decides who is heard
+    sight        : `sight(p)`, how far percept.cast looks, m
+    neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
+    boundary     : surface rule → Walls
+    decide       : → command x, y, z and a Memory if the model declares one
+    usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
+    preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
+    """
+
+    name: str
+    Parameters: type
+    command: str
+    decide: Callable[..., Any]
+    reach: Callable[..., float] | None = None
+    sight: Callable[..., float] | None = None
+    neighbour: Callable[..., Any] | None = None
+    Sums: type | None = None
+    boundary: Callable[..., Any] | None = None
+    Walls: type | None = None
+    Memory: type | None = None
+    reduce: Mapping[str, str] = field(default_factory=dict)
+    usual: Mapping[str, float] = field(default_factory=dict)
+    preferred_speed: Callable[..., float] | None = None
+    interaction_range: Callable[..., float] | None = None
+    doc: str = ""
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.decide, self.neighbour, self.boundary))
+
+
+def model(namespace: Any, name: str = "") -> Model:
+    """Gather a model from a module, a class or a mapping of names; refuse what the contract does not know."""
+    found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
+    name = name or str(found.get("NAME") or found.get("__name__", "model")).rpartition(".")[2]
+    for needed in ("Parameters", "COMMAND", "decide"):
+        if needed not in found:
+            raise RuleError(f"model {name} lacks {needed}")
+    if found["COMMAND"] not in COMMANDS:
+        raise RuleError(f"model {name}: COMMAND = {found['COMMAND']!r} is none of {', '.join(COMMANDS)}")
+    for rule, record in (("neighbour", "Sums"), ("boundary", "Walls")):
+        if rule in found and record not in found:
+            raise RuleError(f"model {name} has a rule {rule} but no NamedTuple {record}")
+    for kind in ("reach", "sight", "neighbour", "boundary", "decide"):
+        if kind in found:
+            asks(found[kind], kind, name)
+    reduce = dict(found.get("REDUCE", {}))
+    for key, how in reduce.items():
+        if key not in getattr(found.get("Sums"), "_fields", ()) or how not in REDUCTIONS:
+            raise RuleError(f"model {name}: REDUCE[{key!r}] = {how!r}; give a field of Sums and one of {REDUCTIONS}")
+    return Model(
+        name=name,
+        Parameters=found["Parameters"],
+        command=found["COMMAND"],
+        decide=found["decide"],
+        reach=found.get("reach"),
+        sight=found.get("sight"),
+        neighbour=found.get("neighbour"),
+        Sums=found.get("Sums"),
+        boundary=found.get("boundary"),
+        Walls=found.get("Walls"),
+        Memory=found.get("Memory"),
+        reduce=reduce,
+        usual=dict(found.get("USUAL", {})),
+        preferred_speed=found.get("preferred_speed"),
+        interaction_range=found.get("interaction_range"),
+        doc=str(found.get("__doc__") or ""),
+    )
+
+
+@dataclass(frozen=True)
+class Body:
+    """What turns a command into a motion, gathered from its module.
+
+    accepts     : the COMMAND of the models that it can carry
+    integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
+    """
+
+    name: str
+    Parameters: type
+    accepts: str
+    integration: str
+    move: Callable[..., Any]
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.move))
+
+
+def body(module: Any, name: str) -> Body:
+    """Gather a body from its module; refuse what the contract does not know."""
+    found = vars(module)
+    asks(found["move"], "move", name)
+    if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
+        raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
+    return Body(name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"])
+
+
+@dataclass(frozen=True)
+class Metric:
+    """An order parameter: rules that measure a flock at one instant, and how instants combine.
+
+    within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
+              while no two agents are nearer than that. A driver may then skip the pair loop.
+    clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
+    reports : of every order parameter that comes out: its unit and what it means
+    total   : from the combined values of a whole flight to named order parameters; by default they are these
+    """
+
+    name: str
+    sample: Callable[..., Any]
+    Sample: type
+    pair: Callable[..., Any] | None = None
+    Pair: type | None = None
+    agent: Callable[..., Any] | None = None
+    Agent: type | None = None
+    linked: Callable[..., Any] | None = None
+    member: Callable[..., Any] | None = None
+    Member: type | None = None
+    cluster: Callable[..., Any] | None = None
+    Cluster: type | None = None
+    Memory: type | None = None
+    within: Callable[..., float] | None = None
+    reduce: Mapping[str, str] = field(default_factory=dict)
+    over_time: Mapping[str, str] = field(default_factory=dict)
+    clock: str = "sample"
+    total: Callable[..., dict[str, float]] | None = None
+    reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
+
+
+def metric(module: Any) -> Metric:
+    """Gather an order parameter from its module; refuse what the contract does not know."""
+    found = dict(vars(module))
+    name = str(found["__name__"]).rpartition(".")[2]
+    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within"):
+        if kind in found:
+            asks(found[kind], kind, name)
+    records = (
+        "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
+        "Memory", "within", "total",
+    )  # fmt: skip
+    return Metric(
+        name=name,
+        reduce=dict(found.get("REDUCE", {})),
+        over_time=dict(found.get("OVER_TIME", {})),
+        reports=dict(found.get("REPORTS", {})),
+        clock=found.get("CLOCK", "sample"),
+        **{key: found[key] for key in records if key in found},
+    )

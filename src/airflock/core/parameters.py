@@ -1,0 +1,147 @@
+"""Parameters: declared once, with unit, range, meaning and source.
+
+Help texts, validation, sliders, search bounds and the kernels' table rows all come from these declarations. A record
+is a frozen dataclass derived from `Parameters`; its numbers are floats, its choices strings that are compile-time
+constants in a kernel.
+"""
+
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, dataclass, field, fields
+from typing import Any, NamedTuple
+
+from airflock.errors import ParameterError
+
+
+class Quantity(NamedTuple):
+    """Declaration of one number: SI unit, allowed range (both ends included), meaning and source."""
+
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    source: str
+    optional: bool  # None is allowed and means "derived from the rest of the scenario"
+
+
+class Choice(NamedTuple):
+    """Declaration of one enumerated choice."""
+
+    options: tuple[str, ...]
+    meaning: str
+    source: str
+
+
+class Points(NamedTuple):
+    """Declaration of a list of points or of polygons; `depth` brackets deep (2: points, 3: polygons)."""
+
+    unit: str
+    depth: int
+    meaning: str
+    source: str
+    axes: int = 2  # coordinates of a point
+
+
+class Text(NamedTuple):
+    """Declaration of a text, such as the name of a file."""
+
+    meaning: str
+    source: str
+
+
+Declaration = Quantity | Choice | Points | Text
+
+
+def quantity(default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "") -> Any:
+    """Declare a number; a default of None makes it optional."""
+    record = Quantity(unit, float(low), float(high), meaning, source, default is None)
+    return field(default=default, metadata={"airflock": record})
+
+
+def choice(default: str, options: tuple[str, ...], *, meaning: str, source: str = "") -> Any:
+    """Declare an enumerated choice."""
+    return field(default=default, metadata={"airflock": Choice(options, meaning, source)})
+
+
+def points(unit: str, depth: int, *, meaning: str, source: str = "", axes: int = 2) -> Any:
+    """Declare a list of points (empty by default)."""
+    return field(default=(), metadata={"airflock": Points(unit, depth, meaning, source, axes)})
+
+
+def text(default: str = "", *, meaning: str, source: str = "") -> Any:
+    """Declare a text."""
+    return field(default=default, metadata={"airflock": Text(meaning, source)})
+
+
+def declarations(record: Any) -> Iterator[tuple[str, Declaration, Any]]:
+    """Name, declaration and default of each parameter of a record or of its class."""
+    for item in fields(record):
+        yield item.name, _declared(item), None if item.default is MISSING else item.default
+
+
+def _declared(item: Field[Any]) -> Declaration:
+    found = item.metadata.get("airflock")
+    if found is None:
+        raise ParameterError(f"parameter {item.name} is not declared by quantity(), choice(), points() or text()")
+    return found  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """Base of every record of parameters: numbers become floats, and all faults are reported together."""
+
+    def __post_init__(self) -> None:
+        faults = []
+        for name, declared, _ in declarations(self):
+            value = getattr(self, name)
+            if isinstance(declared, Quantity):
+                if isinstance(value, int) and not isinstance(value, bool):
+                    value = float(value)
+                    object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
+                fault = quantity_fault(value, declared)
+            elif isinstance(declared, Choice):
+                fault = choice_fault(value, declared)
+            elif isinstance(declared, Text):
+                fault = "" if isinstance(value, str) else f"= {value!r} is no text"
+            else:
+                value = _frozen(value)
+                object.__setattr__(self, name, value)
+                fault = ""
+            if fault:
+                faults.append(f"{type(self).__name__}.{name} {fault}")
+        if faults:
+            raise ParameterError("\n".join(faults))
+
+
+def quantity_fault(value: Any, declared: Quantity) -> str:
+    """What is wrong with a value, as the rest of a sentence; empty if nothing is."""
+    if value is None and declared.optional:
+        return ""
+    if not isinstance(value, float):
+        return f"= {value!r} is not a number; give {declared.unit} in [{declared.low:g}, {declared.high:g}]"
+    if not declared.low <= value <= declared.high:
+        return f"= {value:g} {declared.unit} lies outside [{declared.low:g}, {declared.high:g}] {declared.unit}"
+    return ""
+
+
+def choice_fault(value: Any, declared: Choice) -> str:
+    """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
+    return "" if value in declared.options else f"= {value!r} is none of {', '.join(declared.options)}"
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(v) for v in value) if isinstance(value, (list, tuple)) else float(value)
+
+
+def number_names(record: Any) -> tuple[str, ...]:
+    """Names of the numbers of a record or its class, in declared order: the columns of its table."""
+    return tuple(name for name, declared, _ in declarations(record) if isinstance(declared, Quantity))
+
+
+def choices(record: Any) -> dict[str, str]:
+    """The enumerated choices of a record: compile-time constants of a kernel."""
+    return {name: getattr(record, name) for name, declared, _ in declarations(record) if isinstance(declared, Choice)}
+
+
+def row(record: Any) -> list[float]:
+    """The numbers of a record in declared order; an optional number that is None becomes 0."""
+    return [getattr(record, name) or 0.0 for name in number_names(record)]

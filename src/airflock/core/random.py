@@ -1,0 +1,93 @@
+"""Counter-based random numbers: a number is a function of (seed, stream, world, step, agent).
+
+Philox 4x32-10 (Salmon et al. 2011). The counter holds agent, step, stream with draw, and world; the key holds the
+seed. So no number depends on the order of evaluation, on threads or on who else draws, and a new noise source never
+shifts another. The functions named in `PRIMITIVES` are written here for plain Python integers and floats; a
+device binds its own form of the same arithmetic (`airflock.engine.primitives`).
+"""
+
+import math
+
+# Every stream of the project. Numbers are never reused; a stream may draw 256 times per step.
+SENSOR = 1  # Langevin noise of own and of sent measurements
+OUTER = 2  # white outer noise on the acceleration
+START = 3  # where the agents start
+LOSS = 4  # packets lost between one pair
+LINK = 5  # packets received on one link between one pair
+GUST = 6  # wind gusts, common to the flock
+MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
+
+PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
+
+MASK = 0xFFFFFFFF
+QUARTER_PI = 0.25 * math.pi
+
+
+def word(a):
+    """An integer as a 32-bit word."""
+    return a & MASK
+
+
+def multiply_high(a, b):
+    """Upper 32 bits of the product of two 32-bit words."""
+    return (a * b) >> 32
+
+
+def multiply_low(a, b):
+    """Lower 32 bits of the product of two 32-bit words."""
+    return (a * b) & MASK
+
+
+def add32(a, b):
+    """Sum of two 32-bit words, modulo 2^32."""
+    return (a + b) & MASK
+
+
+def xor32(a, b):
+    """Bitwise exclusive or of two 32-bit words."""
+    return a ^ b
+
+
+def philox(c0, c1, c2, c3, k0, k1):
+    """Four random words of 32 bits from a counter of four words and a key of two."""
+    c0, c1, c2, c3, k0, k1 = word(c0), word(c1), word(c2), word(c3), word(k0), word(k1)
+    for _ in range(10):
+        h0 = multiply_high(0xD2511F53, c0)
+        l0 = multiply_low(0xD2511F53, c0)
+        h1 = multiply_high(0xCD9E8D57, c2)
+        l1 = multiply_low(0xCD9E8D57, c2)
+        c0 = xor32(xor32(h1, c1), k0)
+        c1 = l1
+        c2 = xor32(xor32(h0, c3), k1)
+        c3 = l0
+        k0 = add32(k0, 0x9E3779B9)
+        k1 = add32(k1, 0xBB67AE85)
+    return c0, c1, c2, c3
+
+
+def draw(c0, c1, c2, c3, k0, k1):
+    """The same as philox: compiled once and called, where no loop over agents has to vectorise around it."""
+    return philox(c0, c1, c2, c3, k0, k1)
+
+
+def words(seed, stream, world, step, agent, draw=0):
+    """Four random words of 32 bits for one consumer; seed may use 64 bits, the others 32, draw 8."""
+    return philox(agent, step, stream + 256 * draw, world, seed, seed >> 32)
+
+
+def uniform(word):
+    """A word as a float strictly between 0 and 1, from its upper 23 bits: exactly the same in every precision."""
+    return ((word >> 9) + 0.5) / 8388608.0
+
+
+def normal_pair(a, b):
+    """Two independent normal numbers N(0, 1) from two words (Box and Muller); at most 5.8 standard deviations."""
+    radius = math.sqrt(-2.0 * math.log(uniform(a)))
+    angle = (((b << 2) & MASK) ^ 0x80000000) - 0x80000000  # the lower 30 bits as a signed word
+    s = math.sin(angle * (QUARTER_PI / 2147483648.0))
+    c = math.cos(angle * (QUARTER_PI / 2147483648.0))
+    if b & 0x80000000:  # the upper two bits choose the quarter turn
+        radius = -radius
+    if b & 0x40000000:
+        return radius * s, radius * c
+    return radius * c, radius * s

@@ -1,0 +1,206 @@
+"""The vocabularies of the rule contract: what each kind of rule may ask for, by name, and the records behind the names.
+
+All quantities are in SI; a difference is always neighbour minus own.
+"""
+
+import inspect
+from collections.abc import Callable
+from difflib import get_close_matches
+from typing import Any, NamedTuple
+
+from airflock.errors import RuleError
+
+PAIR = {
+    "dx": "offset to the neighbour as heard, east, m",
+    "dy": "the same, north, m",
+    "dz": "the same, up, m",
+    "r": "length of the offset, m",
+    "r2": "its square, m²; cheaper than r",
+    "dvx": "velocity of the neighbour minus own, east, m/s",
+    "dvy": "the same, north, m/s",
+    "dvz": "the same, up, m/s",
+    "dv": "length of the velocity difference, m/s",
+    "vx": "own velocity as measured, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "hx": "own heading (unit vector), east",
+    "hy": "the same, north",
+    "hz": "the same, up",
+    "nhx": "heading of the neighbour as heard, east",
+    "nhy": "the same, north",
+    "nhz": "the same, up",
+    "age": "age of the neighbour's data, s",
+    "lower": "1.0 if the neighbour has the lower index, else 0.0",
+}
+SURFACE = {
+    "distance": "distance to the surface, m; negative on its far side",
+    "nx": "unit normal of the surface, pointing to where flying is allowed, east",
+    "ny": "the same, north",
+    "nz": "the same, up",
+    "vx": "own velocity as measured, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+}
+AGENT = {
+    "own": "Own: velocity vx vy vz (m/s) and heading hx hy hz as measured",
+    "sums": "what `neighbour` summed up over all neighbours",
+    "walls": "what `boundary` summed up over all surfaces",
+    "memory": "the model's Memory of this agent",
+    "percept": "Percept: time (s), the offsets centre_x centre_y centre_z to the arena's centre "
+    "and goal_x goal_y goal_z to the goal (m), rays and noise",
+    "period": "time between two decisions, s",
+}
+BODY = {
+    "vx": "true velocity, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "mx": "own velocity as measured, east, m/s",
+    "my": "the same, north, m/s",
+    "mz": "the same, up, m/s",
+    "cx": "command, east; m/s or m/s² as the model's COMMAND says",
+    "cy": "the same, north",
+    "cz": "the same, up",
+    "gx": "normal random number, east",
+    "gy": "the same, north",
+    "gz": "the same, up",
+    "wx": "wind, east, m/s",
+    "wy": "the same, north, m/s",
+    "wz": "the same, up, m/s",
+    "dt": "time step, s",
+}
+MEASURED = {
+    "x": "position, east, m",
+    "y": "the same, north, m",
+    "z": "the same, up, m",
+    "vx": "velocity, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "speed": "length of the velocity, m/s",
+    "hx": "heading (unit vector; zero at rest), east",
+    "hy": "the same, north",
+    "hz": "the same, up",
+    "excursion": "distance outside the arena or inside an obstacle, m; negative where flying is allowed",
+    "touches": "1.0 if a sphere of radius metrics.r_body met the scene on its last step of motion, else 0.0",
+    "rays": "rays that the agent cast at its last decision; 0.0 in a recording",
+    "pair": "what this metric's `pair` gathered for this agent",
+    "memory": "this metric's Memory of this agent",
+    "mean": "Mean over the flock: x y z (m), vx vy vz (m/s), hx hy hz, and number n",
+}
+MEMBER = {
+    name: text for name, text in MEASURED.items() if name not in ("excursion", "touches", "rays", "memory", "mean")
+} | {
+    "mean": "Mean over the agent's own cluster",
+}
+CLUSTER = {
+    "n": "members of the cluster",
+    "hx": "sum of their headings, east",
+    "hy": "the same, north",
+    "hz": "the same, up",
+    "hh": "sum of the squared lengths of their headings: how many of them move",
+    "members": "what `member` summed up over the members",
+    "mean": "Mean over the members",
+}
+SAMPLE = {
+    "n": "number of agents",
+    "mean": "Mean over the flock",
+    "agents": "what `agent` summed up over all agents",
+    "clusters": "what `cluster` summed up over all clusters",
+    "dimensions": "2.0 in a plane, 3.0 in space",
+    "time": "since the start, s",
+}
+
+VOCABULARY: dict[str, dict[str, str]] = {
+    "reach": {"p": "parameters"},
+    "sight": {"p": "parameters"},
+    "neighbour": {**PAIR, "p": "the model's parameters"},
+    "boundary": {**SURFACE, "p": "the model's parameters"},
+    "decide": {**AGENT, "p": "the model's parameters"},
+    "move": {**BODY, "b": "the body's parameters"},
+    "pair": {name: PAIR[name] for name in ("dx", "dy", "dz", "r", "r2", "lower")} | {"q": "metric parameters"},
+    "linked": {"r": "distance of two agents, m", "r2": "its square, m²; cheaper than r", "q": "metric parameters"},
+    "agent": {**MEASURED, "q": "metric parameters"},
+    "member": {**MEMBER, "q": "metric parameters"},
+    "cluster": {**CLUSTER, "q": "metric parameters"},
+    "sample": {**SAMPLE, "q": "metric parameters"},
+    "within": {"q": "metric parameters"},
+}
+COMMANDS = ("velocity", "acceleration", "heading")
+REDUCTIONS = ("sum", "min", "max")
+
+
+class Own(NamedTuple):
+    """An agent's own state as it measures it: velocity (m/s) and heading (unit vector)."""
+
+    vx: float
+    vy: float
+    vz: float
+    hx: float
+    hy: float
+    hz: float
+
+
+class Percept(NamedTuple):
+    """What else an agent perceives: time (s), offsets to the arena's centre and to the goal (m), rays, noise.
+
+    Without a goal its offset is zero. An engine binds the methods to its world and its streams; a drone passes a
+    Percept of its own with a real range finder. As they stand here the world is empty and quiet.
+    """
+
+    time: float
+    centre_x: float
+    centre_y: float
+    centre_z: float
+    goal_x: float = 0.0
+    goal_y: float = 0.0
+    goal_z: float = 0.0
+
+    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
+        """Free distance (m) along the unit vector u to the arena's walls and obstacles, at most `length` (m)."""
+        return length
+
+    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
+        """Free distance (m) for a sphere of this radius (m) along the unit vector u, at most `length` (m).
+
+        It ends at the arena's walls, its obstacles and what stands in the scene; a radius of 0 is a thin ray. A model
+        that casts declares `sight(p)`, the largest length + radius (m).
+        """
+        return length
+
+    def normal(self, draw: int) -> float:
+        """Normal random number N(0, 1) of this agent and decision; `draw` from 0 to 255 tells several apart."""
+        return 0.0
+
+    def uniform(self, draw: int) -> float:
+        """Uniform random number between 0 and 1; it shares its words with normal(draw), so use different draws."""
+        return 0.5
+
+
+BOUND = ("ray", "cast", "normal", "uniform")  # methods of Percept that an engine binds
+
+
+class Mean(NamedTuple):
+    """Means over a flock or a cluster of n agents: position (m), velocity (m/s), heading."""
+
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+    hx: float
+    hy: float
+    hz: float
+    n: float
+
+
+def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
+    """Names that a rule asks for, checked against the vocabulary of its kind."""
+    names = tuple(inspect.signature(rule).parameters)
+    known = VOCABULARY[kind]
+    for name in names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            where = f"{owner}.{kind}" if owner else kind
+            raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
+    return names

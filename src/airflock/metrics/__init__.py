@@ -1,0 +1,1 @@
+"""Layer 2: order parameters and fitness, one notion per file."""

@@ -1,0 +1,39 @@
+"""Velocity correlation within clusters and the smallest cluster (Vásárhelyi et al. 2018, Eqs 12-13).
+
+Self pairs are excluded, as in the authors' program; a lone agent and an agent at rest contribute 0.
+"""
+
+from typing import NamedTuple
+
+REPORTS = {"phi_corr": ("", "velocity correlation within clusters"), "n_min": ("", "smallest cluster")}
+
+REDUCE = {"smallest": "min"}
+
+
+class Cluster(NamedTuple):
+    """Sum over the members of their mean correlation with the others; members."""
+
+    correlation: float
+    smallest: float
+
+
+class Sample(NamedTuple):
+    """Correlation in [-1, 1]; members of the smallest cluster."""
+
+    phi_corr: float
+    n_min: float
+
+
+def linked(r2, q):
+    """Whether two agents at a squared distance r2 (m²) belong to one cluster."""
+    return r2 < q.r_cluster * q.r_cluster
+
+
+def cluster(n, hx, hy, hz, hh):
+    """Sum over i of 1/(n-1) sum over j != i of the cosine between their velocities (Eq. 13)."""
+    return Cluster((hx * hx + hy * hy + hz * hz - hh) / max(n - 1.0, 1.0), n)
+
+
+def sample(clusters, n):
+    """Correlation per agent."""
+    return Sample(clusters.correlation / n, clusters.smallest)

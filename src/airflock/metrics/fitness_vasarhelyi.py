@@ -1,0 +1,40 @@
+"""The six partial fitnesses and their product (Vásárhelyi et al. 2018, Eqs 17-22).
+
+F_cluster is printed with three arguments in F3; F1 takes three and fits the definition: F1(N_min, N/5, N/5).
+"""
+
+from collections.abc import Mapping
+
+from airflock.core.maths import bell, peak, rising
+from airflock.metrics.parameters import Parameters
+
+REPORTS = {
+    "f_speed": ("", "partial fitness: speed"),
+    "f_coll": ("", "partial fitness: collisions"),
+    "f_disc": ("", "partial fitness: connection"),
+    "f_cluster": ("", "partial fitness: clusters"),
+    "f_wall": ("", "partial fitness: walls"),
+    "f_corr": ("", "partial fitness: correlation"),
+    "fitness": ("", "product of the partial fitnesses"),
+}
+
+
+def fitness(score: Mapping[str, float], n: int, q: Parameters) -> dict[str, float]:
+    """Partial fitnesses f_* and their product from the order parameters of one flight.
+
+    score : mapping with phi_vel (m/s), phi_corr, phi_coll, phi_wall (m), n_disc, n_min
+    n     : number of agents; q : metric parameters with v_flock, v_tol (m/s), a_tol, r_tol (m)
+    Returns a dict of numbers between 0 and 1.
+    """
+    parts = {
+        "f_speed": rising(score["phi_vel"], q.v_flock, q.v_tol),
+        "f_coll": peak(score["phi_coll"], q.a_tol),
+        "f_disc": peak(score["n_disc"], n / 5.0),
+        "f_cluster": rising(score["n_min"], n / 5.0, n / 5.0),
+        "f_wall": bell(score["phi_wall"], q.r_tol),
+        "f_corr": max(score["phi_corr"], 0.0),
+    }
+    product = 1.0
+    for part in parts.values():
+        product *= part
+    return {**parts, "fitness": product}

@@ -1,0 +1,43 @@
+"""Share of agents that are flocked, and the time until all are (Kidger, section 5.1).
+
+Flocked means within q.r_flock of the centre of mass; the thesis halves a diameter.
+"""
+
+import math
+from typing import NamedTuple
+
+from airflock.core.maths import FAR
+
+OVER_TIME = {"time_to_flock": "min"}
+
+
+class Agent(NamedTuple):
+    """1.0 if flocked."""
+
+    inside: float
+
+
+class Sample(NamedTuple):
+    """Share of the flock that is flocked; this instant (s) if all are, else FAR."""
+
+    flocked: float
+    time_to_flock: float
+
+
+def agent(x, y, z, mean, q):
+    """Whether one agent is within q.r_flock of the centre of mass."""
+    dx = x - mean.x
+    dy = y - mean.y
+    dz = z - mean.z
+    return Agent(1.0 if dx * dx + dy * dy + dz * dz <= q.r_flock * q.r_flock else 0.0)
+
+
+def sample(agents, n, time):
+    """Share of this instant."""
+    return Sample(agents.inside / n, time if agents.inside > n - 0.5 else FAR)
+
+
+def total(over_time):
+    """Nan where the flock was never complete."""
+    time = over_time["time_to_flock"]
+    return {**over_time, "time_to_flock": time if time < 0.5 * FAR else math.nan}

@@ -1,0 +1,54 @@
+"""Distance to the nearest neighbour, and agents out of everybody's radio range (Vásárhelyi et al. 2018, Methods)."""
+
+import math
+from typing import NamedTuple
+
+from airflock.core.maths import FAR
+
+REPORTS = {
+    "r_min_mean": ("m", "mean distance to the nearest neighbour"),
+    "r_min": ("m", "smallest distance of two agents"),
+    "n_disc": ("", "disconnected agents"),
+}
+
+REDUCE = {"nearest2": "min", "least": "min"}  # of Pair, and of Agent
+OVER_TIME = {"r_min": "min"}
+
+
+class Pair(NamedTuple):
+    """Squared distance to the nearest other agent, m²: the root is drawn once per agent, not once per pair."""
+
+    nearest2: float
+
+
+class Agent(NamedTuple):
+    """Sum and minimum of the nearest distances, m; disconnected agents."""
+
+    spacing: float
+    least: float
+    disconnected: float
+
+
+class Sample(NamedTuple):
+    """Mean and minimum of the nearest distances, m; number of disconnected agents."""
+
+    r_min_mean: float
+    r_min: float
+    n_disc: float
+
+
+def pair(r2):
+    """Squared distance of one other agent, m²."""
+    return Pair(r2)
+
+
+def agent(pair, q):
+    """Nearest distance (m) and whether it exceeds the radio range."""
+    nearest = math.sqrt(pair.nearest2)
+    alone = 1.0 if nearest > q.r_comm else 0.0
+    return Agent(nearest if pair.nearest2 < FAR else 0.0, nearest, alone)
+
+
+def sample(agents, n):
+    """Mean and minimum over the n agents."""
+    return Sample(agents.spacing / n, agents.least, agents.disconnected)

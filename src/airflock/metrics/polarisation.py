@@ -1,0 +1,18 @@
+"""Polarisation: length of the mean heading; 1 aligned, about 1/sqrt(n) disordered (Vicsek et al. 1995 call it v_a)."""
+
+from typing import NamedTuple
+
+from airflock.core.maths import norm
+
+REPORTS = {"polarisation": ("", "length of the mean heading, 1 is aligned")}
+
+
+class Sample(NamedTuple):
+    """Length of the mean heading."""
+
+    polarisation: float
+
+
+def sample(mean):
+    """Length of the mean heading, 0 to 1."""
+    return Sample(norm(mean.hx, mean.hy, mean.hz))

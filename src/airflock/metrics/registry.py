@@ -1,0 +1,42 @@
+"""The order parameters that flights are scored with: sets of metrics by the key metrics.kind."""
+
+from airflock.core.contract import Metric, metric
+from airflock.metrics import (
+    avoidance,
+    collisions,
+    correlation,
+    environment,
+    excursion,
+    fitness_vasarhelyi,
+    flocked,
+    groups,
+    milling,
+    nearest,
+    polarisation,
+    quality,
+    rotation,
+    shape,
+    speed,
+    swarms,
+)
+
+STANDARD = tuple(
+    metric(module) for module in (speed, correlation, nearest, collisions, excursion, rotation, polarisation)
+)
+ORDER = tuple(metric(module) for module in (speed, polarisation, milling, shape))
+ZAPOTECATL = (metric(quality), metric(polarisation))
+KIDGER = tuple(
+    metric(module) for module in (flocked, swarms, polarisation, nearest, collisions, environment, avoidance, speed)
+)
+SETS: dict[str, tuple[Metric, ...]] = {
+    "vasarhelyi": STANDARD,
+    "zapotecatl": ZAPOTECATL,
+    "groups": (*ZAPOTECATL, metric(groups), metric(shape)),
+    "order": ORDER,
+    "kidger": KIDGER,
+}
+
+# of every order parameter that is reported: its unit and what it means, from the modules that define them
+REPORTS: dict[str, tuple[str, str]] = {
+    name: about for found in SETS.values() for each in found for name, about in each.reports.items()
+} | fitness_vasarhelyi.REPORTS

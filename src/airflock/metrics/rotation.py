@@ -1,0 +1,25 @@
+"""Rotation about the arena's centre (Vásárhelyi et al. 2018, Eq. 1): 1 counter-clockwise, -1 clockwise, 0 neither."""
+
+from typing import NamedTuple
+
+from airflock.core.maths import norm
+
+REPORTS = {
+    "phi_lap": ("", "rotation, counter-clockwise positive"),
+    "phi_lap_abs": ("", "rotation, either way"),
+}
+
+
+class Sample(NamedTuple):
+    """phi_LAP of this instant, and its magnitude."""
+
+    phi_lap: float
+    phi_lap_abs: float
+
+
+def sample(mean, q):
+    """Tangential share of the mean velocity at the mean position, in units of v_flock."""
+    rx = mean.x - q.centre_x
+    ry = mean.y - q.centre_y
+    lap = (mean.vy * rx - mean.vx * ry) / (q.v_flock * norm(rx, ry, 0.0))
+    return Sample(lap, abs(lap))

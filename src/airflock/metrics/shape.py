@@ -1,0 +1,58 @@
+"""Area and shape of a group: the ellipse, or in space the ellipsoid, whose uniform filling has the same second moments.
+
+A uniform ellipse of half axes a, b has the variances a²/4, b²/4; a uniform ellipsoid a²/5, b²/5, c²/5.
+"""
+
+import math
+from typing import NamedTuple
+
+REPORTS = {
+    "area": ("m²", "area of the ground plan"),
+    "elongation": ("", "long over short axis"),
+    "volume": ("m³", "volume; 0 in a plane"),
+}
+
+
+class Agent(NamedTuple):
+    """Products of the offsets from the centre, m²."""
+
+    xx: float
+    yy: float
+    zz: float
+    xy: float
+    yz: float
+    zx: float
+
+
+class Sample(NamedTuple):
+    """Area of the ground plan (m²), long over short axis of it, and volume (m³; 0 in a plane)."""
+
+    area: float
+    elongation: float
+    volume: float
+
+
+def agent(x, y, z, mean):
+    """Second moments of one agent about the centre."""
+    dx = x - mean.x
+    dy = y - mean.y
+    dz = z - mean.z
+    return Agent(dx * dx, dy * dy, dz * dz, dx * dy, dy * dz, dz * dx)
+
+
+def sample(agents, n, dimensions):
+    """Area and elongation from the moments in the plane; volume from all."""
+    a = agents.xx / n
+    b = agents.yy / n
+    c = agents.zz / n
+    d = agents.xy / n
+    e = agents.yz / n
+    f = agents.zx / n
+    flat = max(a * b - d * d, 0.0)
+    half = 0.5 * (a + b)
+    spread = math.sqrt(max(half * half - flat, 0.0))
+    elongation = math.sqrt((half + spread) / max(half - spread, 1e-12 * half + 1e-30))
+    full = max(a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f), 0.0)
+    scale = 20.0 / 3.0 * math.sqrt(5.0) * math.pi  # 4/3 pi 5^(3/2)
+    area = math.pi * (4.0 if dimensions < 2.5 else 5.0) * math.sqrt(flat)
+    return Sample(area, elongation, scale * math.sqrt(full) if dimensions > 2.5 else 0.0)

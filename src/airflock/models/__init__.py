@@ -1,0 +1,1 @@
+"""Layer 2: one publication per file."""

@@ -1,0 +1,1 @@
+"""Layer 2: scalar geometry of arena and obstacles."""

@@ -1,0 +1,46 @@
+"""Start: where agents are when a flight begins."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import choice, quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """Agents start uniform in a region, at rest or in random directions, redrawn until pairs are far enough apart."""
+
+    kind: str = choice(
+        "arena",
+        ("arena", "ball", "box"),
+        source="authors' programs: arena (Vásárhelyi et al. 2018), ball (Zapotecatl et al. 2016)",
+        meaning="region: the whole arena, or a ball (in a plane a disc) or a box (a square) about its centre",
+    )
+    radius: float = quantity(
+        0.5, "m", low=1e-6, high=1e6, source="Zapotecatl et al. 2016, authors' program", meaning="radius of the ball"
+    )
+    side: float = quantity(10.0, "m", low=1e-6, high=1e6, meaning="side of the box")
+    separation: float | None = quantity(
+        None,
+        "m",
+        low=0.0,
+        high=1e4,
+        source="authors' program of Vásárhelyi et al. 2018: max(3 m, 2 s · v_flock)",
+        meaning="smallest distance of two agents at the start; in a ball or a box 0 by default",
+    )
+    clearance: float = quantity(
+        1.0, "m", low=0.0, high=1e3, source="our choice", meaning="free distance to what stands in the scene"
+    )
+    speed: float = quantity(
+        0.0, "m/s", low=0.0, high=200.0, source="authors' program", meaning="speed at the start, in random directions"
+    )
+
+
+def spread(u, low, high):
+    """A uniform number u in (0, 1) as a coordinate between low and high, m."""
+    return low + (high - low) * u
+
+
+def in_ball(x, y, z, radius):
+    """Whether a position lies in the ball of this radius (m) about the origin."""
+    return x * x + y * y + z * z <= radius * radius
