@@ -1,0 +1,223 @@
+"""Scenario files: TOML with units and sources, presets by name, and keys changed from outside."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from importlib import import_module, resources, util
+from pathlib import Path
+from typing import Any
+
+from airflock.core.contract import Model, model
+from airflock.errors import AirflockError, RuleError, ScenarioError
+from airflock.scenarios import checks, geometry, schema
+from airflock.scenarios.scenario import Scenario, start_separation
+from airflock.scenarios.sections import SECTIONS, Flight
+
+MODELS = ("vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger")
+TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "title")
+
+
+def presets() -> dict[str, Path]:
+    """Name → file of every preset shipped with the package."""
+    root = Path(str(resources.files("airflock"))) / "presets"
+    return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
+
+
+def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None) -> Scenario:
+    """Scenario from a preset's name or a file.
+
+    settings : keys like "model.p_rep" with the values that replace the file's
+    law      : a flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead
+               of the file's; its parameters start from their defaults
+    Raises ScenarioError with one line per fault.
+    """
+    known = presets()
+    text = str(name)
+    path = known.get(text) or Path(text)
+    where = text if text in known else str(path)
+    if not path.is_file():
+        near = get_close_matches(text, known, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
+        raise ScenarioError([f"{text}: no such file or preset{hint}"])
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
+        raise ScenarioError([f"{where}: {fault}"]) from fault
+    if law is None:
+        return make(document, where, settings, folder=path.parent)
+    own = law if isinstance(law, Model) else model(law)
+    return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own)
+
+
+def make(
+    document: Mapping[str, Any],
+    where: str = "scenario",
+    settings: Mapping[str, Any] | None = None,
+    *,
+    folder: Path | None = None,
+    law: Model | None = None,
+) -> Scenario:
+    """Scenario from a nested dict. `where` names it in faults; `law` is a model given directly instead of by name."""
+    merged, faults = _merged(document, settings or {})
+    table, more = _model_table(merged)
+    faults += more
+    found = law
+    if found is None:
+        try:
+            found = find_model(table.get("kind"), folder)
+        except AirflockError as fault:
+            faults += str(fault).splitlines()
+    parts, more = _parts(merged, table, found)
+    faults += more + _faults_between(parts, found)
+    if faults or found is None:
+        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    published = _published(merged.get("published", {}))
+    scenario = Scenario(name=where, model=found, published=published, document=merged, **parts)
+    return replace(scenario, notes=tuple(_notes(scenario)))
+
+
+def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """A copy of a document with keys like "model.p_rep" set, and the keys that nobody knows."""
+    merged: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+    faults: list[str] = []
+    for key, value in settings.items():
+        section, _, name = key.partition(".")
+        if name and not isinstance(merged.setdefault(section, {}), dict):
+            faults.append(f"{key} is no key")
+        elif name:
+            merged[section][name] = value
+        else:
+            merged[section] = value
+    for key in merged:
+        if key not in TOP:
+            near = get_close_matches(key, TOP, n=1, cutoff=0.5)
+            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
+    return merged, faults
+
+
+def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:
+    table = merged.get("model", {})
+    if isinstance(table, Mapping):
+        return table, []
+    return {}, [f"model = {table!r} is no table; write model.kind = {table!r}"]
+
+
+def _parts(
+    merged: Mapping[str, Any], table: Mapping[str, Any], found: Model | None
+) -> tuple[dict[str, Any], list[str]]:
+    """The records of a scenario by section, None where one is faulty; and all their faults."""
+    parts: dict[str, Any] = {}
+    body, faults = checks.body_record(merged.get("body", {}), found)
+    for section, record in (SECTIONS | {"body": body}).items():
+        given = merged.get(section, {})
+        if section == "body" and isinstance(given, Mapping):
+            given = {key: value for key, value in given.items() if key != "kind"}
+        parts[section], more = schema.check(section, given, record)
+        faults += more
+    top: dict[str, Any] = {key: merged[key] for key in ("agents", "duration", "dt", "update") if key in merged}
+    parts["flight"], more = schema.check("", top, Flight)
+    faults += more
+    if found is not None:
+        keys = {key: value for key, value in table.items() if key != "kind"}
+        parts["parameters"], more = schema.check("model", keys, found.Parameters)
+        faults += more
+    return parts, faults
+
+
+def _faults_between(parts: Mapping[str, Any], found: Model | None) -> list[str]:
+    """Faults of sections that are sound alone but do not fit each other."""
+    faults: list[str] = []
+    flight = parts["flight"]
+    if flight is not None and flight.agents != int(flight.agents):
+        faults.append(f"agents = {flight.agents:g} is not a whole number")
+    begin: Any = parts["start"] or SECTIONS["start"]()
+    if parts["world"] is not None:
+        separation = parts["start"].separation if parts["start"] is not None else 0.0
+        if separation is None and found is not None and parts.get("parameters") is not None:
+            separation = start_separation(found, parts["parameters"], begin, parts["world"])
+        count = int(flight.agents) if flight is not None else 1
+        faults += geometry.faults(parts["world"], count, separation or 0.0, begin)
+    if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
+        faults += _timing_faults(flight, parts["sensors"].period, parts["metrics"])
+        faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
+        faults += checks.metric_faults(parts["metrics"], parts["world"])
+    return faults
+
+
+def find_model(kind: Any, folder: Path | None = None) -> Model:
+    """Model by name, or from a user's own Python file (relative to the scenario file)."""
+    if not isinstance(kind, str):
+        raise ScenarioError([f"model.kind = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
+    if kind in MODELS:
+        return model(import_module(f"airflock.models.{kind}"), kind)
+    if kind.endswith(".py"):
+        path = Path(kind) if Path(kind).is_absolute() or folder is None else folder / kind
+        spec = util.spec_from_file_location(path.stem, path)
+        if spec is None or spec.loader is None or not path.is_file():
+            raise ScenarioError([f"model.kind = {kind!r}: no such file"])
+        module = util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except Exception as fault:  # the user's own file may fail in any way
+            raise RuleError(f"{path}: {type(fault).__name__}: {fault}") from fault
+        return model(module, path.stem)
+    near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
+    raise ScenarioError([f"model.kind = {kind!r} is no model; {hint}"])
+
+
+def _published(table: Any) -> dict[str, tuple[float, float | None]]:
+    found = {}
+    for key, entry in (table if isinstance(table, Mapping) else {}).items():
+        if isinstance(entry, Mapping) and isinstance(entry.get("mean"), (int, float)):
+            spread = entry.get("sd")
+            found[key] = (float(entry["mean"]), float(spread) if spread is not None else None)
+    return found
+
+
+def _timing_faults(flight: Flight, period: float, metrics: Any) -> list[str]:
+    dt = flight.dt
+    times = {
+        "sensors.period": period,
+        "metrics.period": metrics.period,
+        "metrics.collision_period": metrics.collision_period or dt,
+    }
+    found = [
+        f"{key} = {value:g} s is shorter than dt = {dt:g} s" for key, value in times.items() if 0.0 < value < 0.5 * dt
+    ]
+    if flight.duration / dt > 2**31:
+        found.append(f"duration = {flight.duration:g} s takes more than 2^31 steps of dt = {dt:g} s")
+    return found
+
+
+def _notes(scenario: Scenario) -> list[str]:
+    """What is rounded or cannot be meant, for a person to read; nothing here stops a flight."""
+    notes, dt = [], scenario.flight.dt
+    times = {
+        "sensors.period": scenario.sensors.period,
+        "radio.delay": scenario.radio.delay,
+        "metrics.period": scenario.metrics.period,
+        "metrics.collision_period": scenario.metrics.collision_period or dt,
+    }
+    for key, value in times.items():
+        steps = round(value / dt)
+        if abs(steps * dt - value) > 1e-9 * max(value, dt):
+            notes.append(f"{key} = {value:g} s is rounded to {steps * dt:g} s, {steps} steps of dt = {dt:g} s")
+    period, delay = scenario.sensors.period, scenario.radio.delay
+    if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
+        notes.append(
+            f"radio.delay = {delay:g} s is no multiple of sensors.period = {period:g} s: decisions use the states of "
+            "exactly that long ago, taken between two measurements"
+        )
+    p = scenario.parameters
+    if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
+        notes.append(
+            f"model.r0_frict = {p.r0_frict:g} m lies below model.r0_rep = {p.r0_rep:g} m: agents may not flock"
+        )
+    if getattr(p, "v_shill", None) is not None and p.v_shill < p.v_flock:
+        notes.append(
+            f"model.v_shill = {p.v_shill:g} m/s lies below model.v_flock = {p.v_flock:g} m/s: walls may not hold"
+        )
+    return notes

@@ -1,0 +1,129 @@
+"""Checks of a world that need more than one number: convexity, containment, room for all agents."""
+
+import math
+from typing import Any
+
+from shapely.geometry import Point, Polygon, box
+
+from airflock.world import arena, start
+
+FAR_HEIGHT = 1e9  # half height of an arena that is flown in a plane, m
+JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
+
+
+def ground_plan(world: arena.Parameters) -> Any:
+    """Ground plan of the arena as a shapely polygon; None without an arena."""
+    if world.arena == "square":
+        h = 0.5 * world.side
+        return Polygon([(-h, -h), (h, -h), (h, h), (-h, h)])
+    if world.arena == "circle":
+        return Point(0.0, 0.0).buffer(world.radius, quad_segs=64)
+    return Polygon(world.corners) if world.arena == "polygon" and len(world.corners) > 2 else None
+
+
+def polygon_fault(corners: Any) -> str:
+    """Why a list of corners is no convex polygon; empty if it is one."""
+    if len(corners) < 3:
+        return f"has {len(corners)} corners; a polygon needs at least 3"
+    shape = Polygon(corners)
+    if not shape.is_valid or shape.area <= 0.0:
+        return "crosses itself or has no area"
+    if shape.convex_hull.area > shape.area * (1.0 + 1e-9):
+        return "is not convex; split it into convex parts"
+    return ""
+
+
+def counter_clockwise(corners: Any) -> tuple[tuple[float, ...], ...]:
+    """The corners in counter-clockwise order."""
+    ring = Polygon(corners).exterior
+    points = tuple(tuple(c) for c in list(ring.coords)[:-1])
+    return points if ring.is_ccw else points[::-1]
+
+
+def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
+    """Half sizes of an arena, m: of a box, or radius and half height; a plane is taken as very high."""
+    z = 0.5 * world.height if world.dimensions == "3" else FAR_HEIGHT
+    if world.arena == "circle":
+        return world.radius, world.radius, z
+    return 0.5 * world.side, 0.5 * world.side, z
+
+
+def largest_extension(world: arena.Parameters) -> float:
+    """Half the distance between two extreme points of the arena, m (Zapotecatl et al. 2016, Eq. 21); 0 without one."""
+    x, y, z = half_sizes(world)
+    up = z if world.dimensions == "3" else 0.0
+    if world.arena == "none":
+        return 0.0
+    if world.arena == "polygon":
+        corners = [(float(c[0]), float(c[1])) for c in world.corners]
+        ground = 0.5 * max((math.dist(a, b) for a in corners for b in corners), default=0.0)
+    else:
+        ground = x if world.arena == "circle" else math.hypot(x, y)
+    return math.hypot(ground, up)
+
+
+def start_faults(world: arena.Parameters, begin: start.Parameters) -> list[str]:
+    """Why a start region does not fit into the arena."""
+    found = []
+    if begin.kind != "arena" and world.arena != "none":
+        reach = begin.radius if begin.kind == "ball" else 0.5 * begin.side
+        x, y, z = half_sizes(world)
+        plan = ground_plan(world)
+        round_ = Point(0.0, 0.0).buffer(reach * 0.999, quad_segs=64)
+        region = round_ if begin.kind == "ball" else box(-reach, -reach, reach, reach)
+        if plan is not None and (not plan.covers(region) or reach > z):
+            name = "radius" if begin.kind == "ball" else "side"
+            found.append(
+                f"start.{name} = {getattr(begin, name):g} m: the arena is smaller than the {begin.kind} in which "
+                f"agents start; enlarge world.side or world.height, or lower start.{name}"
+            )
+    if world.edges != "open" and world.arena != "square":
+        found.append(f"world.edges = {world.edges!r} needs world.arena = 'square'")
+    if world.edges == "periodic" and world.obstacles:
+        found.append("world.edges = 'periodic' takes no obstacles")
+    return found
+
+
+def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[float, float]:
+    """Area (m²) and height (m) of the region in which agents start."""
+    if begin.kind == "ball":
+        return math.pi * begin.radius**2, 4.0 / 3.0 * begin.radius
+    if begin.kind == "box":
+        return begin.side**2, begin.side
+    plan = ground_plan(world)
+    return (plan.area if plan is not None else math.inf), world.height
+
+
+def faults(world: arena.Parameters, agents: int, separation: float, begin: start.Parameters) -> list[str]:
+    """Everything that is wrong with a world, one line each."""
+    found = []
+    if world.arena == "polygon":
+        fault = polygon_fault(world.corners)
+        if fault:
+            found.append(f"world.corners {fault}")
+    if world.arena != "square" and world.walls == "nearest_per_axis":
+        found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
+    plan = None if found else ground_plan(world)
+    free, height = (math.inf, 1.0) if found else _region(world, begin)
+    found += [] if found else start_faults(world, begin)
+    for number, corners in enumerate(world.obstacles):
+        fault = polygon_fault(corners)
+        if fault:
+            found.append(f"world.obstacles[{number}] {fault}")
+            continue
+        shape = Polygon(corners)
+        if plan is not None and not plan.covers(shape):
+            found.append(f"world.obstacles[{number}] reaches outside the arena")
+        free -= shape.area
+    if world.dimensions == "3":
+        need = agents * math.pi / 6.0 * separation**3 / max(free * height, 1e-9)
+    else:
+        need = agents * math.pi / 4.0 * separation**2 / max(free, 1e-9)
+    if not found and need > (JAMMED if world.dimensions == "2" else 0.35):
+        found.append(
+            f"agents = {agents} do not fit at start.separation = {separation:g} m: they would cover {need:.0%} of the "
+            "region they start in; enlarge world.side, or lower agents or start.separation"
+        )
+    if not found and world.arena == "none" and agents > 1 and begin.kind == "arena":
+        found.append("world.arena = 'none' has no room to start in; give an arena, or start.kind = 'ball'")
+    return found

@@ -1,0 +1,109 @@
+"""Scenario: model, body, radio, sensors, world, number of agents, duration and sampling; frozen data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.body import radio, sensors, wind
+from airflock.body.registry import BODIES
+from airflock.core.contract import Body, Model
+from airflock.metrics import parameters as metric_parameters
+from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.sections import Flight
+from airflock.scenes.build import Scene, scene_of, waypoints
+from airflock.world import arena, goals, scenery, start
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything about a flight but the seed.
+
+    model and parameters : the flocking law and its numbers
+    body, sensors, radio, wind, world, scene, goals, start, metrics : records of parameters, SI units
+    flight    : number of agents, duration (s), motion step (s)
+    published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
+    document  : the plain nested dict that this scenario was made from
+    notes     : what was adjusted, for a person to read
+    """
+
+    name: str
+    model: Model
+    parameters: Any
+    body: Any
+    sensors: sensors.Parameters
+    radio: radio.Parameters
+    wind: wind.Parameters
+    world: arena.Parameters
+    scene: scenery.Parameters
+    goals: goals.Parameters
+    start: start.Parameters
+    metrics: metric_parameters.Parameters
+    flight: Flight
+    published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
+    document: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def agents(self) -> int:
+        """Number of agents."""
+        return int(self.flight.agents)
+
+    @property
+    def dimensions(self) -> int:
+        """2 or 3."""
+        return int(self.world.dimensions)
+
+    @property
+    def vehicle(self) -> Body:
+        """The body that `body` holds the numbers of."""
+        return next(found for found in BODIES.values() if type(self.body) is found.Parameters)
+
+    def stands(self) -> Scene:
+        """What stands in the world; for a model that casts, polygons are walls of it too."""
+        polygons = self.world.obstacles
+        if self.world.arena == "polygon":
+            polygons = (self.world.corners, *polygons)
+        return scene_of(self.scene, self.dimensions, polygons if self.model.sight is not None else ())
+
+    def waypoints(self) -> Any:
+        """Goals in their order (goal, 3), m."""
+        return waypoints(self.goals, self.scene, self.dimensions)
+
+    def measured_by(self) -> metric_parameters.Parameters:
+        """Metric parameters with everything that was left to the scenario filled in."""
+        given = {name: getattr(self.metrics, name) for name in self.metrics.__dataclass_fields__}
+        p, model = self.parameters, self.model
+        if given["v_flock"] is None and model.preferred_speed is not None:
+            given["v_flock"] = float(model.preferred_speed(p))
+        if given["v_flock"] is None:
+            given["v_flock"] = 1.0
+        if given["v_tol"] is None:
+            given["v_tol"] = 0.375 * given["v_flock"]
+        if given["r_comm"] is None:
+            given["r_comm"] = self.radio.range
+        if given["r_cluster"] is None:
+            known = model.interaction_range or model.reach
+            given["r_cluster"] = min(float(known(p)), 1e6) if known else min(self.radio.range, 1e6)
+        if given["collision_period"] is None:
+            given["collision_period"] = self.flight.dt
+        if given["max_e"] is None:
+            given["max_e"] = largest_extension(self.world) or None
+        if given["k"] is None:
+            given["k"] = given["max_e"]
+        return metric_parameters.Parameters(**given)
+
+    def separation(self) -> float:
+        """Smallest distance of two agents at the start, m."""
+        given = self.start.separation
+        return start_separation(self.model, self.parameters, self.start, self.world) if given is None else given
+
+
+def start_separation(model: Model, parameters: Any, begin: start.Parameters, world: arena.Parameters) -> float:
+    """Default of start.separation, m: 2 s of flight at the preferred speed, at least 3 m (authors' program).
+
+    In a ball, a box or a periodic world agents may start anywhere: 0.
+    """
+    if begin.kind != "arena" or world.edges == "periodic":
+        return 0.0
+    speed = float(model.preferred_speed(parameters)) if model.preferred_speed else 0.0
+    return max(3.0, 2.0 * speed)

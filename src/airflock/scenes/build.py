@@ -1,0 +1,85 @@
+"""The scene of a scenario, and the goals in it: made once, kept as arrays."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import SceneError
+from airflock.scenes.city import buildings, half_side
+from airflock.scenes.forest import trees
+from airflock.scenes.tree import TALL, Scene, boxes, scene, segments
+from airflock.world import bvh, goals, scenery
+from airflock.world.shapes import BOX, CYLINDER
+
+__all__ = ["Scene", "clearance", "scene_of", "waypoints"]
+
+Polygons = tuple[tuple[tuple[float, ...], ...], ...]
+MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
+DEPTH = 1000.0  # m; thickness of the ground: nothing starts below it
+ATTEMPTS = 100_000  # draws of a free point
+
+
+@lru_cache(maxsize=32)
+def scene_of(p: scenery.Parameters, dimensions: int, polygons: Polygons = ()) -> Scene:
+    """Scene as arrays; in a plane every building and tree is its ground plan. polygons : walls besides, m"""
+    walls = [segments([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons]
+    if p.kind == "none":
+        return scene(walls)
+    notes: tuple[str, ...] = ()
+    if p.kind == "mesh":
+        from airflock.scenes.meshes import load_mesh
+
+        rows, notes = load_mesh(p, dimensions)
+    else:
+        rows = buildings(p) if p.kind == "city" else trees(p)
+    if dimensions == 2:
+        flat = (rows[:, 6] == BOX) | (rows[:, 6] == CYLINDER)
+        rows[flat, 2], rows[flat, 5] = -TALL, TALL
+        return scene([rows, *walls], notes)
+    half = half_side(p, rows) + MARGIN
+    ground = [boxes([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
+    return scene([*ground, rows, *walls], notes)
+
+
+def clearance(found: Scene, position: Any) -> float:
+    """Distance (m) from a position to what stands in a scene; negative inside a solid, 1e30 if nothing stands there."""
+    x, y, z = (float(c) for c in position)
+    return float(bvh.nearest(x, y, z, 1e6, *found.lists).distance)
+
+
+@lru_cache(maxsize=32)
+def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> NDArray[np.float64]:
+    """Goals in their order (goal, 3), m.
+
+    Free points are drawn by the scene's seed: within the scene, between the two heights, clear of everything, and at
+    least goals.apart from the one before.
+    """
+    if g.kind == "none":
+        return np.zeros((0, 3))
+    if g.kind == "points":
+        found = np.array(g.points, float).reshape(-1, 3)
+        return found * (1.0, 1.0, 0.0) if dimensions == 2 else found
+    place = scene_of(p, dimensions)
+    half = (
+        half_side(p, place.shapes)
+        if p.kind in ("city", "forest")
+        else 0.5 * float(np.ptp(place.bounds, axis=0)[:2].min())
+    )
+    rng = np.random.default_rng([int(p.seed), 1])
+    chosen: list[NDArray[np.float64]] = []
+    last = np.zeros(3)
+    for _ in range(ATTEMPTS):
+        spot = np.array(
+            [*rng.uniform(-half, half, 2), rng.uniform(g.low, max(g.high, g.low)) if dimensions == 3 else 0.0]
+        )
+        if np.linalg.norm(spot - last) >= g.apart and clearance(place, spot) >= g.clearance:
+            chosen.append(spot)
+            last = spot
+            if len(chosen) == int(g.count):
+                return np.array(chosen)
+    raise SceneError(
+        f"goals.kind = 'scene': no free point at {g.clearance:g} m from everything and {g.apart:g} m from the last; "
+        "lower goals.clearance, goals.apart or scene.density"
+    )

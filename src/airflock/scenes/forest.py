@@ -1,0 +1,25 @@
+"""A forest: trunks that bear crowns, both upright cylinders, at places that a seed draws. Open air above."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.scenes.tree import cylinders
+from airflock.world import scenery
+
+# Our choice: a stand of grown broad-leaved trees; the thesis's scene is not available
+HEIGHT = (8.0, 20.0)  # m, tree
+TRUNK = (0.15, 0.40)  # m, radius
+CROWN = (1.0, 2.5)  # m, radius
+CLEAR = (0.35, 0.55)  # share of the height below the crown
+
+
+def trees(p: scenery.Parameters) -> NDArray[np.float64]:
+    """Rows of cylinders: trunks, then crowns."""
+    rng = np.random.default_rng(int(p.seed))
+    n = round(p.trees * p.density)
+    x, y = rng.uniform(-0.5 * p.side, 0.5 * p.side, (2, n))
+    height, trunk, crown, clear = (rng.uniform(*span, n) for span in (HEIGHT, TRUNK, CROWN, CLEAR))
+    ground = np.zeros(n)
+    stems = np.stack([x, y, trunk, ground, clear * height], axis=1)
+    crowns = np.stack([x, y, crown, clear * height, height], axis=1)
+    return cylinders(np.concatenate([stems, crowns]))

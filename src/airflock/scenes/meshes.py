@@ -1,0 +1,112 @@
+"""Meshes of the user's: read by trimesh, checked, turned upright, as rows of triangles. A mesh file is untrusted."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import SceneError
+from airflock.scenes.tree import segments, triangles
+from airflock.world import scenery
+
+MOST_BYTES = 200_000_000  # a larger file is refused before it is opened
+MOST_TRIANGLES = 2_000_000
+FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl")  # read by trimesh from nothing but the file and its parts
+LEAST, MOST = 1.0, 1e5  # m; a world for drones is neither smaller nor larger
+
+
+def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Triangles of scene.file, one a row, in m, z up; in a plane, its walls where it crosses height 0. And notes."""
+    mesh = read(Path(p.file))
+    notes = []
+    corners = np.asarray(mesh.vertices, float) * p.unit
+    if p.up == "y":
+        corners = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], axis=1)
+    faults = check(p, corners)
+    if faults:
+        raise SceneError("\n".join(faults))
+    mesh.vertices = corners
+    if not mesh.is_watertight:
+        notes.append(
+            f"scene.file = {p.file}: the mesh is open; its surfaces stop agents from both sides, but nothing is inside"
+        )
+    elif not mesh.is_winding_consistent or mesh.volume < 0.0:
+        notes.append(
+            f"scene.file = {p.file}: the mesh is inverted (its faces look inwards); "
+            "its surfaces are taken from both sides"
+        )
+    found = triangles(corners[np.asarray(mesh.faces)])
+    sound = mesh.area_faces > 1e-12
+    if not sound.all():
+        notes.append(f"scene.file = {p.file}: {int((~sound).sum())} triangles without area were left out")
+        found = found[sound]
+    if dimensions == 2:
+        cut = mesh.section(plane_origin=(0.0, 0.0, 1e-6), plane_normal=(0.0, 0.0, 1.0))
+        if cut is None:
+            raise SceneError(f"scene.file = {p.file}: in a plane the mesh is cut at height 0, but nothing stands there")
+        ends = [np.hstack([line[:-1, :2], line[1:, :2]]) for line in cut.discrete]
+        found = segments(np.concatenate(ends))
+    return found, tuple(notes)
+
+
+def read(path: Path) -> Any:
+    """Mesh of a file. Raises SceneError where it is missing, too large, of another format, empty or damaged."""
+    import trimesh
+
+    kind = path.suffix.lower().lstrip(".")
+    if not path.is_file():
+        raise SceneError(f"scene.file = {str(path)!r}: no such file")
+    if kind not in FORMATS:
+        raise SceneError(f"scene.file = {path}: .{kind} is none of {', '.join(FORMATS)}")
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise SceneError(
+            f"scene.file = {path}: {size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB; simplify the mesh"
+        )
+    if kind == "stl":
+        _whole_stl(path, size)
+    try:
+        mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)
+        faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, float)
+    except Exception as fault:  # any parser may fail in any way on a damaged file
+        raise SceneError(f"scene.file = {path}: cannot be read, it is damaged or cut short: {fault}") from fault
+    if not len(faces):
+        raise SceneError(f"scene.file = {path}: no triangles in it; it is empty, damaged or cut short")
+    if len(faces) > MOST_TRIANGLES:
+        raise SceneError(
+            f"scene.file = {path}: {len(faces)} triangles are more than {MOST_TRIANGLES}; simplify the mesh"
+        )
+    if not np.isfinite(corners).all() or faces.max() >= len(corners):
+        raise SceneError(
+            f"scene.file = {path}: some corners are no numbers or missing; the file is damaged or cut short"
+        )
+    return mesh
+
+
+def _whole_stl(path: Path, size: int) -> None:
+    """Refuse an STL file that ends before what it announces; trimesh reads what is there."""
+    with path.open("rb") as file:
+        head = file.read(84)
+        if head[:5].lower() == b"solid" and b"\n" in head:
+            file.seek(max(0, size - 512))
+            if b"endsolid" not in file.read():
+                raise SceneError(f"scene.file = {path}: the file is cut short: it does not end with endsolid")
+            return
+    announced = 84 + 50 * int.from_bytes(head[80:84], "little")
+    if size < announced:
+        raise SceneError(f"scene.file = {path}: the file is cut short: {size} of {announced} bytes")
+
+
+def check(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
+    """What is wrong with the size of a mesh, one line each."""
+    size = float(np.ptp(corners, axis=0).max())
+    if LEAST <= size <= MOST:
+        return []
+    guess = min(
+        (1e-3, 0.01, 0.0254, 0.3048, 1.0, 1000.0), key=lambda u: abs(np.log(max(size, 1e-30) / p.unit * u / 300.0))
+    )
+    return [
+        f"scene.file = {p.file}: the mesh is {size:.3g} m large with scene.unit = {p.unit:g} m, "
+        f"outside [{LEAST:g}, {MOST:g}] m; it may be in another unit, try scene.unit = {guess:g}"
+    ]
