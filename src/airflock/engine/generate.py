@@ -1,0 +1,175 @@
+"""From plain rules to the text of one driver module.
+
+The text of each rule is copied, global constants are inlined, float literals are cast to `real`, choices of a parameter
+record become constants, and every plain function that a rule calls comes along. The engine writes the loops around it
+(`passes`); the result is one file that depends on nothing but Numba.
+"""
+
+import ast
+import inspect
+import math
+import types
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from airflock.core import random as random_streams
+from airflock.engine import law
+from airflock.errors import RuleError
+
+INLINED = '@njit(inline="always", **JIT)'
+
+
+class Source:
+    """Collects functions and records, each once, as text in the order in which they are needed.
+
+    decorator : line put above each function
+    constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
+    """
+
+    def __init__(self, decorator: str, constants: Mapping[str, Mapping[str, str | float]]):
+        self.decorator = decorator
+        self.constants = constants
+        self.blocks: list[str] = []
+        self._names: dict[Any, str] = {}
+
+    def name(self, item: Any) -> str:
+        """Name in the driver of a plain function or a NamedTuple class; adds its text on first use."""
+        if item in self._names:
+            return self._names[item]
+        drawn = inspect.isfunction(item) and item.__module__ == random_streams.__name__
+        if drawn and item.__name__ in random_streams.PRIMITIVES:
+            return str(item.__name__)  # bound by the device
+        module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
+        name = base = f"{module}_{item.__name__}"
+        count = 1
+        while name in self._names.values():
+            count += 1
+            name = f"{base}{count}"
+        self._names[item] = name
+        if isinstance(item, type):
+            self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
+        else:
+            self.blocks.append(self._function(item, name))
+        return name
+
+    def record(self, name: str, fields: tuple[str, ...]) -> str:
+        """A record of numbers under a name of its own (the columns of a parameter row)."""
+        if name not in self._names.values():
+            self._names[name] = name
+            self.blocks.append(f"{name} = namedtuple({name!r}, {list(fields)!r})")
+        return name
+
+    def _function(self, rule: Callable[..., Any], name: str) -> str:
+        law.check(rule)
+        node = law.tree_of(rule)
+        node.name = name
+        node.returns = None
+        node.args.defaults = []
+        for argument in node.args.args:
+            argument.annotation = None
+        if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
+            node.body.pop(0)
+        rewritten = ast.fix_missing_locations(_Rewrite(rule, self).visit(node))
+        # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
+        # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
+        loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
+        decorator = INLINED if loops and self.decorator else self.decorator
+        return f"{decorator}\n{ast.unparse(rewritten)}"
+
+
+class _Rewrite(ast.NodeTransformer):
+    """Bind the free names of one rule and cast its literals."""
+
+    def __init__(self, rule: Callable[..., Any], source: Source):
+        self.rule = rule
+        self.source = source
+        self.local = set(rule.__code__.co_varnames)
+
+    def _real(self, node: ast.expr) -> ast.expr:
+        return ast.Call(ast.Name("real", ast.Load()), [node], [])
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        return self._real(node) if type(node.value) is float else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if isinstance(node.value, ast.Name):
+            if node.value.id == "math" and isinstance(getattr(math, node.attr, None), float):
+                return self._real(ast.Constant(getattr(math, node.attr)))
+            chosen = self.source.constants.get(node.value.id, {})
+            if node.attr in chosen:
+                value = chosen[node.attr]
+                return ast.Constant(value) if isinstance(value, str) else self._real(ast.Constant(value))
+        self.generic_visit(node)
+        return node
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        self.generic_visit(node)
+        sides = [node.left, *node.comparators]
+        if all(isinstance(s, ast.Constant) and isinstance(s.value, str) for s in sides) and len(sides) == 2:
+            equal = node.left.value == node.comparators[0].value  # type: ignore[attr-defined]
+            return ast.Constant(equal if isinstance(node.ops[0], ast.Eq) else not equal)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            kept: ast.expr = self.visit(node.body if node.test.value else node.orelse)
+            return kept
+        node.body = self.visit(node.body)
+        node.orelse = self.visit(node.orelse)
+        return node
+
+    def visit_If(self, node: ast.If) -> Any:
+        node.test = self.visit(node.test)
+        if isinstance(node.test, ast.Constant):
+            kept = node.body if node.test.value else node.orelse
+            return [self.visit(statement) for statement in kept] or ast.Pass()
+        self.generic_visit(node)
+        return node
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        self.generic_visit(node)
+        method = node.func
+        if isinstance(method, ast.Attribute) and isinstance(method.value, ast.Name) and method.value.id == "percept":
+            node.func = ast.Name(f"percept_{method.attr}", ast.Load())  # bound by the driver
+            node.args.insert(0, method.value)
+        if isinstance(node.func, ast.Name) and node.func.id == "float":
+            node.func.id = "real"
+        if isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+            name = ast.Name("least" if node.func.id == "min" else "most", ast.Load())
+            folded = node.args[0]
+            for argument in node.args[1:]:
+                folded = ast.Call(name, [folded, argument], [])
+            return folded
+        return node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        inner = node.value
+        if isinstance(inner, ast.Subscript) and isinstance(inner.value, ast.Name):  # a[i][j] → a[i, j]
+            pair = ast.Tuple([inner.slice, node.slice], ast.Load())
+            return ast.Subscript(inner.value, pair, node.ctx)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.local:
+            return node
+        value = self.rule.__globals__.get(node.id, self._closure().get(node.id))
+        if isinstance(value, bool) or value is None:
+            return node
+        if isinstance(value, float):
+            return self._real(ast.Constant(value))
+        if isinstance(value, int):
+            return ast.Constant(value)
+        if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
+            return ast.Name(self.source.name(value), node.ctx)
+        if isinstance(value, types.ModuleType):
+            return node
+        raise RuleError(
+            f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
+            "a plain function nor a NamedTuple"
+        )
+
+    def _closure(self) -> dict[str, Any]:
+        cells = self.rule.__closure__ or ()
+        return dict(zip(self.rule.__code__.co_freevars, (c.cell_contents for c in cells), strict=True))

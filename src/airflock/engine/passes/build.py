@@ -1,0 +1,115 @@
+"""Builder: what all passes share while the text of one driver grows."""
+
+from collections.abc import Callable, Iterable, Mapping
+from textwrap import indent
+from typing import Any
+
+from airflock.core.contract import Metric
+from airflock.core.vocabulary import asks
+from airflock.engine.generate import Source
+from airflock.engine.plan import WHOLE, Plan
+from airflock.world import edges
+
+JIT = "@njit(**JIT)"
+
+
+class Builder:
+    """Names rules, rows of the work table and records of the parameter row for one plan."""
+
+    def __init__(self, plan: Plan):
+        self.plan = plan
+        self.source = Source(JIT, plan.constants)
+        self.rows: dict[str, int] = {}
+        self.functions: list[str] = []
+        self.turns: list[tuple[list[str], str]] = []  # of each stage of a sequential step: what it reads, its call
+
+    def bind(self, names: Iterable[str]) -> list[str]:
+        """Lines that bind rows of the work table to local names."""
+        return [f"{name} = work[{self.row(name)}]" for name in names]
+
+    def row(self, name: str) -> int:
+        """Index of a row of the work table; unperturbed perception shares the rows of the truth."""
+        plan = self.plan
+        if not plan.noisy and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:
+            name = name[1:]
+        if not (plan.noisy or plan.delayed) and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
+            name = name[1:]
+        return self.rows.setdefault(name, len(self.rows))
+
+    def records(self, letters: str) -> list[str]:
+        """Lines that read records of numbers (p, b, q, ...) from the parameter row."""
+        lines, offset = [], 0
+        for letter, fields in self.plan.records.items():
+            if letter in letters.split():
+                kind = self.source.record(letter.upper() * 2, fields)
+                values = ", ".join(f"row[{offset + i}]" for i in range(len(fields)))
+                lines.append(f"{letter} = {kind}({values})")
+            offset += len(fields)
+        return lines
+
+    def whole(self, *names: str) -> list[str]:
+        """Lines that read integers of this world."""
+        return [f"{name} = whole[{WHOLE.index(name)}]" for name in names]
+
+    def call(self, rule: Callable[..., Any], kind: str, given: Mapping[str, str], owner: str = "") -> str:
+        """Text of a call of a rule with what it asks for."""
+        names = asks(rule, kind, owner)
+        return f"{self.source.name(rule)}({', '.join(given.get(name, name) for name in names)})"
+
+    def wants(self, rule: Callable[..., Any] | None, kind: str, *names: str) -> bool:
+        """Whether a rule exists and asks for any of these names."""
+        return rule is not None and bool(set(asks(rule, kind)) & set(names))
+
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False) -> None:
+        """Add one compiled function of the driver; a parallel one spreads its prange over all cores."""
+        lines: list[str] = []
+        for body in bodies:
+            lines += [body] if isinstance(body, str) else list(body)
+        decorator = "@njit(parallel=True, **JIT)" if parallel else JIT
+        self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
+
+    def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
+        """Loop over all agents (n) or lanes (m); with a sequential update the body alone, for the agent in turn."""
+        return list(body) if self.plan.sequential else loop(f"i in range({lanes})", body)
+
+    def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
+        """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i."""
+        if not self.plan.sequential:
+            spread = self.plan.grid and name == "decide"
+            body = [line.replace("i in range(n)", "i in prange(n)") for line in body] if spread else body
+            self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
+            return
+        read = [line.partition(" = ")[0] for line in lines if " = " in line and line[0] != " " and ";" not in line]
+        given = ", ".join(dict.fromkeys(["i", *arguments.split(", "), *(w for w in read if w.isidentifier())]))
+        self.function(f"{name}_of({given})", body, f"return {answer}")
+        self.turns.append((lines, f"{name}_of({given})"))
+
+    def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
+        """Lines that take offsets to the nearest image of a periodic box."""
+        if not self.plan.periodic:
+            return []
+        rule = self.source.name(edges.nearest_image)
+        return [f"{names.format(a)} = {rule}({names.format(a)}, w.half_{a})" for a in axes]
+
+    def z(self, text: str) -> str:
+        """A third coordinate, or a literal zero in a plane."""
+        return text if self.plan.dimensions == 3 else "ZERO"
+
+
+def loop(over: str, lines: Iterable[str]) -> list[str]:
+    """A for loop around lines."""
+    return [f"for {over}:", *[f"    {line}" for text in lines for line in text.splitlines()]]
+
+
+def branch(test: str, lines: Iterable[str]) -> list[str]:
+    """An if around lines."""
+    return [f"if {test}:", *[f"    {line}" for text in lines for line in text.splitlines()]]
+
+
+def columns(metrics: Iterable[Metric]) -> list[tuple[str, str, str]]:
+    """Of every value that metrics sample: name, how it combines over time, and the clock that samples it."""
+    return [
+        (name, metric.over_time.get(name, "mean"), metric.clock)
+        for metric in metrics
+        for name in metric.Sample._fields  # type: ignore[attr-defined]
+    ]

@@ -1,0 +1,127 @@
+"""Start and move: where agents begin, and one motion step of all of them."""
+
+from airflock.body import wind
+from airflock.core import random
+from airflock.core.maths import norm
+from airflock.engine.passes import scene
+from airflock.engine.passes.build import Builder, branch, loop
+from airflock.engine.passes.perceive import normals
+from airflock.world import start as start_rules
+
+ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
+
+
+def begin(build: Builder) -> None:
+    """Place all agents at rest or at start speed; returns minus the first agent (from 1) that found no room."""
+    plan, axes = build.plan, build.plan.axes
+    rows = [*axes, *(f"v{a}" for a in axes)]
+    lines = (
+        build.records("w") + build.bind(rows) + build.whole("world", "seed_low", "seed_high", "corners", "obstacles")
+    )
+    lines += loop("i in range(m)", [f"{a}[i] = AWAY; v{a}[i] = ZERO" for a in axes])
+    if plan.given_start:
+        lines += loop("i in range(n)", [f"{name}[i] = start[{c}, i]" for c, name in enumerate(rows)])
+        build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
+        return
+    philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
+    spread = build.source.name(start_rules.spread)
+    draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
+    draw += [f"s{a} = {spread}({uniform}(w{c}), -w.extent_{a}, w.extent_{a})" for c, a in enumerate(axes)]
+    draw += [] if plan.dimensions == 3 else ["sz = ZERO"]
+    draw += [f"free = {beyond(build)} <= ZERO"]
+    gap = " + ".join(f"(s{a} - {a}[j]) * (s{a} - {a}[j])" for a in axes)
+    if plan.start == "ball":
+        draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, w.extent_x)"]
+    draw += loop(
+        "j in range(i if w.separation > ZERO else 0)", [f"free = free & ({gap} >= w.separation * w.separation)"]
+    )
+    draw += scene.room(build)
+    place = [f"{a}[i] = s{a}" for a in axes]
+    draw += branch("free", [*place, "placed = True", "break"])
+    body = ["placed = False", *loop(f"attempt in range({ATTEMPTS})", draw), "if not placed:", "    return -(i + 1)"]
+    turn = [
+        f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)",
+        f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
+        "gz = gz" if plan.dimensions == 3 else "gz = ZERO",
+        f"f = w.speed / {build.source.name(norm)}(gx, gy, gz)",
+        *[f"v{a}[i] = f * g{a}" for a in axes],
+    ]
+    lines += loop("i in range(n)", [*body, *branch("w.speed > ZERO", turn)])
+    build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
+
+
+def beyond(build: Builder) -> str:
+    """Call of the excursion of position sx sy sz, obstacles included."""
+    from airflock.world.arena import convex_obstacle
+
+    name = "excursion"
+    if not any(f"def {name}(" in text for text in build.functions):
+        rule = build.source.name(build.plan.excursion)
+        lines = [f"e = {rule}(x, y, z, w.half_x, w.half_y, w.half_z, edges, corners)"]
+        if build.plan.obstacles:
+            obstacle = build.source.name(convex_obstacle)
+            lines += loop(
+                "o in range(obstacles)",
+                [f"e = most(e, -{obstacle}(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)"],
+            )
+        lines += scene.excursion(build)
+        build.function(f"{name}(x, y, z, w, edges, spans, corners, obstacles, scene)", lines, "return e")
+    return f"{name}(sx, sy, sz, w, edges, spans, corners, obstacles, scene)"
+
+
+def move(build: Builder) -> None:
+    """Velocities by the body, positions by the velocity before or after; returns the largest squared speed."""
+    plan, axes, vehicle = build.plan, build.plan.axes, build.plan.body
+    lines = build.records("b a c w" if plan.edge else "b a c") + build.whole("world", "seed_low", "seed_high")
+    lines += build.bind([*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)])
+    if build.wants(vehicle.move, "move", "gx", "gy", "gz"):
+        lines += _noise(build)
+    lines += ["wx = ZERO; wy = ZERO; wz = ZERO"]
+    if plan.windy:
+        lines += _wind(build)
+    square = " + ".join(f"v{a}[i] * v{a}[i]" for a in axes)
+    speeds = ["fastest = ZERO", *build.each([f"fastest = most(fastest, {square})"])]
+    positions = [line for a in axes for line in build.each([f"{a}[i] += v{a}[i] * c.dt"], "m")]
+    if plan.noisy:
+        lines += build.bind([f"own_u{a}" for a in axes])
+    given = {"dt": "c.dt"}
+    for a in ("x", "y", "z"):
+        flown = a in axes
+        given[f"v{a}"] = f"v{a}[i]" if flown else "ZERO"
+        error = f" + own_u{a}[i]" if plan.noisy else ""
+        given[f"m{a}"] = f"v{a}[i]{error}" if flown else "ZERO"
+        given[f"c{a}"] = f"c{a}[i]" if flown else "ZERO"
+        given[f"g{a}"] = f"g{a}_[i]" if flown else "ZERO"
+        given[f"w{a}"] = f"w{a}" if flown else "ZERO"
+    body = [f"t = {build.call(vehicle.move, 'move', given, vehicle.name)}"]
+    velocities = build.each(body + [f"v{a}[i] = t[{c}]" for c, a in enumerate(axes)], "m")
+    old = plan.integration == "old"
+    steps = [*speeds, *positions, *velocities] if old else [*velocities, *speeds, *positions]
+    if plan.edge:
+        edge = build.source.name(plan.edge)
+        kept = [f"{a}[i], v{a}[i] = {edge}({a}[i], v{a}[i], w.half_{a})" for a in axes]
+        steps += build.each(kept)
+    build.stage("move", "step, n, m, row, whole, work, words, gust", lines, steps, "fastest")
+
+
+def _noise(build: Builder) -> list[str]:
+    """Normal numbers of the outer noise, as gx_ gy_ gz_."""
+    if build.plan.dimensions == 3:
+        return [*normals(build, "step", random.OUTER), "gx_ = g0; gy_ = g1; gz_ = g2"]
+    lines = branch("step % 2 == 0", normals(build, "step // 2", random.OUTER))  # four words are two steps of two axes
+    lines += build.bind(["g0", "g1", "g2", "g3"])
+    return [*lines, "gx_ = g0 if step % 2 == 0 else g2", "gy_ = g1 if step % 2 == 0 else g3"]
+
+
+def _wind(build: Builder) -> list[str]:
+    """Wind of this step, common to the flock, as wx wy wz."""
+    philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
+    gusting = build.source.name(wind.gusting)
+    return [
+        f"w0, w1, w2, w3 = {philox}(0, step, {random.GUST}, world, seed_low, seed_high)",
+        f"ga, gb = {pair}(w0, w1); gc, gd = {pair}(w2, w3)",
+        f"gust[0] = {gusting}(gust[0], ga, c.dt, a)",
+        f"gust[1] = {gusting}(gust[1], gb, c.dt, a)",
+        f"gust[2] = {gusting}(gust[2], gc, c.dt, a)",
+        "wx = a.east + gust[0]; wy = a.north + gust[1]; wz = a.up + gust[2]",
+    ]

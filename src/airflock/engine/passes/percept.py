@@ -1,0 +1,54 @@
+"""Percept: what the methods of `Percept` are bound to in a driver: the arena's rays and the stream MODEL."""
+
+from airflock.core import random
+from airflock.core.vocabulary import BOUND, Percept
+from airflock.engine.passes import scene
+from airflock.engine.passes.build import Builder, loop
+from airflock.world import rays
+
+FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
+REST = "w.half_x, w.half_y, w.half_z, i, k_, world, seed_low, seed_high, corners, obstacles, edges, spans"
+
+
+def record(build: Builder) -> str:
+    """Record that a driver hands to `decide`: the public fields, then what the bound methods need."""
+    casts = scene.CAST if build.plan.model.sight is not None else ()
+    return build.source.record("PERCEPT", (*Percept._fields, *FIELDS, "edges", "spans", *casts))
+
+
+def values(build: Builder) -> str:
+    """What agent i at its measured position puts into that record."""
+    axes, plan = build.plan.axes, build.plan
+    position = ", ".join(f"-m{a}[i]" if a in axes else "ZERO" for a in "xyz")
+    goal = ", ".join(f"aim[{c}] - m{a}[i]" if plan.goals and a in axes else "ZERO" for c, a in enumerate("xyz"))
+    casts = scene.CAST if plan.model.sight is not None else ()
+    return ", ".join(["time", position, goal, REST, *casts])
+
+
+def bind(build: Builder) -> None:
+    """Functions percept_ray, percept_normal and percept_uniform, those of them that a rule calls."""
+    called = [name for name in BOUND if any(f"percept_{name}(" in text for text in build.source.blocks)]
+    who = "percept.agent, percept.step, {} + 256 * draw, percept.world, percept.seed_low, percept.seed_high"
+    draw = f"w0, w1, w2, w3 = {{}}({who.format(random.MODEL)})"
+    if "ray" in called:
+        build.function("percept_ray(percept, ux, uy, uz, length)", _ray(build))
+    if "cast" in called:
+        build.function("percept_cast(percept, ux, uy, uz, length, radius)", scene.cast(build))
+    if "normal" in called:
+        philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
+        build.function("percept_normal(percept, draw)", [draw.format(philox), f"a, b = {pair}(w0, w1)", "return a"])
+    if "uniform" in called:
+        philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
+        build.function("percept_uniform(percept, draw)", [draw.format(philox), f"return {uniform}(w0)"])
+
+
+def _ray(build: Builder) -> list[str]:
+    rule = build.source.name(build.plan.ray)
+    lines = ["x = -percept.centre_x; y = -percept.centre_y; z = -percept.centre_z"]
+    rest = "percept.half_x, percept.half_y, percept.half_z, percept.edges, percept.corners"
+    lines += [f"t = least(length, {rule}(x, y, z, ux, uy, uz, {rest}))"]
+    if build.plan.obstacles:
+        edge = build.source.name(rays.to_edges)
+        spans = "percept.edges, percept.spans[o, 0], percept.spans[o, 1]"
+        lines += loop("o in range(percept.obstacles)", [f"t = least(t, {edge}(x, y, ux, uy, {spans}))"])
+    return [*lines, "return t"]

@@ -1,0 +1,106 @@
+"""Scene: what stands in a world, in a driver: shapes gathered for casts, contacts, excursions, goals on their way.
+
+`scene` is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts (rays
+cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and reached
+(time of each, s; -1 before).
+"""
+
+from airflock.core.contract import Model
+from airflock.engine.passes.build import Builder, branch, loop
+from airflock.world import bvh, goals, rays
+
+PARTS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached")
+CAST = ("shapes", "nodes", "links", "near", "counts", "gathered")  # what a percept carries for its casts
+NEAR = 64  # shapes gathered at most; where more are in sight, each cast goes through the tree
+
+
+def parts(*names: str) -> list[str]:
+    """Lines that take arrays out of the tuple."""
+    return [f"{name} = scene[{PARTS.index(name)}]" for name in names]
+
+
+def sees(build: Builder) -> bool:
+    """Whether the model casts at what stands in the scene."""
+    return build.plan.scene and build.plan.model.sight is not None
+
+
+def look(build: Builder, model: Model) -> list[str]:
+    """Lines that gather what agent i can see before it decides."""
+    lines = [*parts(*CAST[:-1]), "counts[0] = 0"]
+    if not sees(build):
+        return [*lines, "gathered = 0"]
+    position = f"mx[i], my[i], {build.z('mz[i]')}"
+    assert model.sight is not None
+    sight = build.call(model.sight, "sight", {}, model.name)
+    return [*lines, f"gathered = {build.source.name(bvh.gather)}({position}, {sight}, shapes, nodes, links, near)"]
+
+
+def cast(build: Builder) -> list[str]:
+    """Body of percept_cast(percept, ux, uy, uz, length, radius)."""
+    plan = build.plan
+    lines = ["percept.counts[0] += 1", "x = -percept.centre_x; y = -percept.centre_y; z = -percept.centre_z"]
+    lines += ["t = length"]
+    if plan.ray is not rays.to_nothing:
+        rule = build.source.name(rays.to_box if plan.ray is rays.to_polygon else plan.ray)
+        sides = "LIMIT, LIMIT" if plan.ray is rays.to_polygon else "percept.half_x - radius, percept.half_y - radius"
+        height = "percept.half_z - radius" if plan.dimensions == 3 else "LIMIT"
+        lines += [f"t = least(t, {rule}(x, y, z, ux, uy, uz, {sides}, {height}, percept.edges, 0))"]
+    if sees(build):
+        near, tree = build.source.name(bvh.cast_near), build.source.name(bvh.cast)
+        given = "x, y, z, ux, uy, uz, t, radius, percept.shapes"
+        lines += branch("percept.gathered >= 0", [f"t = {near}({given}, percept.near, percept.gathered)"])
+        lines += ["else:", f"    t = {tree}({given}, percept.nodes, percept.links)"]
+    return [*lines, "return t"]
+
+
+def excursion(build: Builder) -> list[str]:
+    """Lines that raise the excursion e (m) at x y z by what stands there."""
+    if not build.plan.scene:
+        return []
+    nearest = build.source.name(bvh.nearest)
+    return [
+        *parts("shapes", "nodes", "links"),
+        f"e = most(e, -{nearest}(x, y, z, LIMIT, shapes, nodes, links).distance)",
+    ]
+
+
+def room(build: Builder) -> list[str]:
+    """Lines that ask for start.clearance around a start at sx sy sz."""
+    if not build.plan.scene:
+        return []
+    nearest = build.source.name(bvh.nearest)
+    call = f"{nearest}(sx, sy, sz, w.clearance, shapes, nodes, links)"
+    return branch("free", [*parts("shapes", "nodes", "links"), f"free = {call}.distance >= w.clearance"])
+
+
+def contacts(build: Builder) -> list[str]:
+    """Lines that find which agents have touched the scene since the positions were last looked at."""
+    axes = build.plan.axes
+    if not build.plan.scene:
+        return [*build.bind(["touches_"]), *loop("i in range(n)", ["touches_[i] = ZERO"])]
+    before = [f"before_{a}" for a in axes]
+    lines = [*parts("shapes", "nodes", "links", "counts"), *build.bind(["touches_", *before])]
+    lines += branch("counts[1] == 0", loop("i in range(n)", [f"before_{a}[i] = {a}[i]" for a in axes]))
+    start, end = (
+        ", ".join(build.z(f"{word}{a}[i]") if a == "z" else f"{word}{a}[i]" for a in "xyz") for word in ("before_", "")
+    )
+    rule = build.source.name(bvh.touches)
+    body = [f"touches_[i] = {rule}({start}, {end}, q.r_body, shapes, nodes, links)"]
+    body += [f"before_{a}[i] = {a}[i]" for a in axes]
+    return [*lines, "counts[1] = 1", *loop("i in range(n)", body)]
+
+
+def aim(build: Builder) -> None:
+    """Function aim(time, elapsed, n, work, row, scene): the goal goes on its way, for the flock's centre as it is."""
+    plan = build.plan
+    lines = [*build.records("w"), *parts("goals", "aim", "reached"), *build.bind(plan.axes), "number = int(aim[3])"]
+    lines += branch("number >= len(goals)", ["return 0"])
+    lines += [f"s{a} = ZERO" for a in "xyz"] + loop("i in range(n)", [f"s{a} += {a}[i]" for a in plan.axes])
+    centre = ", ".join(f"s{a} / real(n)" for a in "xyz")
+    travel = "(w.goal_speed * elapsed if w.goal_speed > ZERO else FAR)"
+    target = ", ".join(f"goals[number, {c}]" for c in range(3))
+    rule = build.source.name(goals.pursue)
+    lines += [f"g = {rule}(aim[0], aim[1], aim[2], {target}, {centre}, w.goal_radius, {travel})"]
+    lines += [f"aim[{c}] = g[{c}]" for c in range(3)]
+    lines += branch("g.reached > HALF", ["reached[number] = time", "aim[3] += ONE"])
+    build.function("aim_(time, elapsed, n, work, row, scene)", lines, "return 0")

@@ -1,0 +1,72 @@
+"""Probe: call every rule of a model once as plain Python, so that a fault appears in the author's own file and line."""
+
+import math
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from airflock.core.contract import Model
+from airflock.core.vocabulary import PAIR, SURFACE, Own, Percept, asks
+from airflock.engine import law
+from airflock.errors import RuleError
+
+VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
+    3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 7.0, 0.0,
+    1.0, 0.0,
+), strict=True))  # fmt: skip
+
+
+def probe(model: Model, parameters: Any) -> None:
+    """Raise a RuleError that names file, line and fault, if a rule fails or returns something else than it declares."""
+    given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
+    given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
+    for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
+        if rule is not None:
+            law.check(rule)
+            answer = _call(rule, kind, given, model.name)
+            if kind != "reach":
+                record = model.Sums if kind == "neighbour" else model.Walls
+                _same_length(rule, answer, record, model.name)
+                given["sums" if kind == "neighbour" else "walls"] = answer
+    for word, record in (("sums", model.Sums), ("walls", model.Walls), ("memory", model.Memory)):
+        if word not in given and record is not None:
+            given[word] = (
+                record(*getattr(record, "_field_defaults", {}).values())
+                if word == "memory"
+                else record(
+                    *([0.0] * len(record._fields))  # type: ignore[attr-defined]
+                )
+            )
+    law.check(model.decide)
+    answer = _call(model.decide, "decide", given, model.name)
+    expected = 4 if model.Memory is not None else 3
+    if not isinstance(answer, tuple) or len(answer) != expected:
+        shape = "x, y, z, Memory(...)" if expected == 4 else "x, y, z"
+        raise RuleError(f"{_place(model.decide)}: {model.name}.decide must return {shape}")
+
+
+def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str) -> Any:
+    names = asks(rule, kind, owner)
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise RuleError(f"{_place(rule)}: {owner}.{kind} asks for {missing[0]}, which this model does not provide")
+    try:
+        answer = rule(*(given[name] for name in names))
+    except Exception as fault:  # a user's rule may fail in any way; show where
+        frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/engine/probe" not in f.filename]
+        spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
+        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {type(fault).__name__}: {fault}") from fault
+    numbers = answer if isinstance(answer, tuple) else (answer,)
+    for number in numbers:
+        if isinstance(number, (int, float)) and not math.isfinite(number):
+            raise RuleError(f"{_place(rule)}: {owner}.{kind} returns {number} on a probe; use FAR instead of infinity")
+    return answer
+
+
+def _same_length(rule: Callable[..., Any], answer: Any, record: Any, owner: str) -> None:
+    if not isinstance(answer, tuple) or len(answer) != len(record._fields):
+        raise RuleError(f"{_place(rule)}: {owner}.{rule.__name__} must return {record.__name__}{record._fields}")
+
+
+def _place(rule: Callable[..., Any]) -> str:
+    return f"{rule.__code__.co_filename}:{rule.__code__.co_firstlineno}"

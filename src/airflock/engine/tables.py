@@ -1,0 +1,150 @@
+"""Tables: a scenario as the numbers that a driver reads: a row of reals, a row of integers, the arena's geometry."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.core.parameters import row
+from airflock.engine.plan import ARENA, CLOCK, WHOLE, Plan
+from airflock.scenarios.geometry import counter_clockwise, half_sizes
+from airflock.scenarios.scenario import Scenario
+from airflock.scenes.tree import scene as make_scene
+
+EMPTY = make_scene([])
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Numbers of one world.
+
+    row   : (columns,) all records of numbers in the plan's order, SI
+    whole : (len(WHOLE),) integers
+    faces : (face, 4) numbers of each surface, families one after another
+    edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles'
+    spans : (obstacle, 2) first and last edge of each obstacle
+    shapes, nodes, links : what stands in the scene, as in `scenes.tree`
+    goals : (goal, 3) points in their order, m
+    """
+
+    row: NDArray[Any]
+    whole: NDArray[np.int64]
+    faces: NDArray[Any]
+    edges: NDArray[Any]
+    spans: NDArray[np.int64]
+    shapes: NDArray[Any]
+    nodes: NDArray[Any]
+    links: NDArray[np.int64]
+    goals: NDArray[Any]
+
+
+def clock(scenario: Scenario) -> dict[str, int]:
+    """All times of a scenario in motion steps."""
+    dt, q = scenario.flight.dt, scenario.measured_by()
+    decide_every = max(1, round(scenario.sensors.period / dt))
+    delay = round(scenario.radio.delay / dt)
+    return {
+        "steps": round(scenario.flight.duration / dt),
+        "decide_every": decide_every,
+        "sample_every": max(1, round(q.period / dt)),
+        "collide_every": round((q.collision_period or dt) / dt),
+        "delay": delay,
+        "ring": delay // decide_every + 2,
+    }
+
+
+def extents(scenario: Scenario) -> tuple[float, float, float]:
+    """Half sizes of the box about the origin from which starts are drawn, m."""
+    world = scenario.world
+    x, y, z = half_sizes(scenario.world)
+    if scenario.start.kind != "arena":
+        reach = scenario.start.radius if scenario.start.kind == "ball" else 0.5 * scenario.start.side
+        return reach, reach, reach if scenario.dimensions == 3 else 0.0
+    if world.arena == "polygon":
+        x, y = (max(abs(c[axis]) for c in world.corners) for axis in (0, 1))
+    return x, y, z if scenario.dimensions == 3 else 0.0
+
+
+def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
+    """Rows of the surface functions of `plan.arena_surfaces`, and how many belong to each family."""
+    world, three = scenario.world, scenario.dimensions == 3
+    h, z = 0.5 * world.side, 0.5 * world.height
+    caps = [[0.0, 0.0, 1.0, z], [0.0, 0.0, -1.0, z]] if three else []
+    if world.arena == "none" or world.edges == "periodic":
+        return [], []
+    if world.arena == "circle":
+        return [[0.0, 0.0, 0.0, world.radius], *caps], [1, len(caps)]
+    if world.arena == "square" and world.walls == "nearest_per_axis":
+        rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
+        return rows, [len(rows)]
+    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else counter_clockwise(world.corners)
+    rows = []
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        tx, ty = b[0] - a[0], b[1] - a[1]
+        length = (tx * tx + ty * ty) ** 0.5
+        nx, ny = -ty / length, tx / length  # inwards, because the corners run counter-clockwise
+        rows.append([nx, ny, 0.0, -(nx * a[0] + ny * a[1])])
+    return rows + caps, [len(rows) + len(caps)]
+
+
+def polygon_edges(scenario: Scenario) -> tuple[list[list[float]], int, list[list[int]]]:
+    """Edges of all polygons, how many are the arena's, and the span of each obstacle."""
+    world = scenario.world
+    edges: list[list[float]] = []
+
+    def add(corners: Any) -> None:
+        ring = counter_clockwise(corners)
+        edges.extend([*a[:2], *b[:2]] for a, b in zip(ring, ring[1:] + ring[:1], strict=True))
+
+    if world.arena == "polygon":
+        add(world.corners)
+    own, spans = len(edges), []
+    for corners in world.obstacles:
+        first = len(edges)
+        add(corners)
+        spans.append([first, len(edges)])
+    return edges, own, spans
+
+
+def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
+    """Numbers of one world for a plan's driver."""
+    real = np.float32 if plan.bits == 32 else np.float64
+    dt, times = scenario.flight.dt, clock(scenario)
+    surfaces, families = faces(scenario)
+    edges, corners, spans = polygon_edges(scenario)
+    begin, goals = scenario.start, scenario.goals
+    arena = dict(zip(ARENA, (
+        *half_sizes(scenario.world), *extents(scenario), scenario.separation(), begin.speed, begin.clearance,
+        goals.radius,
+        goals.speed,
+    ), strict=True))  # fmt: skip
+    scene = scenario.stands() if plan.scene else EMPTY
+    timing = dict(zip(CLOCK, (dt, times["decide_every"] * dt), strict=True))
+    numbers = [
+        *row(scenario.parameters), *row(scenario.body), *row(scenario.sensors), *row(scenario.radio),
+        *row(scenario.wind), *(arena[name] for name in ARENA), *row(scenario.measured_by()),
+        *(timing[name] for name in CLOCK),
+    ]  # fmt: skip
+    counts = families + [0] * (2 - len(families))
+    whole = times | {
+        "agents": scenario.agents,
+        "world": world,
+        "seed_low": seed & 0xFFFFFFFF,
+        "seed_high": (seed >> 32) & 0xFFFFFFFF,
+        "corners": corners,
+        "obstacles": len(spans),
+        "faces_0": counts[0],
+        "faces_1": counts[1],
+    }
+    return Tables(
+        row=np.array(numbers, real),
+        whole=np.array([whole[name] for name in WHOLE], np.int64),
+        faces=np.array(surfaces, real).reshape(-1, 4),
+        edges=np.array(edges, real).reshape(-1, 4),
+        spans=np.array(spans, np.int64).reshape(-1, 2),
+        shapes=scene.shapes.astype(real),
+        nodes=scene.nodes.astype(real),
+        links=scene.links,
+        goals=scenario.waypoints().astype(real),
+    )
