@@ -1,0 +1,5 @@
+"""Layer 5: the command line. Verbs only; everything heavy is imported when a verb needs it."""
+
+from airflock.cli.main import main
+
+__all__ = ["main"]

@@ -1,0 +1,128 @@
+"""Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.errors import AirflockError
+
+
+def presets(
+    name: Annotated[
+        str | None, typer.Argument(metavar="PRESET", help="Show one preset in full.", show_default=False)
+    ] = None,
+    for_speed: Annotated[
+        float | None, typer.Option(min=0.1, max=100.0, help="Starting set for this speed, m/s.")
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the presets, show one as TOML, or derive a starting set for any speed.
+
+    Example: airflock presets --for-speed 12 > mine.toml
+    """
+    from airflock.scenarios import files
+
+    known = files.presets()
+    if for_speed is not None:
+        from airflock.scenarios.scaling import starting_set
+
+        typer.echo(starting_set(for_speed), nl=False)
+        return
+    if name is not None:
+        files.load(name)  # complains about a wrong name
+        typer.echo((known.get(name) or Path(name)).read_text(encoding="utf-8"), nl=False)
+        return
+    found = {key: str(files.load(key).document.get("title", "")) for key in known}
+    if as_json:
+        tables.emit_json(found)
+        return
+    width = max(len(key) for key in found)
+    for key, title in found.items():
+        typer.echo(f"{key:<{width}}  {title}")
+
+
+def validate(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets or recordings.")],
+    changes: options.Set = None,
+) -> None:
+    """Check scenario files (every fault at once), or fly a recording again and compare the bits.
+
+    Example: airflock validate mine.toml
+    """
+    from airflock.errors import ScenarioError
+
+    faults: list[str] = []
+    for name in files:
+        try:
+            _validate(name, options.settings(changes))
+        except ScenarioError as fault:
+            faults += fault.faults
+    if faults:
+        raise ScenarioError(faults)
+
+
+def _validate(name: str, changed: dict[str, Any]) -> None:
+    if name.endswith(".nc"):
+        from airflock.recordings.files import fly_again, load_recording
+
+        same, differences = fly_again(load_recording(name))
+        for line in differences:
+            tables.say(f"note: {name}: {line}")
+        if not same:
+            reason = "see the notes above" if differences else "although nothing that should matter differs"
+            raise AirflockError(f"{name}: flown again, the positions differ, {reason}")
+        typer.echo(f"{name}: flown again with the same bits")
+        return
+    from airflock.engine.simulate import plan_of
+    from airflock.scenarios.files import load
+
+    found = load(name, changed)
+    plan_of(found)  # probes the rules
+    for note in found.notes:
+        tables.say(f"note: {name}: {note}")
+    typer.echo(f"{name}: valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s")
+
+
+def doctor(as_json: options.Json = False) -> None:
+    """Show versions, processor and cache, and fly a ten-second self-check.
+
+    Example: airflock doctor
+    """
+    import platform
+    import shutil
+    import time
+    from importlib.metadata import PackageNotFoundError, version
+
+    from airflock import __version__
+    from airflock.engine.cpu import cores
+    from airflock.engine.simulate import score_flight
+    from airflock.engine.store import cache_folder
+    from airflock.recordings.flights import processor
+    from airflock.scenarios.files import load
+
+    found: dict[str, Any] = {"airflock": __version__, "python": platform.python_version(), "processor": processor()}
+    found |= {"cores": cores(), "cache": str(cache_folder())}
+    found["cache_free_gb"] = round(shutil.disk_usage(cache_folder()).free / 1e9, 1)
+    for name in ("numba", "llvmlite", "numpy", "xarray", "matplotlib", "numba-cuda"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    began = time.perf_counter()
+    scenario = load("vasarhelyi_2018/4ms", {"duration": 10.0})
+    values = score_flight(scenario, 0)
+    found["first_flight_s"] = round(time.perf_counter() - began, 3)
+    began = time.perf_counter()
+    again = score_flight(scenario, 0)
+    found["second_flight_s"] = round(time.perf_counter() - began, 4)
+    healthy = values == again and 0.5 < values["phi_vel"] < 5.0 and values["r_min"] > 0.0
+    found["self_check"] = "passed" if healthy else "failed"
+    if as_json:
+        tables.emit_json(found)
+    else:
+        for key, text in found.items():
+            typer.echo(f"{key:<16} {text}")
+    if not healthy:
+        raise AirflockError(f"self-check failed: {values}")

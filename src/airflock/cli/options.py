@@ -1,0 +1,88 @@
+"""Options that several verbs share, and what they turn into."""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.errors import AirflockError, ScenarioError
+
+Where = Annotated[
+    str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change any key, for instance model.p_rep=0.14; repeatable."),
+]
+Seeds = Annotated[int, typer.Option(min=1, help="Number of flights, with seeds 0, 1, 2, ...")]
+FirstSeed = Annotated[int, typer.Option(min=0, help="Seed of the first flight.")]
+Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_default="the scenario's")]
+Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_default="the scenario's")]
+Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
+Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
+PlotFile = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")
+]
+SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help="Save the recordings as netCDF.")]
+
+
+def settings(pairs: list[str] | None, agents: int | None = None, duration: float | None = None) -> dict[str, Any]:
+    """Keys and values from --set and its short forms; values are read as TOML, or else as text."""
+    found: dict[str, Any] = {}
+    faults = []
+    for pair in pairs or []:
+        key, equals, text = pair.partition("=")
+        if not equals or not key.strip():
+            faults.append(f"--set {pair}: write KEY=VALUE, for instance --set model.p_rep=0.14")
+            continue
+        found[key.strip()] = value(text)
+    if faults:
+        raise ScenarioError(faults)
+    if agents is not None:
+        found["agents"] = agents
+    if duration is not None:
+        found["duration"] = duration
+    return found
+
+
+def value(text: str) -> Any:
+    """A TOML value, or the text itself if it is none."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
+
+
+def writable(*paths: Path | None) -> None:
+    """Refuse output files whose folder does not exist or cannot be written, before any work is done."""
+    import os
+
+    for path in paths:
+        if path is None:
+            continue
+        folder = path.parent
+        if not folder.is_dir():
+            raise AirflockError(f"{path}: the folder {folder} does not exist")
+        if path.is_dir() or not os.access(folder, os.W_OK):
+            raise AirflockError(f"{path}: cannot be written")
+
+
+@contextmanager
+def progress(label: str, total: int, quiet: bool = False) -> Iterator[Callable[[], None]]:
+    """A bar on the terminal while long work runs; yields a function to call after each part."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    shape = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*shape, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda: bar.advance(task)

@@ -1,0 +1,45 @@
+"""Verb paper: recompute what a publication reports."""
+
+from typing import Annotated
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.errors import AirflockError
+
+
+def paper(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018.")],
+    only: Annotated[
+        str | None, typer.Option(help="One part only, for instance s2 or fig1.", show_default="all")
+    ] = None,
+    quick: Annotated[bool, typer.Option(help="A coarse form with few seeds.")] = False,
+    seeds: Annotated[int | None, typer.Option(min=2, help="Flights per number.", show_default="the paper's")] = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+) -> None:
+    """Recompute a paper's numbers and figures; print each claim with its verdict.
+
+    Example: airflock paper vasarhelyi_2018 --quick --only s2
+    """
+    from importlib import import_module
+    from pkgutil import iter_modules
+
+    import airflock.papers as papers
+
+    known = [item.name for item in iter_modules(papers.__path__) if item.name[-1:].isdigit()]
+    if name not in known:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, known, n=1)
+        raise AirflockError(
+            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(known)}"
+        )
+    module = import_module(f"airflock.papers.{name}")
+    claims = module.run(only=only, quick=quick, seeds=seeds, threads=threads)
+    if as_json:
+        tables.emit_json([claim.as_dict() for claim in claims])
+        return
+    from airflock.papers.claims import print_claims
+
+    print_claims(claims)

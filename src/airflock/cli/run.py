@@ -1,0 +1,112 @@
+"""Verbs run and score: fly a scenario, or measure a recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from airflock.cli import options, tables
+
+
+def run(
+    scenario: options.Where,
+    seeds: options.Seeds = 1,
+    first_seed: options.FirstSeed = 0,
+    changes: options.Set = None,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    precision: options.Precision = 32,
+    as_json: options.Json = False,
+    save: options.SaveFile = None,
+    plot: options.PlotFile = None,
+) -> None:
+    """Fly a scenario and print its order parameters, beside the paper's where there are any.
+
+    Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
+    """
+    from airflock.engine.simulate import score_flights
+    from airflock.scenarios.files import load
+
+    changed = options.settings(changes, agents, duration)
+    found = load(scenario, changed)
+    options.writable(save, plot)
+    for note in found.notes:
+        tables.say(f"note: {note}")
+    numbers = list(range(first_seed, first_seed + seeds))
+    with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
+        rows = score_flights([found] * seeds, numbers, threads=threads, precision=precision, done=done)
+    if save or plot:
+        _record(found, numbers, precision, save, plot)
+    if as_json:
+        from airflock.recordings.flights import plain
+
+        runs = [{"seed": seed, **row} for seed, row in zip(numbers, rows, strict=True)]
+        result = {"scenario": {"name": found.name, **plain(found.document)}, "seeds": seeds, "runs": runs}
+        tables.emit_json({**result, **tables.statistics(rows)})
+        return
+    count = f"{seeds} flights" if seeds > 1 else f"seed {first_seed}"
+    title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
+    published = {} if changed else found.published
+    tables.score_table(title, rows, published)
+
+
+def _record(found, numbers, precision, save, plot) -> None:  # type: ignore[no-untyped-def]
+    """Fly again with the trajectories kept (the same bits), and write what was asked for."""
+    from airflock.recordings.files import save as save_recording
+    from airflock.recordings.flights import simulate
+
+    for seed in numbers if save else numbers[:1]:
+        recording = simulate(found, seed, precision=precision)
+        if save:
+            many = len(numbers) > 1
+            path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save
+            tables.say(f"saved {save_recording(recording, path)}")
+        if plot and seed == numbers[0]:
+            from airflock.plots.save import save_figure
+            from airflock.plots.trajectories import trajectories
+
+            save_figure(trajectories(recording), plot)
+            tables.say(f"saved {plot}")
+
+
+def score(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE.nc...", help="Recordings to measure.", show_default=False)
+    ],
+    changes: options.Set = None,
+    as_json: options.Json = False,
+    series: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="Also write the order parameters over time.")
+    ] = None,
+) -> None:
+    """Measure recordings, simulated or flown, with the same order parameters.
+
+    Example: airflock score flight.nc --set metrics.r_coll=2.0 --series course.csv
+    """
+    from airflock.recordings.files import load_recording
+    from airflock.recordings.scores import measure
+
+    options.writable(series)
+    changed = options.settings(changes)
+    rows, courses = [], []
+    for path in files:
+        values, course = measure(load_recording(path), changed)
+        rows.append(values)
+        courses.append(course.assign(file=str(path)))
+    if series is not None:
+        import io
+
+        import pandas as pd
+
+        from airflock import atomic
+
+        text = io.StringIO()
+        pd.concat(courses).to_csv(text)
+        atomic.write(series, text.getvalue())
+        tables.say(f"saved {series}")
+    if as_json:
+        runs = [{"file": str(path), **row} for path, row in zip(files, rows, strict=True)]
+        tables.emit_json({"runs": runs, **tables.statistics(rows)})
+        return
+    tables.score_table(", ".join(map(str, files)), rows, {})

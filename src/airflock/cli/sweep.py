@@ -1,0 +1,113 @@
+"""Verb sweep: order parameters over ranges of any keys."""
+
+import itertools
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.errors import ScenarioError
+
+
+def sweep(
+    scenario: options.Where,
+    over: Annotated[
+        list[str],
+        typer.Option(
+            "--over",
+            metavar="KEY=VALUES",
+            help="Values as a list a,b,c or a range low:high:count; repeat for a grid.",
+            show_default=False,
+        ),
+    ],
+    seeds: options.Seeds = 5,
+    first_seed: options.FirstSeed = 0,
+    changes: options.Set = None,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    precision: options.Precision = 32,
+    as_json: options.Json = False,
+    table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one).")
+    ] = None,
+    show: Annotated[str, typer.Option(metavar="NAME", help="Order parameter to show.")] = "fitness",
+) -> None:
+    """Fly a scenario over a grid of values and tabulate the order parameters.
+
+    Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
+    """
+    import pandas as pd
+
+    from airflock.engine.simulate import score_flights
+    from airflock.scenarios.files import load
+
+    options.writable(table, plot)
+    fixed = options.settings(changes, agents, duration)
+    axes = [axis(text) for text in over]
+    points = [
+        dict(zip([key for key, _ in axes], grid, strict=True)) for grid in itertools.product(*(v for _, v in axes))
+    ]
+    scenarios = [load(scenario, {**fixed, **point}) for point in points]
+    for note in dict.fromkeys(note for found in scenarios for note in found.notes):
+        tables.say(f"note: {note}")
+    numbers = range(first_seed, first_seed + seeds)
+    jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in numbers]
+    with options.progress(f"{scenario}: flights", len(jobs), quiet=as_json) as done:
+        rows = score_flights(
+            [j[1] for j in jobs], [j[2] for j in jobs], threads=threads, precision=precision, done=done
+        )
+    if show not in rows[0]:
+        raise ScenarioError([f"--show {show}: no such order parameter; known: {', '.join(rows[0])}"])
+    tidy = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    if table is not None:
+        from airflock import atomic
+
+        atomic.write(table, tidy.to_csv(index=False))
+        tables.say(f"saved {table}")
+    if plot is not None:
+        from airflock.plots.heatmap import heatmap
+        from airflock.plots.save import save_figure
+
+        save_figure(heatmap(tidy, [key for key, _ in axes], show, scenario=scenarios[0]), plot)
+        tables.say(f"saved {plot}")
+    if as_json:
+        tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
+    else:
+        _print(tidy, [key for key, _ in axes], show)
+
+
+def axis(text: str) -> tuple[str, list[Any]]:
+    """Key and values from KEY=a,b,c or KEY=low:high:count."""
+    key, equals, values = text.partition("=")
+    parts = values.split(":")
+    if equals and len(parts) == 3:
+        try:
+            low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        except ValueError as fault:
+            raise ScenarioError([f"--over {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
+        if count < 1:
+            raise ScenarioError([f"--over {text}: the count must be at least 1"])
+        step = (high - low) / max(count - 1, 1)
+        return key, [low + step * i for i in range(count)]
+    if not equals or not values:
+        raise ScenarioError([f"--over {text}: write KEY=a,b,c or KEY=low:high:count"])
+    return key, [options.value(part) for part in values.split(",")]
+
+
+def _print(tidy: Any, keys: list[str], show: str) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    grouped = tidy.groupby(keys, sort=False)[show].agg(["mean", "std", "median", "count"]).reset_index()
+    table = Table(title=f"{show} (mean ± sd over seeds)", box=box.SIMPLE_HEAD, title_justify="left")
+    for name in (*keys, show, "median", "flights"):
+        table.add_column(name, justify="right")
+    for row in grouped.to_dict("records"):
+        spread = "" if row["count"] < 2 else f" ± {row['std']:.2g}"
+        cells = [str(row[key]) if isinstance(row[key], str) else f"{row[key]:g}" for key in keys]
+        table.add_row(*cells, f"{row['mean']:.4g}{spread}", f"{row['median']:.4g}", str(row["count"]))
+    Console().print(table)

@@ -1,0 +1,79 @@
+"""Tables for a terminal, and JSON for machines."""
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def statistics(rows: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Mean, standard deviation and median of each column."""
+    found: dict[str, dict[str, float]] = {"mean": {}, "std": {}, "median": {}}
+    for key in rows[0]:
+        values = sorted(float(row[key]) for row in rows)
+        n = len(values)
+        mean = math.fsum(values) / n
+        found["mean"][key] = mean
+        found["std"][key] = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (n - 1)) if n > 1 else 0.0
+        found["median"][key] = 0.5 * (values[(n - 1) // 2] + values[n // 2])
+    return found
+
+
+def number(x: float) -> str:
+    """A number with four significant digits."""
+    return f"{x:.4g}"
+
+
+def score_table(
+    title: str, rows: Sequence[Mapping[str, float]], published: Mapping[str, tuple[float, float | None]]
+) -> None:
+    """Print order parameters beside what a paper reports."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from airflock.metrics.registry import REPORTS
+
+    found = statistics(rows)
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column("order parameter", style="bold")
+    table.add_column("mean ± sd" if len(rows) > 1 else "value", justify="right")
+    if len(rows) > 1:
+        table.add_column("median", justify="right")
+    if published:
+        table.add_column("published", justify="right", style="cyan")
+    table.add_column("unit")
+    table.add_column("meaning", style="dim")
+    for key in found["mean"]:
+        unit, meaning = REPORTS.get(key, ("", ""))
+        mean = number(found["mean"][key])
+        cells = [key, f"{mean} ± {found['std'][key]:.2g}" if len(rows) > 1 else mean]
+        cells += [number(found["median"][key])] if len(rows) > 1 else []
+        if published:
+            entry = published.get(key)
+            spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"
+            cells += ["" if entry is None else f"{number(entry[0])}{spread}"]
+        table.add_row(*cells, unit, meaning)
+    Console().print(table)
+
+
+def emit_json(value: Any) -> None:
+    """Print one JSON object; numbers that are no JSON (never expected) become null."""
+    sys.stdout.write(json.dumps(clean(value), ensure_ascii=False) + "\n")
+
+
+def clean(value: Any) -> Any:
+    """Plain Python values with finite numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): clean(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [clean(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value.item() if hasattr(value, "item") else value
+
+
+def say(text: str) -> None:
+    """A line for a person, on the error stream so that it never mixes with output."""
+    sys.stderr.write(f"{text}\n")

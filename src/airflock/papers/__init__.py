@@ -1,0 +1,1 @@
+"""Papers: what publications report, recomputed. One module per publication; `airflock paper NAME` runs it."""

@@ -1,0 +1,57 @@
+"""Figures on disk: complete or not there at all, in the format that the file's ending names."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from airflock.atomic import atomic
+from airflock.errors import AirflockError, RecordingError
+
+# no dates: the same figure gives the same file
+ENDINGS: dict[str, dict[str, Any]] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+
+
+class PictureError(RecordingError):
+    """A figure or a video cannot be written: names the file and the reason."""
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: float = 200.0) -> Path:
+    """Write a figure as .png, .pdf or .svg; raises PictureError and leaves nothing behind.
+
+    resolution : dots per inch of .png, and of what is drawn as pixels within the others
+    """
+    with complete_or_absent(path, tuple(ENDINGS)) as temporary:
+        ending = temporary.suffix.lower()
+        figure.savefig(
+            temporary, format=ending[1:], dpi=resolution, metadata=ENDINGS[ending], facecolor=figure.get_facecolor(),
+            bbox_inches="tight", pad_inches=0.08,
+        )  # fmt: skip
+    return Path(path)
+
+
+@contextmanager
+def complete_or_absent(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Iterator[Path]:
+    """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        said = f"ending {target.suffix}" if target.suffix else "name without an ending"
+        raise PictureError(f"{target}: {said} is no format known here; give one of {', '.join(endings)}")
+    if target.is_dir():
+        raise PictureError(f"{target}: is a folder; give a file name")
+    try:
+        with atomic(target) as temporary:
+            yield temporary
+    except (OSError, RuntimeError) as fault:
+        reason = getattr(fault, "strerror", None) or (str(fault).splitlines() or [type(fault).__name__])[0]
+        raise PictureError(f"{target}: cannot be written: {reason}; nothing was saved") from fault
+
+
+def positive(**numbers: float) -> None:
+    """Raise an AirflockError that names the first number that is not above zero."""
+    for name, number in numbers.items():
+        if not number > 0.0:
+            raise AirflockError(f"{name} = {number:g} must be above 0")

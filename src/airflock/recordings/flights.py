@@ -1,0 +1,75 @@
+"""Flights: simulate a scenario and keep its trajectories."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from typing import Any
+
+import xarray as xr
+
+from airflock import __version__
+from airflock.engine import cpu
+from airflock.engine.passes.driver import flight
+from airflock.engine.simulate import fly, plan_of
+from airflock.engine.store import toolchain
+from airflock.engine.tables import clock
+from airflock.recordings.layout import dataset
+from airflock.scenarios.scenario import Scenario
+
+
+def simulate(scenario: Scenario, seed: int = 0, *, precision: int = 32, start: Any = None) -> xr.Dataset:
+    """Fly a scenario once and return the recording, sampled every `metrics.period`.
+
+    seed      : any integer from 0; the same seed gives the same bits
+    precision : 32 or 64 bits per number
+    start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
+    Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
+    hold the scenario, the seed, versions and processor, so that it can be flown again.
+    """
+    flown = fly(scenario, seed, precision=precision, record=True, start=start)
+    assert flown.frames is not None
+    period = clock(scenario)["sample_every"] * scenario.flight.dt
+    attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
+    return dataset(flown.frames, scenario.dimensions, period, attributes, scenario.model.command)
+
+
+def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
+    """Everything that decides the bits of a flight, as plain attributes."""
+    text = flight(plan_of(scenario, precision=precision, record=True))
+    return {
+        "airflock_scenario": json.dumps(plain(scenario.document)),
+        "airflock_name": scenario.name,
+        "airflock_metrics": json.dumps(asdict(scenario.measured_by())),
+        "airflock_seed": seed,
+        "airflock_precision": precision,
+        "airflock_version": __version__,
+        "airflock_sources": hashlib.sha256(text.encode()).hexdigest(),
+        "airflock_toolchain": toolchain(),
+        "airflock_processor": processor(),
+    }
+
+
+def processor() -> str:
+    """Model name of the processor."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+        return names[0] if names else "unknown"
+    except OSError:
+        import platform
+
+        return platform.processor() or "unknown"
+
+
+def plain(value: Any) -> Any:
+    """A nested dict of plain Python values, for JSON."""
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    return value
+
+
+def warm(scenario: Scenario, precision: int = 32) -> None:
+    """Compile or load the driver of a scenario before it is needed."""
+    cpu.flight_driver(plan_of(scenario, precision=precision))

@@ -1,0 +1,97 @@
+"""Layout of a recording: one xarray Dataset, the same for simulated and flown flocks.
+
+Dimensions (time, space, keypoint, individual) and the attributes fps, time_unit, source_software and ds_type follow the
+convention of `movement`; velocity and command are Airflock's own additions. Local east-north-up, SI units.
+"""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+
+DIMENSIONS = ("time", "space", "keypoint", "individual")
+UNITS = {"position": "m", "velocity": "m/s"}
+
+
+def dataset(
+    frames: NDArray[Any], dimensions: int, period: float, attributes: dict[str, Any], command: str
+) -> xr.Dataset:
+    """Dataset from frames (time, component, agent): position, velocity and command components, `period` s apart.
+
+    command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
+    """
+    count, _, agents = frames.shape
+    space = ["x", "y", "z"][:dimensions]
+    coordinates = {
+        "time": ("time", np.arange(count) * period, {"units": "s"}),
+        "space": space,
+        "keypoint": ["centre"],
+        "individual": [f"agent_{i}" for i in range(agents)],
+    }
+    names = ("position", "velocity", "command")
+    units = {**UNITS, "command": {"velocity": "m/s", "acceleration": "m/s^2"}.get(command, "1")}
+    variables: dict[str, Any] = {
+        name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
+        for c, name in enumerate(names)
+    }
+    variables["confidence"] = (("time", "keypoint", "individual"), np.ones((count, 1, agents), np.float32))
+    fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
+    return xr.Dataset(variables, coordinates, {**fixed, **attributes})
+
+
+def check(found: xr.Dataset, where: str = "recording") -> None:
+    """Raise a RecordingError that lists everything a dataset lacks to be a recording."""
+    faults = []
+    if "position" not in found:
+        faults.append("no variable position")
+    else:
+        missing = [name for name in DIMENSIONS if name not in found["position"].dims]
+        if missing:
+            faults.append(f"position lacks the dimension{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+    if not faults:
+        sizes = found["position"].sizes
+        if sizes["time"] < 1 or sizes["individual"] < 1:
+            faults.append(f"position is empty ({sizes['time']} times, {sizes['individual']} individuals)")
+        if sizes["space"] not in (2, 3):
+            faults.append(f"space has {sizes['space']} components, not 2 or 3")
+        if "time" not in found.coords or (sizes["time"] > 1 and not (np.diff(found["time"].values) > 0).all()):
+            faults.append("time is no increasing coordinate, s")
+    if faults:
+        raise RecordingError("\n".join(f"{where}: {fault}" for fault in faults))
+
+
+def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float]:
+    """Frames (time, component, agent) of position and velocity, and the time between frames, s.
+
+    Velocity is differentiated from position where it is not recorded. Missing values are an error that names the first.
+    """
+    check(found, where)
+    order = ("time", "space", "keypoint", "individual")
+    position = found["position"].transpose(*order).isel(keypoint=0).values
+    times = found["time"].values.astype(float)
+    steps = np.diff(times)
+    period = float(np.median(steps)) if steps.size else 1.0
+    if steps.size and np.abs(steps - period).max() > 0.01 * period + 1e-9:
+        raise RecordingError(
+            f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"
+        )
+    if "velocity" in found:
+        velocity = found["velocity"].transpose(*order).isel(keypoint=0).values
+    elif len(times) > 1:
+        velocity = np.gradient(position, times, axis=0)
+    else:
+        raise RecordingError(f"{where}: one frame without velocity has no speed to score")
+    frames = np.concatenate([position, velocity], axis=1)
+    bad = np.argwhere(~np.isfinite(frames))
+    if bad.size:
+        time, _, agent = bad[0]
+        name = str(found["individual"].values[agent])
+        share = len({(t, a) for t, _, a in bad.tolist()}) / (frames.shape[0] * frames.shape[2])
+        raise RecordingError(
+            f"{where}: {share:.1%} of the positions are missing, first {name} at t = {times[time]:g} s; "
+            "interpolate or drop them before scoring"
+        )
+    return frames, period

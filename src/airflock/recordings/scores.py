@@ -1,0 +1,106 @@
+"""Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.engine import cpu
+from airflock.engine.passes.build import columns
+from airflock.engine.plan import WHOLE
+from airflock.engine.simulate import finish, plan_of, score_flights
+from airflock.engine.tables import tables
+from airflock.errors import RecordingError
+from airflock.recordings.layout import frames_of
+from airflock.scenarios.files import MODELS, make
+from airflock.scenarios.scenario import Scenario
+
+
+def score(
+    what: Scenario | xr.Dataset,
+    seeds: int | Iterable[int] = 1,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    precision: int = 32,
+    done: Callable[[], None] | None = None,
+) -> pd.DataFrame:
+    """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
+
+    what     : scenario (flown with `seeds`: a number of them, or the seeds themselves), or recording
+    settings : for a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with
+    threads  : flights side by side; by default one per core
+    done     : called after each flight
+    """
+    if isinstance(what, xr.Dataset):
+        values, _ = measure(what, settings)
+        return pd.DataFrame([values])
+    found = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
+    rows = score_flights([what] * len(found), found, threads=threads, precision=precision, done=done)
+    return pd.DataFrame(rows, index=pd.Index(found, name="seed"))
+
+
+def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> pd.DataFrame:
+    """Order parameters at every instant of a recording; the index is time in s."""
+    return measure(recording, settings)[1]
+
+
+def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
+    """Order parameters of a recording, and their course over time.
+
+    Frames are taken every metrics.period, or each one if they are farther apart; collisions every
+    metrics.collision_period.
+    """
+    frames, period = frames_of(recording)
+    scenario = scenario_of(recording, settings)
+    precision = 64 if frames.dtype == np.float64 else 32
+    plan = replace(plan_of(scenario, precision=precision), record=False)
+    found = tables(scenario, plan, 0)
+    q = scenario.measured_by()
+    every = {"sample_every": q.period, "collide_every": q.collision_period or period}
+    for name, seconds in every.items():
+        found.whole[WHOLE.index(name)] = max(1, round(seconds / period))
+    found.whole[WHOLE.index("agents")] = frames.shape[2]
+    values, series = cpu.measure_frames(plan, found, frames, period)
+    names = [name for name, _, _ in columns(plan.metrics)]
+    times = pd.Index(recording["time"].values.astype(float), name="time")
+    course = pd.DataFrame(series, index=times, columns=names)
+    return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
+
+
+def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> Scenario:
+    """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
+
+    A log brings no arena and no model: its arena is open unless settings name one, and v_flock is its mean speed.
+    """
+    text = recording.attrs.get("airflock_scenario")
+    if text:
+        try:
+            document = json.loads(text)
+        except json.JSONDecodeError as fault:
+            raise RecordingError(f"recording: attribute airflock_scenario is damaged: {fault}") from fault
+        name = str(recording.attrs.get("airflock_name", "recording"))
+        kind = document.get("model", {}).get("kind", "")
+        if kind in MODELS or str(kind).endswith(".py"):
+            return make(document, name, settings)
+        # flown with a law that was given directly: its parameters are gone, what it is measured by is kept
+        measured = json.loads(str(recording.attrs.get("airflock_metrics", "{}")))
+        stand_in = {**document, "model": {"kind": MODELS[0]}, "metrics": measured}
+        return make(stand_in, name, {k: v for k, v in (settings or {}).items() if not k.startswith("model.")})
+    frames, period = frames_of(recording)
+    dims = frames.shape[1] // 2
+    speed = float(np.linalg.norm(frames[:, dims:], axis=1).mean())
+    document = {
+        "agents": 1,
+        "dt": period,
+        "model": {"kind": "vasarhelyi_2018"},
+        "sensors": {"period": period},
+        "start": {"separation": 0.0},
+        "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
+        "world": {"dimensions": str(dims), "arena": "none"},
+    }
+    return make(document, "recording", settings)
