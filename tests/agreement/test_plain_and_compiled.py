@@ -1,0 +1,99 @@
+"""A flight is the same as plain Python and compiled, in double and, to its rounding, in single precision."""
+
+import numpy as np
+import pytest
+
+from airflock.engine import cpu
+from airflock.engine.plain import fly_plainly
+from airflock.engine.simulate import plan_of
+from airflock.engine.tables import tables
+from flocks import IDEAL, ISLANDS, PENTAGON, flown, scenario
+
+COMMON = {"duration": 10.0, "world.side": 90.0, "world.height": 50.0, "world.radius": 48.0, "start.separation": 5.0}
+FLIGHTS = {
+    "paper": ("vasarhelyi_2018", {"agents": 12, "world.walls": "nearest_per_axis", "metrics.r_coll": 8.0}),
+    "storm": ("viragh_2014", {
+        "agents": 9, "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.east": 1.0,
+        "wind.gust": 2.0, "start.speed": 3.0, "metrics.r_coll": 7.0, "metrics.collision_period": 0.03,
+    }),
+    "links": ("vasarhelyi_2018", {
+        "agents": 8, "world.dimensions": "3", "world.walls": "nearest_per_axis", "radio.kind": "links",
+        "radio.delay": 0.2, "radio.near": 5.0, "radio.far": 30.0, "model.limit": "cap", "radio.range": 60.0,
+    }),
+    "polygon": ("vasarhelyi_2018", {
+        "agents": 8, "world.arena": "polygon", "world.corners": PENTAGON, "radio.kind": "links", "radio.loss": 0.6,
+        "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5, "sensors.noise": 0.0,
+        "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
+    }),
+    "circle": ("vasarhelyi_2018", {"agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0}),
+    "silo": ("viragh_2014", {
+        "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
+        "wind.gust": 1.0, "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0,
+    }),
+    "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
+    "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),
+}  # fmt: skip
+
+
+def build(name):
+    kind, settings = FLIGHTS[name]
+    return scenario(kind, **{key.replace(".", "__"): value for key, value in (COMMON | settings).items()})
+
+
+def start_of(found, seed):
+    """A start for the flights that are flown from given states: the physics tests share their plans."""
+    rng = np.random.default_rng(seed)
+    n, dims = found.agents, found.dimensions
+    places = rng.permutation(np.stack(np.meshgrid(*[np.arange(-2.0, 3.0) * 9.0] * dims), -1).reshape(-1, dims))[:n]
+    return np.concatenate([places.T, rng.normal(0.0, 2.0, (dims, n))])
+
+
+@pytest.fixture(scope="module")
+def plain_flights():
+    return {}
+
+
+def both(name, seed, precision, plain_flights):
+    found = build(name)
+    start = start_of(found, seed) if name.startswith("ideal") else None
+    if name not in plain_flights:
+        plain_flights[name] = fly_plainly(found, seed, start)
+    return plain_flights[name], flown(found, seed, start, precision)
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_plain_python_is_the_compiled_flight(name, seed, plain_flights):
+    plain, compiled = both(name, seed, 64, plain_flights)
+    assert plain.status == compiled.status == 0
+    assert np.abs(np.diff(plain.frames, axis=0)).max() > 0.1  # something happens
+    np.testing.assert_allclose(compiled.frames, plain.frames, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(compiled.state, plain.state, rtol=0.0, atol=1e-9)
+    assert compiled.values == pytest.approx(plain.values, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["paper", "storm"])
+def test_single_precision_differs_by_its_rounding(name, seed, plain_flights):
+    plain, compiled = both(name, seed, 32, plain_flights)
+    assert compiled.frames.dtype == np.float32
+    # Positions of 50 m are known to 4 µm; the law's slopes make 1 mm of it in 10 s. A command is a short sum rescaled
+    # to v_flock, which magnifies its rounding.
+    for component, margin in enumerate((1e-3, 1e-3, 2e-3, 2e-3, 2e-2, 2e-2)):
+        np.testing.assert_allclose(compiled.frames[:, component], plain.frames[:, component], rtol=0.0, atol=margin)
+    assert compiled.values["phi_vel"] == pytest.approx(plain.values["phi_vel"], rel=1e-5)
+    assert compiled.values["n_coll"] == plain.values["n_coll"]
+
+
+def test_flights_of_this_file_collide_and_leave_the_arena(seed, plain_flights):
+    """So that the agreement above covers collision events and excursions."""
+    totals = [both(name, seed, 64, plain_flights)[0].values for name in ("paper", "storm", "silo")]
+    assert max(values["n_coll"] for values in totals) >= 2.0
+    assert max(values["phi_wall"] for values in totals) > 0.0
+    assert max(values["n_min"] for values in totals) > 1.0
+
+
+def test_a_crowd_without_room_is_refused_by_both(seed):
+    found = scenario(agents=12, world__side=31.0, world__walls="nearest_per_axis", start__separation=7.0)
+    status = fly_plainly(found, seed).status
+    assert status < 0
+    plan = plan_of(found, precision=64, record=True)
+    assert cpu.fly(plan, tables(found, plan, seed)).status == status

@@ -1,0 +1,47 @@
+"""Scenarios that several tests fly. Few distinct plans, because compiling one takes ten seconds."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from airflock.engine import cpu
+from airflock.engine.simulate import fly, plan_of
+from airflock.engine.tables import tables
+from airflock.scenarios.files import make
+
+ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
+PENTAGON = [[-40.0, -30.0], [35.0, -38.0], [50.0, 10.0], [5.0, 45.0], [-45.0, 20.0]]
+SILENT = {"sensors.noise": 0.0, "body.noise": 0.0}
+IDEAL = SILENT | {"radio.delay": 0.0, "radio.range": 1e6}  # no noise, everybody hears everybody at once
+
+
+def scenario(kind="vasarhelyi_2018", **settings):
+    """Scenario with keys such as world__side = 100."""
+    return make({"model": {"kind": kind}}, "test", {key.replace("__", "."): value for key, value in settings.items()})
+
+
+def ideal(dims=2, **settings):
+    """Scenario without noise, delay or loss; every edge of a square acts."""
+    keys = {key.replace(".", "__"): value for key, value in IDEAL.items()}
+    keys |= {"world__dimensions": str(dims), "agents": 1}  # `from_start` brings its own
+    return scenario(**keys | settings)
+
+
+def flown(found, seed=0, start=None, precision=64):
+    """Frames and order parameters of a compiled flight."""
+    return fly(found, seed, precision=precision, record=True, start=start)
+
+
+def from_start(found, *agents, precision=64):
+    """Compiled flight from given (x, y, vx, vy) or (x, y, z, vx, vy, vz) of each agent."""
+    return flown(
+        replace(found, flight=replace(found.flight, agents=float(len(agents)))), 0, np.array(agents).T, precision
+    )
+
+
+def measured(found, frames):
+    """Order parameters of frames (time, component, agent), by the compiled driver that scores recordings."""
+    frames = np.asarray(frames, float)
+    every = replace(found, flight=replace(found.flight, agents=float(frames.shape[2])))
+    plan = plan_of(every, precision=64)
+    return cpu.measure_frames(plan, tables(every, plan, 0), frames)[0]

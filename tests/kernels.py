@@ -1,0 +1,19 @@
+"""A rule compiled as it is in a driver: copied by the generator, with literals in the driver's precision."""
+
+from functools import cache
+
+from airflock.engine.generate import Source
+from airflock.engine.passes.build import JIT
+from airflock.engine.passes.driver import HEAD
+from airflock.engine.primitives import primitives
+from airflock.engine.store import load_driver
+
+
+@cache
+def compiled(rule, bits=64, loop=""):
+    """Compiled twin of a rule; `loop` is driver text that calls RULE, and defines `run`, which is returned instead."""
+    source = Source(JIT, {})
+    name = source.name(rule)
+    head = HEAD.format(label=rule.__name__, bits=bits, primitives=primitives(bits))
+    text = "\n\n".join([head, *source.blocks, loop.replace("RULE", name)]) + "\n"
+    return getattr(load_driver(text, "rule"), "run" if loop else name)

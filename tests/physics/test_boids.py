@@ -1,0 +1,116 @@
+"""Boids, particles and schools: what the models must do, whatever the drivers; grid against all pairs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from airflock.body.turning import Parameters as Turning
+from airflock.body.turning import move as turn
+from airflock.core.maths import arc_cosine
+from airflock.engine import cpu
+from airflock.engine.simulate import plan_of, score_flight
+from airflock.engine.tables import tables
+from airflock.models import reynolds_1987 as boids
+from airflock.scenarios.files import load
+from airflock.world import edges, rays
+
+
+def test_arc_cosine_is_the_library_s():
+    x = np.linspace(-1.0, 1.0, 4001)
+    assert max(abs(arc_cosine(c) - math.acos(c)) for c in x) < 3e-8
+
+
+def test_a_boid_sees_within_half_its_field_of_view_and_everybody_below_the_floor():
+    p = boids.Parameters(fov_c_deg=90.0)
+
+    def sees(angle_deg, r):
+        angle = math.radians(angle_deg)
+        sums = boids.neighbour(r * math.cos(angle), r * math.sin(angle), 0.0, r * r, 0, 0, 0, 1.0, 0.0, 0.0, p)
+        return sums.near_c
+
+    assert (sees(44.0, 0.3), sees(46.0, 0.3), sees(180.0, 0.3)) == (1.0, 0.0, 0.0)
+    assert (sees(44.0, 0.51), sees(180.0, 0.014), sees(180.0, 0.016)) == (0.0, 1.0, 0.0)
+
+
+def test_cohesion_and_separation_of_one_neighbour_cancel_in_the_program_s_form():
+    p = boids.Parameters(w_a=0.0)
+    sums = boids.neighbour(0.1, 0.05, -0.1, 0.0225, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, p)
+    assert boids.flocking(sums, p) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_a_turning_body_turns_by_its_rate_and_keeps_its_speed():
+    b = Turning(speed=3.0, turn=0.7)
+    v = turn(3.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.1, b)
+    assert math.hypot(*v) == pytest.approx(3.0)
+    assert math.atan2(v[1], v[0]) == pytest.approx(0.07, abs=1e-6)
+    assert turn(3.0, 0.0, 0.0, 0.0, 1.0, 0.0, 10.0, b) == pytest.approx((0.0, 3.0, 0.0), abs=1e-6)
+
+
+def test_edges_clamp_reflect_and_wrap():
+    assert edges.bounce(1.6, 2.0, 1.5) == (1.5, -2.0)
+    assert edges.bounce(-1.4, -2.0, 1.5) == (-1.4, -2.0)
+    assert edges.wrap(1.6, 2.0, 1.5) == pytest.approx((-1.4, 2.0))
+    assert edges.nearest_image(2.9, 1.5) == pytest.approx(-0.1)
+
+
+def test_rays_end_where_shapely_says(seed):
+    from shapely.geometry import LineString, Polygon
+
+    rng = np.random.default_rng(seed)
+    corners = [(-2.0, -1.5), (2.5, -1.0), (1.0, 2.0), (-1.5, 1.5)]
+    rows = [[*a, *b] for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    for _ in range(100):
+        x, y, angle = *rng.uniform(-0.8, 0.8, 2), rng.uniform(0.0, 2 * math.pi)
+        ux, uy = math.cos(angle), math.sin(angle)
+        whole = LineString([(x, y), (x + 10 * ux, y + 10 * uy)]).intersection(Polygon(corners)).length
+        assert rays.to_edges(x, y, ux, uy, rows, 0, 4) == pytest.approx(whole, rel=1e-9)
+        box = LineString([(x, y), (x + 10 * ux, y + 10 * uy)]).intersection(
+            Polygon([(-1, -2), (1, -2), (1, 2), (-1, 2)])
+        )
+        assert rays.to_box(x, y, 0.0, ux, uy, 0.0, 1.0, 2.0, 3.0, [], 0) == pytest.approx(box.length, rel=1e-6)
+        assert rays.to_cylinder(x, y, 0.0, ux, uy, 0.0, 1.5, 0.0, 3.0, [], 0) == pytest.approx(
+            -(x * ux + y * uy) + math.sqrt((x * ux + y * uy) ** 2 + 2.25 - x * x - y * y), rel=1e-6
+        )
+
+
+@pytest.mark.parametrize("world", ["bounce", "periodic"])
+@pytest.mark.parametrize("side", [1.3, 3.0])
+def test_grid_is_all_pairs(world, side, seed):
+    found = load("zapotecatl_2016/best", {
+        "agents": 300, "update": "synchronous", "dt": 0.02, "duration": 0.1, "metrics.kind": "order",
+        "start.kind": "arena", "start.separation": 0.0, "world.edges": world, "world.side": side, "world.height": side,
+    })  # fmt: skip
+    pairs, cells = (plan_of(found, precision=64, grid=grid) for grid in (False, True))
+    one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
+    assert np.abs(one[3:]).max() > 0.0
+    np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
+
+
+def test_particles_are_ordered_at_low_noise_and_not_at_high():
+    settings = {"agents": 300, "world.side": 8.66, "duration": 800.0}
+    at = {eta: score_flight(load("vicsek_1995/transition", {"model.eta": eta, **settings})) for eta in (0.1, 2.0, 6.28)}
+    assert at[0.1]["polarisation"] > 0.9
+    assert at[0.1]["polarisation"] > at[2.0]["polarisation"] > at[6.28]["polarisation"]
+    # without order the mean heading is a random walk: Rayleigh mean sqrt(pi / (4 n))
+    assert at[6.28]["polarisation"] == pytest.approx(math.sqrt(math.pi / 1200.0), rel=0.1)
+
+
+def test_the_four_groups_of_couzin():
+    found = {
+        name: score_flight(load(f"couzin_2002/{name}"))
+        for name in ("swarm", "torus", "dynamic_parallel", "highly_parallel")
+    }
+    assert found["swarm"]["polarisation"] < 0.25
+    assert found["swarm"]["milling"] < 0.3
+    assert found["torus"]["polarisation"] < 0.3
+    assert found["torus"]["milling"] > 0.5
+    assert found["dynamic_parallel"]["polarisation"] > 0.8
+    assert found["highly_parallel"]["polarisation"] > 0.98
+
+
+def test_a_short_flight_of_the_paper_has_its_quality():
+    found = score_flight(load("zapotecatl_2016/best", {"dt": 0.004, "duration": 89.996}), 1)
+    assert 0.88 < found["quality"] < 0.96
+    six = ["extension_cm", "polarization_deg", "f_collision", "cns_ext", "cns_pol", "quality"]
+    assert list(found) == [*six, "polarisation"]

@@ -1,0 +1,120 @@
+"""Bodies, sensors and wind against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from airflock.body import motion, sensors, wind
+from airflock.core import random
+from flocks import flown, from_start, ideal, scenario
+
+
+def error_statistics(h, **settings):
+    """Stationary covariance of (q, u) of the sensor error: the rule is linear, so its moments are known exactly."""
+    s = sensors.Parameters(**settings)
+    columns = [sensors.langevin(1.0, 0.0, 0.0, h, s), sensors.langevin(0.0, 1.0, 0.0, h, s)]
+    step = np.array(columns).T
+    push = np.array(sensors.langevin(0.0, 0.0, 1.0, h, s))
+    # C = A C Aᵀ + b bᵀ, solved as linear equations
+    return np.linalg.solve(np.eye(4) - np.kron(step, step), np.outer(push, push).ravel()).reshape(2, 2)
+
+
+@pytest.mark.parametrize("settings", [{}, {"noise": 0.08}, {"damping": 0.3}, {"scale": 1.0, "noise": 0.02}])
+def test_sensor_error_has_its_stationary_deviations(settings):
+    """SD(u) = sqrt(S) and SD(q) = sqrt(S / D) with D = sqrt(2 damping S) / scale, as the period goes to zero."""
+    s = sensors.Parameters(**settings)
+    spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale
+    for h, margin in ((0.2, 0.12), (0.002, 0.0012)):
+        found = error_statistics(h, **settings)
+        assert math.sqrt(found[1, 1]) == pytest.approx(math.sqrt(s.noise), rel=margin)
+        assert math.sqrt(found[0, 0]) == pytest.approx(math.sqrt(s.noise / spring), rel=margin)
+    assert error_statistics(0.2)[0, 0] ** 0.5 == pytest.approx(0.69, abs=0.05)  # m, reference of the authors' program
+
+
+def test_sensor_error_in_random_numbers(seed):
+    """The exact covariance is what random numbers give: 400 errors, 10 decay times after they began at zero."""
+    s, h = sensors.Parameters(damping=1.0), 0.2
+    ends = []
+    for agent in range(400):
+        q = u = 0.0
+        for step in range(100):
+            g, _ = random.normal_pair(*random.words(seed, random.SENSOR, 0, step, agent)[:2])
+            q, u = sensors.langevin(q, u, g, h, s)
+        ends.append((q, u))
+    expected = error_statistics(h, damping=1.0)
+    np.testing.assert_allclose(
+        np.cov(np.array(ends).T).diagonal(), expected.diagonal(), rtol=5.0 * math.sqrt(2.0 / 400)
+    )
+
+
+def test_outer_noise_diffuses(seed):
+    """The variance of each velocity component grows as 2 sigma t: 1,000 agents, control all but switched off."""
+    keys = {"agents": 1000, "duration": 2.0, "world__side": 1e5, "world__walls": "nearest_per_axis"}
+    found = scenario(**keys, body__tau=60.0, body__a_max=0.01, body__noise=0.3)
+    frames = flown(found, seed, precision=32).frames
+    velocity = frames[:, 2:4].astype(float)
+    times = 0.2 * np.arange(len(frames))
+    error = 5.0 * math.sqrt(2.0 / 2000)  # of a variance from 2,000 components
+    np.testing.assert_allclose(velocity.var(axis=(1, 2))[1:], 2.0 * 0.3 * times[1:], rtol=error)
+    assert np.corrcoef(velocity[5].ravel(), (velocity[10] - velocity[5]).ravel())[0, 1] == pytest.approx(0.0, abs=0.12)
+
+
+def test_gusts_keep_their_deviation_and_forget_with_their_time(seed):
+    a, dt = wind.Parameters(gust=2.5, gust_time=4.0), 0.1
+    keep, push = wind.gusting(1.0, 0.0, dt, a), wind.gusting(0.0, 1.0, dt, a)
+    assert keep == math.exp(-dt / 4.0)  # exact correlation after dt
+    assert push * push / (1.0 - keep * keep) == pytest.approx(2.5**2, rel=1e-12)  # exact stationary variance
+    w, course = 0.0, []
+    for step in range(20_000):
+        w = wind.gusting(w, random.normal_pair(*random.words(seed, random.GUST, 0, step, 0)[:2])[0], dt, a)
+        course.append(w)
+    course = np.array(course[400:])
+    assert course.std() == pytest.approx(2.5, rel=0.12)  # about 250 independent gusts
+    later = np.corrcoef(course[:-40], course[40:])[0, 1]
+    assert later == pytest.approx(math.exp(-1.0), abs=0.15)
+
+
+def test_a_lone_agent_reaches_its_speed_with_time_constant_tau():
+    """v(t) = v_flock + (v0 - v_flock) exp(-t / tau); explicit Euler makes the power (1 - dt / tau)^n of it, exactly."""
+    tau = 1.5
+    found = ideal(duration=6.0, world__side=1e4, body__tau=tau)
+    frames = from_start(found, (0.0, 0.0, 0.6, 0.8)).frames
+    speed = np.hypot(frames[:, 2, 0], frames[:, 3, 0])
+    steps = 20 * np.arange(len(speed))
+    np.testing.assert_allclose(speed, 4.0 - 3.0 * (1.0 - 0.01 / tau) ** steps, rtol=1e-9)
+    np.testing.assert_allclose(speed, 4.0 - 3.0 * np.exp(-0.01 * steps / tau), rtol=5e-3)
+    np.testing.assert_allclose(frames[:, 3, 0] / frames[:, 2, 0], 0.8 / 0.6, rtol=1e-9)  # it flies straight
+
+
+def test_acceleration_saturates_with_its_direction_kept():
+    b = motion.Parameters(a_max=2.0, noise=0.0)
+    vx, vy, vz = motion.move(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 30.0, 40.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.1, b)
+    assert (vx, vy, vz) == pytest.approx((0.12, 0.16, 0.0))
+
+
+def test_noise_comes_after_the_saturation():
+    b = motion.Parameters(a_max=0.01, noise=2.0)
+    vx, _, _ = motion.move(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, b)
+    assert vx == pytest.approx(0.01 * 0.01 + math.sqrt(2.0 * 2.0 * 0.01))
+
+
+def test_wind_carries_a_flock_that_does_not_resist():
+    """Steady wind pushes with drag times its velocity: dv = drag · w · t on an agent without control."""
+    b = motion.Parameters(a_max=0.01, noise=0.0, drag=0.2)
+    v = (1.0, 0.0, 0.0)
+    for _ in range(100):
+        v = motion.move(*v, *v, *v, 0.0, 0.0, 0.0, 5.0, -3.0, 1.0, 0.01, b)
+    assert v == pytest.approx((2.0, -0.6, 0.2))
+
+
+@pytest.mark.parametrize("tau", [1.0])
+def test_halving_the_step_halves_the_error(tau):
+    """Order 1: three flights of two interacting agents at dt, dt/2, dt/4; decisions at the same times."""
+    ends = []
+    for dt in (0.02, 0.01, 0.005):
+        found = ideal(duration=4.0, dt=dt, world__side=1e4, body__tau=tau)
+        ends.append(from_start(found, (0.0, 0.0, 1.0, 0.0), (9.0, 3.0, 0.0, 1.0)).state)
+    first, second = np.abs(ends[0] - ends[1]).max(), np.abs(ends[1] - ends[2]).max()
+    assert 1e-4 < first < 0.2
+    assert first / second == pytest.approx(2.0, rel=0.1)

@@ -1,0 +1,35 @@
+"""Bad input for boids is refused in one line that names key, value and range."""
+
+import pytest
+
+from airflock.errors import ScenarioError
+from airflock.scenarios.files import load
+
+BAD = {
+    "model.r_s": (-0.1, "model.r_s = -0.1 m lies outside [0, 1000] m"),
+    "model.w_a": (-1.0, "model.w_a = -1 1 lies outside"),
+    "model.fov_c_deg": (400.0, "model.fov_c_deg = 400 deg lies outside [0, 360] deg"),
+    "metrics.r_b": (0.0, "metrics.r_b = 0 m lies outside"),
+    "world.side": (0.8, "the arena is smaller than the ball in which agents start"),
+    "metrics.k": (3.0, "metrics.k = 3 m lies outside [0, 2.25] m"),
+    "metrics.sigma": (0.7, "metrics.sigma + metrics.gamma = 1.2 is not 1"),
+    "body.kind": ("multirotor", "takes a velocity, but model reynolds_1987 commands acceleration"),
+    "radio.delay": (0.5, "update = 'sequential' needs ideal perception"),
+    "update": ("random", "update = 'random' is none of synchronous, sequential"),
+}
+
+
+@pytest.mark.parametrize("key", BAD)
+def test_bad_input_is_one_line(key):
+    value, line = BAD[key]
+    with pytest.raises(ScenarioError) as fault:
+        load("zapotecatl_2016/best", {key: value})
+    assert line in str(fault.value)
+    assert len(str(fault.value).splitlines()) == 1
+
+
+def test_largest_extension_comes_from_the_arena_or_is_asked_for():
+    assert load("zapotecatl_2016/best").measured_by().max_e == pytest.approx(2.25)
+    with pytest.raises(ScenarioError, match=r"metrics\.max_e is missing"):
+        load("couzin_2002/torus", {"metrics.kind": "zapotecatl"})
+    assert load("couzin_2002/torus", {"metrics.kind": "zapotecatl", "metrics.max_e": 9.0}).measured_by().k == 9.0

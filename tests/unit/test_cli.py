@@ -1,0 +1,159 @@
+"""The command line: what it prints, and that bad input ends with one line and status 2."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SHORT = ["--duration", "2", "--agents", "10"]
+
+
+def airflock(*arguments, **options):
+    command = [sys.executable, "-m", "airflock", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
+
+
+def test_run_prints_one_json_object_with_the_published_keys():
+    done = airflock("run", "vasarhelyi_2018/4ms", "--seeds", 2, "--json", *SHORT)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    keys = [
+        "phi_vel",
+        "phi_corr",
+        "r_min_mean",
+        "r_min",
+        "phi_coll",
+        "n_coll",
+        "phi_wall",
+        "n_disc",
+        "n_min",
+        "phi_lap",
+        "f_speed",
+        "f_coll",
+        "f_disc",
+        "f_cluster",
+        "f_wall",
+        "f_corr",
+        "fitness",
+    ]
+    assert found["seeds"] == 2 and [run["seed"] for run in found["runs"]] == [0, 1]
+    for part in (*found["runs"], found["mean"], found["std"], found["median"]):
+        assert set(keys) <= set(part)
+    first, second = (run["phi_vel"] for run in found["runs"])
+    assert first != second
+    assert found["mean"]["phi_vel"] == pytest.approx((first + second) / 2)
+    assert found["median"]["phi_vel"] == pytest.approx((first + second) / 2)
+
+
+def test_first_seed_flies_the_same_flight_as_the_same_seed_among_many():
+    many = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--seeds", 3, "--json", *SHORT).stdout)["runs"]
+    one = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--first-seed", 2, "--json", *SHORT).stdout)["runs"]
+    assert one == many[2:]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "vasarhelyi_2018/4m"], ["no such file or preset", "did you mean vasarhelyi_2018/4ms?"]),
+        (["run", "vasarhelyi_2018/4ms", "--set", "model.p_repp=1"], ["model.p_repp", "did you mean model.p_rep?"]),
+        (["run", "vasarhelyi_2018/4ms", "--set", "model.r0_rep=-4"], ["model.r0_rep = -4 m", "[0, 1000] m"]),
+        (["run", "vasarhelyi_2018/4ms", "--set", "model.limit=capp"], ["model.limit", "did you mean cap?"]),
+        (["run", "vasarhelyi_2018/4ms", "--set", "p_rep"], ["--set p_rep", "KEY=VALUE"]),
+        (["run", "vasarhelyi_2018/4ms", "--agents", "3000"], ["agents = 3000 do not fit", "start.separation = 8 m"]),
+        (["run", "vasarhelyi_2018/4ms", "--save", "/nowhere/x.nc"], ["/nowhere/x.nc", "does not exist"]),
+        (["sweep", "vasarhelyi_2018/4ms", "--over", "radio.delay=0:x:3"], ["--over", "low:high:count"]),
+        (["score", "nothing.nc"], ["nothing.nc", "no such file"]),
+        (["paper", "vasarheli_2018"], ["no such paper", "did you mean vasarhelyi_2018?"]),
+    ],
+)
+def test_bad_input_ends_with_one_line_that_names_it_and_status_2(arguments, words):
+    done = airflock(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1 and lines[0].startswith("airflock: ")
+    for word in words:
+        assert word in lines[0]
+
+
+def test_all_faults_of_a_file_are_reported_together(tmp_path):
+    file = tmp_path / "bad.toml"
+    file.write_text(
+        'agents = "many"\nduratoin = 3\n[model]\nkind = "vasarhelyi"\n[sensors]\nperiod = -1\n'
+        '[world]\narena = "polygon"\ncorners = [[0, 0], [10, 0], [1, 1], [0, 10]]\n'
+        '[radio]\nrange = { value = 80, unit = "km" }\n'
+    )
+    done = airflock("validate", file)
+    assert done.returncode == 2
+    for word in ("agents", "duratoin", "model.kind", "sensors.period = -1 s", "not convex", "the unit is m"):
+        assert word in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 6
+
+
+def test_a_recording_scores_like_its_flight_and_flies_again_to_the_same_bits(tmp_path):
+    file = tmp_path / "flight.nc"
+    same = ["--set", "metrics.collision_period=0.2", "--precision", "64", *SHORT]
+    flown = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--json", "--save", file, *same).stdout)["runs"][0]
+    scored = json.loads(airflock("score", file, "--json").stdout)["runs"][0]
+    for key in flown.keys() & scored.keys() - {"seed"}:
+        assert scored[key] == pytest.approx(flown[key], abs=1e-9), key
+    again = airflock("validate", file)
+    assert again.returncode == 0 and "same bits" in again.stdout
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
+    folder = tmp_path / "folder.nc"
+    folder.mkdir()
+    done = airflock("run", "vasarhelyi_2018/4ms", "--save", folder, *SHORT)
+    assert done.returncode == 2 and "folder.nc" in done.stderr
+    assert list(tmp_path.iterdir()) == [folder] and list(folder.iterdir()) == []
+
+
+def test_a_cut_off_recording_is_refused(tmp_path):
+    file = tmp_path / "flight.nc"
+    assert airflock("run", "vasarhelyi_2018/4ms", "--save", file, *SHORT).returncode == 0
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    done = airflock("score", file)
+    assert done.returncode == 2 and "is no netCDF recording" in done.stderr
+
+
+def test_starting_set_is_a_valid_scenario_and_table_s1_at_its_own_speeds(tmp_path):
+    from airflock.scenarios.files import load
+
+    for speed in ("4", "16"):
+        file = tmp_path / f"{speed}.toml"
+        file.write_text(airflock("presets", "--for-speed", speed).stdout)
+        ours, published = load(file).parameters, load(f"vasarhelyi_2018/{speed}ms").parameters
+        for name in ("r0_rep", "p_rep", "r0_frict", "c_frict", "v_frict", "v_shill", "a_shill"):
+            assert getattr(ours, name) == pytest.approx(getattr(published, name), rel=1e-3)
+    file.write_text(airflock("presets", "--for-speed", "12").stdout)
+    between = load(file).parameters
+    assert between.v_shill >= 2.0 * 12.0
+    assert (
+        load("vasarhelyi_2018/8ms").parameters.r0_rep < between.r0_rep < load("vasarhelyi_2018/16ms").parameters.r0_rep
+    )
+
+
+def test_every_verb_has_help_with_an_example():
+    verbs = ["run", "score", "sweep", "plot", "video", "paper", "presets", "validate", "doctor"]
+    listing = airflock("--help").stdout
+    for verb in verbs:
+        assert verb in listing
+        help_text = airflock(verb, "--help").stdout
+        assert f"airflock {verb}" in " ".join(help_text.split()) and "Example" in help_text
+
+
+def test_interrupt_ends_with_one_line_and_status_2():
+    import signal
+    import time
+
+    command = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--seeds", "2000"]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=Path.home())
+    time.sleep(4.0)
+    running.send_signal(signal.SIGINT)
+    _, stderr = running.communicate(timeout=120)
+    assert running.returncode == 2
+    assert stderr.startswith("airflock: interrupted") and len(stderr.strip().splitlines()) == 1

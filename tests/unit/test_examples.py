@@ -1,0 +1,46 @@
+"""Examples and the README's scenario file run as they stand; every publication named is in references.bib."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_example_runs(path, tmp_path):
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "phi_vel" in done.stdout
+
+
+def test_own_rule_flies_the_same_in_plain_python():
+    sys.path.insert(0, str(ROOT / "examples"))
+    try:
+        import own_rule
+    finally:
+        sys.path.pop(0)
+    p = own_rule.Parameters()
+    alone = own_rule.neighbour(0.0, 100.0, 0.0, 100.0, 0.0, 0.0, 0.0, p)
+    assert alone == (0.0, 0.0, 0.0)
+    near = own_rule.neighbour(3.0, 4.0, 0.0, 5.0, 0.0, 0.0, 0.0, p)
+    assert near == pytest.approx((-p.push * 10.0 * 0.6, -p.push * 10.0 * 0.8, 0.0))
+
+
+def test_readme_scenario_is_valid(tmp_path):
+    from airflock.scenarios.files import load
+
+    block = re.search(r"```toml\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)
+    assert block
+    file = tmp_path / "readme.toml"
+    file.write_text(block[1], encoding="utf-8")
+    assert load(file).agents == 30
+
+
+def test_every_model_file_is_named_after_a_publication_in_the_bibliography():
+    keys = set(re.findall(r"@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8")))
+    for path in (ROOT / "src/airflock/models").glob("*_[12]*.py"):
+        assert path.stem in keys, f"{path.stem} is not in references.bib"

@@ -1,0 +1,385 @@
+"""Figures and videos say what is in the recording: lines, extents, colours, frames; failed writes leave nothing."""
+
+import errno
+import json
+import math
+
+import imageio.v3 as iio
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
+
+import airflock
+from airflock.core.maths import bell, braking_curve, excess, peak, rising
+from airflock.errors import AirflockError, RecordingError
+from airflock.models import vasarhelyi_2018
+from airflock.plots import scene, style
+from airflock.plots.exposure import develop, exposure, light
+from airflock.plots.heatmap import heatmap
+from airflock.plots.rules import alignment, allowed_difference, repulsion, rules, vectors, wall_response
+from airflock.plots.save import PictureError, save_figure
+from airflock.plots.series import rotations, series
+from airflock.plots.trajectories import trajectories
+from airflock.plots.transfer import transfer
+from airflock.plots.video import Stage, frame_count, video
+from airflock.recordings.layout import dataset
+from airflock.scenarios.files import make
+
+RADIUS, PACE = 50.0, 4.0
+
+
+def flight(axes=2, agents=3, seconds=100.0, period=0.5, document=None):
+    """Agents that circle the origin anticlockwise at 4 m/s, evenly spaced; in space each at its own height."""
+    times = np.arange(0.0, seconds + 1e-9, period)
+    angle = times[:, None] * PACE / RADIUS + np.arange(agents) * 2.0 * math.pi / agents
+    level = np.broadcast_to(np.arange(agents) * 5.0, angle.shape)
+    flat = np.zeros_like(angle)
+    position = [RADIUS * np.cos(angle), RADIUS * np.sin(angle), level][:axes]
+    velocity = [-PACE * np.sin(angle), PACE * np.cos(angle), flat][:axes]
+    attributes = {} if document is None else {"airflock_scenario": json.dumps(document), "airflock_seed": 7}
+    return dataset(np.stack(position + velocity + velocity, axis=1), axes, period, attributes, "velocity")
+
+
+SQUARE = {
+    "agents": 3,
+    "model": {"kind": "vasarhelyi_2018"},
+    "world": {"side": 200.0, "obstacles": [[[-10.0, -10.0], [10.0, -10.0], [0.0, 10.0]]]},
+}
+BOX = {"agents": 3, "model": {"kind": "vasarhelyi_2018"}, "world": {"dimensions": "3", "side": 200.0, "height": 60.0}}
+
+
+def coloured_paths(figure):
+    return [c for c in figure.axes[0].collections if isinstance(c, LineCollection) and c.get_array() is not None]
+
+
+def test_every_path_is_drawn_once_in_its_window_and_coloured_by_its_speed():
+    figure = trajectories(flight(document=SQUARE), start=20.0, stop=30.0)
+    paths = coloured_paths(figure)
+    assert len(paths) == 3  # two in colour, one in grey
+    for path in paths:
+        segments = np.array(path.get_segments())
+        assert len(segments) == 20
+        assert np.allclose(np.hypot(segments[..., 0], segments[..., 1]), RADIUS)
+        drawn = np.linalg.norm(np.diff(segments, axis=1), axis=2).sum()
+        assert drawn == pytest.approx(10.0 * PACE, rel=1e-3)
+        assert np.allclose(path.get_array(), PACE)
+    assert sum(path.get_cmap().name == "gray" for path in paths) == 1
+    low, high = figure.axes[0].get_xlim()
+    assert low < -100.0 and high > 100.0  # the arena fits
+
+
+def test_trajectories_default_to_the_last_minute_and_say_so():
+    figure = trajectories(flight(document=SQUARE))
+    texts = " ".join(t.get_text() for t in figure.axes[0].texts)
+    assert "40 to 100 s" in texts and "seed 7" in texts and "3 agents" in texts
+
+
+def test_dots_mark_the_final_positions_and_the_world_is_outlined():
+    recording = flight(document=SQUARE)
+    axes = trajectories(recording).axes[0]
+    dots = next(c for c in axes.collections if c.get_label() == "end")
+    assert np.allclose(dots.get_offsets(), recording["position"].values[-1, :, 0].T)
+    outline = axes.lines[0].get_xydata()
+    assert outline.min() == -100.0 and outline.max() == 100.0
+    assert np.allclose(axes.patches[0].get_xy()[:3], SQUARE["world"]["obstacles"][0])
+
+
+def test_the_highlighted_agent_can_be_chosen_or_left_out():
+    chosen = next(p for p in coloured_paths(trajectories(flight(), agent=2)) if p.get_cmap().name == "gray")
+    expected = flight()["position"].sel(time=40.0).values[:, 0, 2]
+    assert np.allclose(chosen.get_segments()[0][0], expected)
+    assert all(p.get_cmap().name != "gray" for p in coloured_paths(trajectories(flight(), highlight=False)))
+    with pytest.raises(RecordingError, match="no agent 3"):
+        trajectories(flight(), agent=3)
+
+
+def test_a_recording_in_space_gets_axes_in_space():
+    axes = trajectories(flight(axes=3, document=BOX)).axes[0]
+    assert axes.name == "3d"
+    assert axes.get_zlabel() == "up (m)"
+    assert axes.get_zlim()[0] <= -30.0 and axes.get_zlim()[1] >= 30.0
+
+
+def test_a_window_without_frames_is_refused_in_one_line():
+    with pytest.raises(RecordingError, match="from 200 to 300 s; it reaches from 0 to 100 s"):
+        trajectories(flight(), start=200.0, stop=300.0)
+    with pytest.raises(RecordingError, match="ends before it starts"):
+        exposure(flight(), start=30.0, stop=20.0)
+
+
+def test_missing_positions_leave_gaps_and_nothing_else():
+    recording = flight(document=SQUARE)
+    recording["position"].values[150:160, :, :, 1] = np.nan
+    save_to_nowhere(trajectories(recording))
+    save_to_nowhere(exposure(recording, start=70.0))
+
+
+def save_to_nowhere(figure):
+    assert len(figure._repr_png_()) > 1000
+
+
+def test_light_adds_up_to_one_unit_per_agent_and_second_faded():
+    shown = scene.paths_of(flight())
+    x, y = shown.position[:, 0], shown.position[:, 1]
+    film = light(shown, x, y, (-60.0, 60.0, -60.0, 60.0), 20.0)
+    one_colour = exposure_colour(shown)
+    expected = 3 * 20.0 * (1.0 - math.exp(-100.0 / 20.0))
+    assert film.sum(axis=(0, 1)) == pytest.approx(expected * one_colour, rel=1e-4)
+    rows, columns = np.nonzero(film.sum(axis=2))
+    radius = np.hypot(columns + 0.5 - film.shape[1] / 2, rows + 0.5 - film.shape[0] / 2) * 120.0 / film.shape[1]
+    assert abs(radius - RADIUS).max() < 0.4
+
+
+def exposure_colour(shown):
+    from airflock.plots.exposure import LAMP
+
+    low, high = scene.speed_range(shown)
+    return np.array(LAMP((PACE - low) / max(high - low, 1e-9))[:3])
+
+
+def test_developed_pictures_are_colours_and_dark_where_nobody_flew():
+    picture = develop(np.zeros((8, 8, 3)))
+    assert picture.min() >= 0.0 and picture.max() < 0.06
+
+
+def test_series_of_a_circling_flock():
+    figure = series(flight(agents=12, document={**SQUARE, "agents": 12}))
+    upper, lower, right = figure.axes
+    lines = {line.get_label(): line.get_ydata() for axes in figure.axes for line in axes.lines}
+    speed = next(v for k, v in lines.items() if "vel" in k)
+    assert np.allclose(speed, 1.0, atol=1e-6)
+    rotation = next(v for k, v in lines.items() if "LAP" in k)
+    assert np.abs(rotation).max() < 0.05  # an even ring has no mean velocity
+    nearest = [v for k, v in lines.items() if "r_{ij}" in k]
+    assert len(nearest) == 2 and np.allclose(nearest, 2.0 * RADIUS * math.sin(math.pi / 12.0), rtol=1e-5)
+    assert "(m)" in right.get_ylabel() and "(s)" in lower.get_xlabel()
+
+
+def test_rotations_draw_one_line_for_each_flight():
+    one = flight(agents=1, document={**SQUARE, "agents": 1})
+    axes = rotations({"circle": one, "again": one}).axes[0]
+    drawn = [line for line in axes.lines if line.get_label() in ("circle", "again")]
+    assert len(drawn) == 2 and np.allclose(drawn[0].get_ydata(), 1.0, atol=1e-6)  # one circling agent: phi_LAP = 1
+
+
+@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_8ms"])
+def test_drawn_rules_are_the_closed_forms_of_the_paper(name):
+    scenario = airflock.load(name)
+    p, r = scenario.parameters, np.linspace(0.5, 120.0, 60)
+    (push,) = repulsion(scenario.model, p, r)
+    assert np.allclose(push.values, p.p_rep * np.maximum(p.r0_rep - r, 0.0), rtol=1e-9, atol=1e-12)
+    allowed = np.array([max(p.v_frict, braking_curve(d - p.r0_frict, p.a_frict, p.p_frict)) for d in r])
+    assert np.allclose(allowed_difference(scenario.model, p, r), allowed, rtol=1e-9)
+    (term,) = alignment(scenario.model, p, r, 4.0)
+    assert np.allclose(term.values, [p.c_frict * excess(4.0, a) * 4.0 for a in allowed], atol=1e-12)
+    (wall,) = wall_response(scenario.model, p, r, p.v_flock)
+    gap = p.v_shill + p.v_flock
+    stop = np.array([braking_curve(d - p.r0_shill, p.a_shill, p.p_shill) for d in r])
+    assert np.allclose(wall.values, np.maximum(gap - stop, 0.0), atol=1e-9)
+
+
+def test_the_figure_of_rules_holds_these_lines_with_units():
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    figure = rules(scenario, difference=3.0, farthest=100.0)
+    pair, term, wall = figure.axes
+    push = next(line for line in pair.lines if line.get_label() == "repulsion")
+    p, r = scenario.parameters, push.get_xdata()
+    assert r[-1] == 100.0
+    assert np.allclose(push.get_ydata(), p.p_rep * np.maximum(p.r0_rep - r, 0.0), atol=1e-12)
+    assert "(m)" in pair.get_xlabel() and "(m/s)" in pair.get_ylabel() and "(m/s)" in term.get_ylabel()
+    assert any(np.allclose(line.get_ydata(), 3.0) for line in pair.lines)
+
+
+def test_friction_of_virágh_2014_allows_no_difference_at_all():
+    scenario = airflock.load("viragh_2014/4ms")
+    assert np.array_equal(allowed_difference(scenario.model, scenario.parameters, np.array([1.0, 20.0])), [0.0, 0.0])
+    assert len(rules(scenario).axes) == 3
+
+
+def test_rules_of_any_model_are_drawn_vector_by_vector():
+    from typing import NamedTuple
+
+    class Sums(NamedTuple):
+        apart_x: float
+        apart_y: float
+        apart_z: float
+        vx: float
+        vy: float
+        vz: float
+        n: float
+
+    assert vectors(Sums) == {"apart": ("apart_x", "apart_y"), "v": ("vx", "vy")}
+
+    def neighbour(dx, dy, dz, r2, dvx, dvy, dvz):
+        return Sums(-dx / r2, -dy / r2, -dz / r2, dvx, dvy, dvz, 1.0)
+
+    def decide(sums):
+        return sums.apart_x, sums.apart_y, sums.apart_z
+
+    found = airflock.model(
+        {"Parameters": vasarhelyi_2018.Parameters, "COMMAND": "acceleration", "Sums": Sums, "neighbour": neighbour,
+         "decide": decide, "__name__": "own"}
+    )  # fmt: skip
+    parameters = vasarhelyi_2018.Parameters()
+    r = np.array([1.0, 2.0, 4.0])
+    apart, velocity = repulsion(found, parameters, r)
+    assert np.allclose(apart.values, 1.0 / r) and not velocity.values.any()
+    figure = rules(make({"agents": 3}, "own", law=found), difference=2.0)
+    assert len(figure.axes) == 3  # two panels, and velocities on an axis of their own
+    assert "m/s²" in figure.axes[0].get_ylabel()
+
+
+def test_transfer_functions_are_those_of_the_fitness():
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    q = scenario.measured_by()
+    figure = transfer(scenario)
+    forms = (lambda v: rising(v, q.v_flock, q.v_tol), lambda v: bell(v, q.r_tol), lambda v: peak(v, q.a_tol))
+    for axes, form in zip(figure.axes, forms, strict=True):
+        x, y = axes.lines[0].get_data()
+        assert np.array_equal(y, [form(float(v)) for v in x])
+        assert min(y) >= 0.0 and max(y) <= 1.0
+    assert len(transfer().axes) == 3
+
+
+def sweep():
+    return pd.DataFrame(
+        [
+            {"model.p_rep": p, "radio.range": g, "seed": s, "r_min": 10.0 * p + g + s}
+            for p in (0.1, 0.2, 0.5)
+            for g in (20, 40)
+            for s in (-1, 0, 1)
+        ]
+    )
+
+
+def test_a_sweep_of_one_key_is_its_mean_and_standard_deviation():
+    table = sweep()
+    axes = heatmap(table[table["radio.range"] == 20], ["model.p_rep"], "r_min").axes[0]
+    mean = axes.lines[-1]
+    assert np.allclose(mean.get_xdata(), [0.1, 0.2, 0.5]) and np.allclose(mean.get_ydata(), [21.0, 22.0, 25.0])
+    band = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert band.min() == pytest.approx(20.0) and band.max() == pytest.approx(26.0)
+    assert axes.get_ylabel() == "r_min (m)"
+
+
+def test_a_sweep_of_two_keys_is_the_map_of_their_means():
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    figure = heatmap(
+        sweep().sample(frac=1.0, random_state=1), ["model.p_rep", "radio.range"], "r_min", scenario=scenario
+    )
+    axes = figure.axes[0]
+    assert np.allclose(axes.collections[0].get_array(), [[21.0, 22.0, 25.0], [41.0, 42.0, 45.0]])
+    assert axes.get_xlabel() == "model.p_rep (1/s)" and axes.get_ylabel() == "radio.range (m)"
+
+
+def test_a_sweep_with_holes_and_names_is_drawn():
+    table = sweep().iloc[:-3].replace({"radio.range": {20: "near", 40: "far"}})
+    save_to_nowhere(heatmap(table, ["model.p_rep", "radio.range"], "r_min"))
+    save_to_nowhere(heatmap(table, ["radio.range"], "r_min"))
+    with pytest.raises(AirflockError, match="no column r_mean"):
+        heatmap(table, ["model.p_rep"], "r_mean")
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif"])
+def test_a_video_has_the_promised_frames_and_size(tmp_path, ending):
+    recording, path, calls = flight(seconds=4.0, document=SQUARE), tmp_path / f"flight.{ending}", []
+    choice = {"fps": 10, "speed": 2.0, "start": 1.0, "stop": 3.0}
+    assert frame_count(recording, **choice) == 11  # 2 s at 2 times real time: 1 s of film, both ends included
+    video(recording, path, height=120, done=lambda: calls.append(1), **choice)
+    shown = iio.imread(path, plugin="FFMPEG" if ending == "mp4" else "pillow")
+    assert len(calls) == 11
+    assert shown.shape[0] == 11 and shown.shape[1] == 120 and shown.shape[2] % 2 == 0
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_darts_are_where_the_agents_are_and_point_where_they_fly():
+    stage = Stage(flight(document=SQUARE), None, None, tail=2.0, height=240, speed=1.0)
+    stage.picture(12.25)  # between two frames
+    corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
+    angle = 12.25 * PACE / RADIUS + np.arange(3) * 2.0 * math.pi / 3.0
+    nose, back = corners[:, 0], corners[:, 2]
+    centre = nose + (back - nose) * (0.6 / 0.82)
+    assert np.allclose(centre, RADIUS * np.column_stack([np.cos(angle), np.sin(angle)]), atol=0.02)
+    heading = (nose - back) / np.linalg.norm(nose - back, axis=1)[:, None]
+    assert np.allclose(heading, np.column_stack([-np.sin(angle), np.cos(angle)]), atol=1e-3)
+
+
+def test_pictures_in_space_project_parallel():
+    view = scene.view_of(3)
+    assert np.allclose([view.right @ view.up, view.right @ view.right, view.up @ view.up], [0.0, 1.0, 1.0])
+    stage = Stage(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
+    assert stage.picture(1.0).shape == (stage.size[1], stage.size[0], 4)
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_a_figure_is_saved_in_the_format_of_its_ending(tmp_path, ending):
+    path = tmp_path / f"functions.{ending}"
+    save_figure(transfer(), path)
+    start = path.read_bytes()[:5]
+    assert start == {"png": b"\x89PNG\r", "pdf": b"%PDF-", "svg": b"<?xml"}[ending]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_unknown_endings_and_missing_folders_are_refused_in_one_line(tmp_path):
+    for name, reason in (
+        ("a.jpg", "ending .jpg is no format"),
+        ("a", "without an ending"),
+        ("none/a.png", "No such file or directory"),
+    ):
+        with pytest.raises(PictureError, match=reason) as caught:
+            save_figure(transfer(), tmp_path / name)
+        assert "\n" not in str(caught.value)
+    for name, reason in (("a.avi", "give one of .mp4, .gif"), ("none/a.mp4", "No such file or directory")):
+        with pytest.raises(PictureError, match=reason):
+            video(flight(seconds=1.0), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_the_old_picture_and_nothing_new(tmp_path, monkeypatch):
+    figure, path = transfer(), tmp_path / "a.png"
+    path.write_bytes(b"old")
+
+    def full(target, **_):
+        target.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(figure, "savefig", full)
+    with pytest.raises(PictureError, match="No space left on device; nothing was saved"):
+        save_figure(figure, path)
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_or_truncated_video_leaves_nothing(tmp_path, monkeypatch):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        video(flight(seconds=5.0), tmp_path / "a.mp4", height=64, done=interrupt)
+    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr("airflock.plots.video.imageio_ffmpeg.count_frames_and_secs", lambda _: (1, 0.1))
+    with pytest.raises(PictureError, match="kept 1 of"):
+        video(flight(seconds=5.0), tmp_path / "a.mp4", height=64)
+    assert not list(tmp_path.iterdir())
+
+
+def test_pictures_leave_the_global_state_of_matplotlib_alone():
+    import subprocess
+    import sys
+
+    code = (
+        "import sys, matplotlib; before = matplotlib.rcParams.copy()\n"
+        "from airflock.plots.transfer import transfer; transfer()._repr_png_()\n"
+        "assert matplotlib.rcParams.copy() == before and 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_lines_differ_for_colour_blind_readers_too():
+    def luminance(color):
+        return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), color[:3], strict=True))
+
+    ramp = [luminance(style.SPEED(v)) for v in np.linspace(0.0, 1.0, 20)]
+    assert np.all(np.diff(ramp) > 0.0)  # speed can be read in grey
+    assert len({to_hex(c) for c in style.LINES}) == len(style.LINES)

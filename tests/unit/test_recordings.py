@@ -1,0 +1,101 @@
+"""Recordings: layout, scores of flights and logs, and what is refused."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import airflock
+from airflock.errors import RecordingError
+from airflock.recordings.layout import dataset, frames_of
+from airflock.recordings.scores import measure, over_time
+
+
+def log(position, velocity=None, period=0.1):
+    """A flight log (time, individual, 2) without anything that only a simulation knows."""
+    dims = ("time", "space", "keypoint", "individual")
+    times = np.arange(len(position)) * period
+    names = [f"drone_{i}" for i in range(position.shape[1])]
+    pack = {"position": (dims, np.transpose(position, (0, 2, 1))[:, :, None, :])}
+    if velocity is not None:
+        pack["velocity"] = (dims, np.transpose(velocity, (0, 2, 1))[:, :, None, :])
+    coordinates = {"time": times, "space": ["x", "y"], "keypoint": ["centre"], "individual": names}
+    return xr.Dataset(pack, coordinates)
+
+
+@pytest.fixture(scope="module")
+def circling():
+    """Four drones at 5 m/s, 90 degrees apart on a circle of 20 m, counter-clockwise."""
+    t = np.arange(0.0, 10.0, 0.1)[:, None]
+    angle = t * 5.0 / 20.0 + np.arange(4) * np.pi / 2
+    return log(20.0 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+
+
+def test_layout_is_that_of_movement():
+    found = dataset(np.zeros((5, 6, 3)), 2, 0.2, {}, "velocity")
+    assert found.position.dims == ("time", "space", "keypoint", "individual")
+    assert found.attrs["ds_type"] == "poses" and found.attrs["fps"] == 5.0 and found.attrs["time_unit"] == "seconds"
+    assert found.confidence.dims == ("time", "keypoint", "individual")
+    assert found.position.attrs["units"] == "m" and found.command.attrs["units"] == "m/s"
+
+
+def test_a_log_is_scored_without_velocity_model_or_arena(circling):
+    values, course = measure(circling)
+    assert values["phi_vel"] == pytest.approx(5.0, rel=1e-3)
+    assert values["r_min_mean"] == pytest.approx(20.0 * np.sqrt(2.0), rel=1e-6)
+    assert values["phi_corr"] == pytest.approx(-1.0 / 3.0, abs=1e-3)  # unit vectors of a cross sum to zero
+    assert values["phi_wall"] == 0.0 and values["n_coll"] == 0.0
+    assert len(course) == circling.sizes["time"]
+
+
+def test_settings_change_what_counts_as_a_collision(circling):
+    assert airflock.score(circling, settings={"metrics.r_coll": 29.0})["n_coll"][0] > 0
+    assert airflock.score(circling, settings={"metrics.r_coll": 28.0})["n_coll"][0] == 0
+
+
+def test_missing_positions_are_named_and_never_become_a_silent_nan(circling):
+    broken = circling.copy(deep=True)
+    broken["position"][dict(time=30, individual=2)] = np.nan
+    with pytest.raises(RecordingError, match=r"drone_2 at t = 2\.9 s"):
+        over_time(broken)  # the velocity before the gap is missing too
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda d: d.drop_vars("position"), "no variable position"),
+        (lambda d: d.isel(individual=0), "lacks the dimension individual"),
+        (lambda d: d.isel(individual=slice(0)), "is empty"),
+        (lambda d: d.isel(space=[0]), "1 components"),
+        (lambda d: d.isel(time=slice(None, None, -1)), "time is no increasing"),
+        (lambda d: d.isel(time=[0, 1, 5, 6]), "resample"),
+        (lambda d: d.isel(time=[0]), "one frame without velocity"),
+    ],
+)
+def test_what_is_no_recording_is_refused_with_the_reason(circling, damage, words):
+    with pytest.raises(RecordingError, match=words):
+        frames_of(damage(circling))
+
+
+def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
+    import importlib.util
+    from pathlib import Path
+
+    path = Path(__file__).parents[2] / "examples" / "own_rule.py"
+    spec = importlib.util.spec_from_file_location("own_rule", path)
+    law = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(law)
+    settings = {"duration": 5.0, "agents": 10, "metrics.collision_period": 0.2}
+    scenario = airflock.load("vasarhelyi_2018/4ms", settings, law=law)
+    direct = airflock.score(scenario, [4], precision=64).iloc[0]
+    file = airflock.save(airflock.simulate(scenario, 4, precision=64), tmp_path / "own.nc")
+    scored = airflock.score(airflock.load_recording(file)).iloc[0]
+    assert scored[direct.index].to_numpy() == pytest.approx(direct.to_numpy(), abs=1e-9)
+
+
+def test_same_sampling_gives_the_same_numbers_from_the_kernel_and_from_the_recording():
+    settings = {"duration": 20.0, "metrics.collision_period": 0.2}
+    for name in ("vasarhelyi_2018/4ms", "vasarhelyi_2018/obstacles"):
+        scenario = airflock.load(name, settings)
+        direct = airflock.score(scenario, [1], precision=64).iloc[0]
+        scored = airflock.score(airflock.simulate(scenario, 1, precision=64)).iloc[0]
+        assert scored[direct.index].to_numpy() == pytest.approx(direct.to_numpy(), abs=1e-9)
