@@ -44,6 +44,8 @@ def plan_of(
         start=scenario.start.kind,
         scene=bool(len(scenario.stands().shapes)),
         goals=scenario.goals.kind != "none",
+        herd=scenario.goals.kind != "none" and scenario.goals.role == "herd",
+        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
