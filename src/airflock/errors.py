@@ -31,3 +31,7 @@ class FlightError(AirflockError):
 
 class SceneError(AirflockError):
     """A scene cannot be used: a mesh that is open, inverted, in a wrong unit or damaged, or one without free room."""
+
+
+class StudyError(AirflockError):
+    """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""
