@@ -35,3 +35,7 @@ class SceneError(AirflockError):
 
 class DeviceError(AirflockError):
     """A device cannot be used, or not for this flight: says why, how much memory is needed and what fits."""
+
+
+class StudyError(AirflockError):
+    """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""
