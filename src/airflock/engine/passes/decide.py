@@ -72,8 +72,7 @@ def neighbours(build: Builder) -> None:
     given = {"age": "age[j]" if selective else "late", "lower": "(ONE if integer(j) < ii else ZERO)"}
     given |= {f"h{a}": f"own_h{a}" for a in "xyz"}
     inner += [f"t = {build.call(rule, 'neighbour', given, model.name)}"]
-    inner += [combine(how[c], f"t{c}", f"t[{c}] if ok else {START[how[c]]}") for c in sums if how[c] == "sum"]
-    inner += [combine(how[c], f"t{c}", f"(t[{c}] if ok else {START[how[c]]})") for c in sums if how[c] != "sum"]
+    inner += [combine(how[c], f"t{c}", f"choose(ok, t[{c}], {START[how[c]]})") for c in sums]
     after = [f"sum{c}[i] = t{c}" for c in sums]
     if plan.grid:
         inner = [line.replace("integer(j)", "who[j]") for line in inner]

@@ -16,8 +16,9 @@ from numba.extending import intrinsic
 
 real = np.float{bits}
 integer = np.int{bits}
-JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True)
-INLINE = dict(fastmath=True, error_model="numpy")
+COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
+JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True, _nrt=COUNTED)
+INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED)
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)
@@ -178,6 +179,8 @@ def _clocks(plan: Plan) -> list[str]:
 
 def _text(build: Builder, label: str) -> str:
     head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits))
+    if not build.plan.grid:  # which sorts cells into arrays of its own
+        head = head.replace("COUNTED = True", "COUNTED = False")
     last = build.functions[-1].replace("@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {len(build.rows)}"]
     return "\n\n".join(parts) + "\n"
