@@ -31,3 +31,11 @@ class FlightError(AirflockError):
 
 class SceneError(AirflockError):
     """A scene cannot be used: a mesh that is open, inverted, in a wrong unit or damaged, or one without free room."""
+
+
+class DeviceError(AirflockError):
+    """A device cannot be used, or not for this flight: says why, how much memory is needed and what fits."""
+
+
+class StudyError(AirflockError):
+    """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""

@@ -15,7 +15,12 @@ JIT = "@njit(**JIT)"
 
 
 class Builder:
-    """Names rules, rows of the work table and records of the parameter row for one plan."""
+    """Names rules, rows of the work table and records of the parameter row for one plan.
+
+    clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    """
+
+    clusters: Callable[[Metric], list[str]] | None = None
 
     def __init__(self, plan: Plan):
         self.plan = plan

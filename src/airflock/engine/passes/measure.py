@@ -24,7 +24,7 @@ def measure(build: Builder, clock: str) -> None:
         lines += build.bind(["rays_"])
     for metric in metrics:
         lines += _agents(build, metric)
-        lines += _clusters(build, metric)
+        lines += build.clusters(metric) if build.clusters else _clusters(build, metric)
         lines += _sample(build, metric)
     head = f"measure_{clock}(time, n, m, row, whole, work, edges, spans, scene, memory, labels, values)"
     build.function(head, lines, "return math.sqrt(least2)")
