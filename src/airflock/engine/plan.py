@@ -46,6 +46,7 @@ class Plan:
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
+    own       : each agent has a goal of its own
     appearing : some of the scene appears while flying
     sequential: one agent after another perceives, decides and moves
     record    : keep every sample (position, velocity, command) besides the running sums
@@ -65,6 +66,7 @@ class Plan:
     scene: bool = False
     goals: bool = False
     herd: bool = False
+    own: bool = False
     appearing: bool = False
     sequential: bool = False
     grid: bool = False
