@@ -34,48 +34,34 @@ def fly_many(
     jobs: Sequence[Tables],
     starts: Sequence[NDArray[Any]] | None = None,
     done: Callable[[], None] | None = None,
-    per_agent: int | None = None,
-    simulated: bool = False,
+    shape: Shape | None = None,
 ) -> list[Flown]:
     """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
 
-    starts    : (component, agent) of each world where the plan asks for it
-    done      : called once per flight as results come in
-    per_agent : threads per agent instead of the number that suits population and flock size
+    starts : (component, agent) of each world where the plan asks for it
+    done   : called once per flight as results come in
+    shape  : layout of a flock instead of the one that suits population, flock size and GPU
+
+    Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
     """
-    required(simulated)
+    required(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
     results: dict[int, Flown] = {}
     for key, members in groups.items():
-        shape = _shape(plan, key[0], len(members), per_agent, simulated)
-        driver = flight_driver(plan, shape)
-        size = _batch(plan, driver, shape, [jobs[m] for m in members], simulated)
+        layout = shape or shape_of(key[0], len(members), multiprocessors(), sequential=plan.sequential)
+        driver = flight_driver(plan, layout)
+        size = _batch(plan, driver, layout, [jobs[m] for m in members])
         for first in range(0, len(members), size):
             batch = members[first : first + size]
             given = None if starts is None else [starts[m] for m in batch]
-            flown = _fly(plan, driver, shape, [jobs[m] for m in batch], given)
+            flown = _fly(plan, driver, layout, [jobs[m] for m in batch], given)
             for member, result in zip(batch, flown, strict=True):
                 results[member] = result
                 if done:
                     done()
     return [results[number] for number in range(len(jobs))]
-
-
-def _shape(plan: Plan, agents: int, flocks: int, per_agent: int | None, simulated: bool) -> Shape:
-    """Layout of this many flocks on the present GPU."""
-    options: dict[str, Any] = {"simulated": simulated}
-    processors = 132 if simulated else multiprocessors()
-    shape = shape_of(agents, flocks, processors, sequential=plan.sequential, **options)
-    if simulated:  # every thread costs; lanes stay whole words
-        threads = max(1, per_agent or 1)
-        if plan.sequential:
-            return Shape(shape.lanes, threads, threads, registers=False, simulated=True)
-        return Shape(shape.lanes, threads, -(-agents // 1) * threads, registers=True, simulated=True)
-    if per_agent and shape.registers:
-        return Shape(shape.lanes, per_agent, shape.lanes * per_agent, registers=True)
-    return shape
 
 
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
@@ -117,9 +103,9 @@ def memory_needed(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[T
     return (numbers + tables + 64) * plan.bits // 8
 
 
-def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], simulated: bool) -> int:
+def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
     """How many flocks one launch takes; raises DeviceError if not even one fits."""
-    if simulated:
+    if shape.simulated:
         return len(jobs)
     needed, free = memory_needed(plan, driver, shape, jobs), int(SHARE * free_memory())
     if needed > free:
