@@ -23,6 +23,7 @@ class Model:
     sight        : `sight(p)`, how far percept.cast looks, m
     neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
     boundary     : surface rule → Walls
+    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
@@ -38,6 +39,7 @@ class Model:
     Sums: type | None = None
     boundary: Callable[..., Any] | None = None
     Walls: type | None = None
+    wall_reach: Callable[..., float] | None = None
     Memory: type | None = None
     reduce: Mapping[str, str] = field(default_factory=dict)
     usual: Mapping[str, float] = field(default_factory=dict)
@@ -61,7 +63,7 @@ def model(namespace: Any, name: str = "") -> Model:
     for rule, record in (("neighbour", "Sums"), ("boundary", "Walls")):
         if rule in found and record not in found:
             raise RuleError(f"model {name} has a rule {rule} but no NamedTuple {record}")
-    for kind in ("reach", "sight", "neighbour", "boundary", "decide"):
+    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "decide"):
         if kind in found:
             asks(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))
@@ -79,6 +81,7 @@ def model(namespace: Any, name: str = "") -> Model:
         Sums=found.get("Sums"),
         boundary=found.get("boundary"),
         Walls=found.get("Walls"),
+        wall_reach=found.get("wall_reach"),
         Memory=found.get("Memory"),
         reduce=reduce,
         usual=dict(found.get("USUAL", {})),

@@ -20,7 +20,7 @@ from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
 from airflock.engine.passes.move import ATTEMPTS
 from airflock.engine.plain_scores import Scores
-from airflock.engine.plain_world import Place, Senses
+from airflock.engine.plain_world import Course, Place, Senses
 from airflock.engine.tables import clock, extents
 from airflock.metrics.registry import SETS
 from airflock.scenarios.scenario import Scenario
@@ -38,7 +38,7 @@ class Agent:
     state      : true position (m) and velocity (m/s)
     command    : what its model decided last
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
-    memory     : the model's Memory
+    memory     : the model's Memory; rays: how many it cast at its last decision
     packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
     """
 
@@ -47,6 +47,7 @@ class Agent:
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     memory: Any = None
+    rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
 
 
@@ -69,29 +70,31 @@ def fly_plainly(
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = SETS[scenario.metrics.kind] if metrics is None else metrics
-    scores = Scores(chosen, scenario.measured_by(), place.excursion, place.image, dims)
+    scores, course = Scores(chosen, scenario.measured_by(), place, dims), Course(scenario)
     if len(flock) < scenario.agents:
         return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
     at_start, gust = states(flock), ZERO
     past: dict[int, list[State]] = {}  # by the number of the decision that hears them
     for step in range(times["steps"] + 1):
+        course.advance(step * dt, dt, states(flock))
+        place.appear(step * dt, states(flock))
         if (step + delay) % every == 0:
             past[(step + delay) // every] = states(flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
-            decisions(scenario, seed, place, flock, number, past.pop(number, at_start), step * dt)
+            decisions(scenario, seed, (place, course), flock, number, past.pop(number, at_start), step * dt)
         if step % times["collide_every"] == 0:
-            scores.look("collision", states(flock))
+            scores.look("collision", states(flock), step * dt)
         if step % times["sample_every"] == 0:
-            scores.look("sample", states(flock))
+            scores.look("sample", states(flock), step * dt, [agent.rays for agent in flock])
             frames[step // times["sample_every"]] = components(flock, dims)
         if step < times["steps"]:
             gust = blow(scenario, seed, step, gust)
             for i, agent in enumerate(flock):
                 if scenario.flight.update == "sequential":
-                    decisions(scenario, seed, place, flock, step, states(flock), step * dt, [i])
+                    decisions(scenario, seed, (place, course), flock, step, states(flock), step * dt, [i])
                 advance(scenario, seed, step, i, agent, gust, place)
-    return Flown(scores.totals(), frames, components(flock, dims)[: 2 * dims], 0)
+    return Flown(scores.totals() | course.values(), frames, components(flock, dims)[: 2 * dims], 0)
 
 
 def states(flock: Sequence[Agent]) -> list[State]:
@@ -142,7 +145,7 @@ def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequen
             continue
         gaps = ((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2 for s in states(flock))
         near = apart > 0.0 and any(gap < apart * apart for gap in gaps)
-        if not near and place.excursion(x, y, z) <= 0.0:
+        if not near and place.roomy(x, y, z):
             return x, y, z
     return None
 
@@ -167,14 +170,14 @@ def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tup
 
 
 def decisions(
-    scenario: Scenario, seed: int, place: Place, flock: list[Agent], number: int, past: list[State], time: float,
-    turn: Sequence[int] | None = None,
+    scenario: Scenario, seed: int, world: tuple[Place, Course], flock: list[Agent], number: int, past: list[State],
+    time: float, turn: Sequence[int] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
     if scenario.sensors.noise > 0.0:
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent)
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
     said = [plus(state, agent.sent) for state, agent in zip(past, flock, strict=True)]
     for i in range(len(flock)) if turn is None else turn:
         agent = flock[i]
@@ -183,11 +186,12 @@ def decisions(
             Heard(h.who, place.beside(own, h.state), h.age)
             for h in hear(scenario, seed, number, i, flock, said, time, place)
         ]
+        senses = Senses.of(place, course, own, time, seed, number, i)
         made = decide(
             scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
-            time=time, period=period, index=i,
-            percept=Senses.of(place, own, time, seed, number, i),
+            time=time, period=period, index=i, percept=senses,
         )  # fmt: skip
+        agent.rays = float(senses.rays)
         x, y, z = made.command
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
         agent.memory = made.memory

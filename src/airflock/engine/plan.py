@@ -23,6 +23,8 @@ ARENA = (
     "clearance",
     "goal_radius",
     "goal_speed",
+    "goal_spread",
+    "goal_behind",
 )
 CLOCK = ("dt", "period")
 WHOLE = (
@@ -43,7 +45,8 @@ class Plan:
     start     : region in which agents start
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     scene     : something stands in the world that agents see with rays, feel, or must not touch
-    goals     : the flock has goals
+    goals     : the flock has goals; herd: the goal is a shepherd
+    appearing : some of the scene appears while flying
     sequential: one agent after another perceives, decides and moves
     record    : keep every sample (position, velocity, command) besides the running sums
     """
@@ -61,6 +64,8 @@ class Plan:
     start: str = "arena"
     scene: bool = False
     goals: bool = False
+    herd: bool = False
+    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2

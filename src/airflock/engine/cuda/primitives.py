@@ -47,6 +47,11 @@ def most(a, b):
     return max(a, b)
 
 
+@njit()
+def choose(test, a, b):
+    return a if test else b
+
+
 @njit(fastmath=False)
 def add_exactly(total, lost, value):
     # Kahan's sum, without fastmath: the sums of a flight lose nothing to single precision
