@@ -13,6 +13,7 @@ pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airfloc
 HERE = Path(__file__).resolve().parents[1] / "cuda"
 CASES = (
     "paper", "split", "storm", "polygon", "silo", "links", "table", "couzin", "vicsek", "groups", "together", "city",
+    "herd",
 )  # fmt: skip
 
 

@@ -42,7 +42,7 @@ if __name__ == "__main__":
     pairs = [random.normal_pair(w[0], w[1]) for w in plain]
     found = {
         "counters": n,
-        "wrong_words": int((words.T != np.array(plain)).sum()),
+        "wrong_words": int((np.array(plain) != words.T).sum()),
         "wrong_uniforms": int((uniforms != [random.uniform(w[0]) for w in plain]).sum()),
         "normals": float(np.abs(normals.T - np.array(pairs)).max()),
     }

@@ -45,11 +45,16 @@ CASES = {
     "couzin": ("couzin_2002/swarm", {"agents": 5, "duration": 1.0}, 1, True),
     "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 8.0, "world.side": 3.0}, 1, True),
     "groups": ("zapotecatl_2016/best", {
-        "agents": 4, "dt": 0.02, "duration": 0.08, "metrics.kind": "groups", "metrics.r_cluster": 0.3, "start.speed": 0.1,
+        "agents": 4, "dt": 0.02, "duration": 0.08, "metrics.kind": "groups", "metrics.r_cluster": 0.3,
+        "start.speed": 0.1,
     }, 2, False),
     "together": ("zapotecatl_2016/best", {
-        "agents": 5, "dt": 0.02, "duration": 0.16, "update": "synchronous", "metrics.kind": "groups", "metrics.r_cluster": 0.3,
-        "start.speed": 0.1,
+        "agents": 5, "dt": 0.02, "duration": 0.16, "update": "synchronous", "metrics.kind": "groups",
+        "metrics.r_cluster": 0.3, "start.speed": 0.1,
+    }, 1, True),
+    "herd": ("kidger/city", {
+        "agents": 3, "duration": 0.4, "scene.blocks": 2, "goals.kind": "points", "goals.points": [[5.0, 5.0, 9.0]],
+        "goals.role": "herd", "scene.later": 0.5, "scene.later_until": 0.3,
     }, 1, True),
     "city": ("kidger/city", {"agents": 3, "duration": 0.4, "scene.blocks": 3, "goals.count": 2}, 1, True),
 }  # fmt: skip

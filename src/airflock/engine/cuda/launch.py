@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.cpu import Flown, _combine, _goals
+from airflock.engine.cpu import Flown, combined, goals_reached
 from airflock.engine.cuda.device import free_memory, multiprocessors, required, runtime
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.shape import Shape, shape_of
@@ -69,7 +69,7 @@ def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
     frames = whole["steps"] // whole["sample_every"] if plan.record else 0
     scene = hashlib.sha256(tables.shapes.tobytes() + tables.nodes.tobytes()).digest() if len(tables.nodes) else b""
-    return whole["agents"], frames, len(tables.goals), scene
+    return whole["agents"], frames, len(tables.goals), len(tables.later), scene
 
 
 def _sizes(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> dict[str, tuple[int, ...]]:
@@ -148,7 +148,9 @@ def _fly(
         "all_edges": _padded([t.edges for t in jobs]),
         "all_spans": _padded([t.spans for t in jobs]),
         "all_goals": _padded([t.goals for t in jobs]),
-        "shapes": _filled(jobs[0].shapes, 16),
+        # one scene for all flocks, or one of its own for each where some of it appears while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
+        "all_later": _padded([t.later for t in jobs]),
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
     }
@@ -167,7 +169,7 @@ def _flown(plan: Plan, jobs: Sequence[Tables], left: dict[str, NDArray[Any]]) ->
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
-        values = _combine(plan, sums) | _goals(plan, (left["all_reached"][flock][: len(tables.goals)],))
+        values = combined(plan, sums) | goals_reached(plan, left["all_reached"][flock][: len(tables.goals)])
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
         results.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
     return results
@@ -180,11 +182,6 @@ def _padded(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     for flock, array in enumerate(arrays):
         found[flock, : len(array)] = array
     return found
-
-
-def _filled(array: NDArray[Any], width: int) -> NDArray[Any]:
-    """At least one row, so that no array is empty."""
-    return array if len(array) else np.zeros((1, width), array.dtype)
 
 
 def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
