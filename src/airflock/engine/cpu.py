@@ -73,7 +73,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
         work, words, past, store, gust, mem, memory, labels, values, sums,
         np.zeros((1, 3 * dims, n), real) if frames is None else frames,
     )  # fmt: skip
-    return Flown(_combine(plan, sums) | _goals(plan, scene), frames, work[: 2 * dims, :n].copy(), int(status))
+    return Flown(combined(plan, sums) | goals_reached(plan, scene[7]), frames, work[: 2 * dims, :n].copy(), int(status))
 
 
 def measure_frames(
@@ -91,7 +91,7 @@ def measure_frames(
         _memory(plan, m, real), _rows((2, m), np.int32 if plan.bits == 32 else np.int64), values, sums,
         np.ascontiguousarray(frames, real), series, real.type(period),
     )  # fmt: skip
-    return _combine(plan, sums) | _goals(plan, scene), series
+    return combined(plan, sums) | goals_reached(plan, scene[7]), series
 
 
 def _rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
@@ -113,11 +113,11 @@ def _scene(tables: Tables) -> tuple[NDArray[Any], ...]:
     return shapes, tables.nodes, tables.links, near, counts, tables.goals, aim, reached, later
 
 
-def _goals(plan: Plan, scene: tuple[NDArray[Any], ...]) -> dict[str, Any]:
+def goals_reached(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:
     """When each goal was reached, s (nan: never), and how many were."""
     if not plan.goals:
         return {}
-    times = [float(t) if t >= 0.0 else math.nan for t in scene[7]]
+    times = [float(t) if t >= 0.0 else math.nan for t in reached]
     return {"goals_reached": float(sum(t == t for t in times)), "goals": float(len(times)), "time_to_goal": times}
 
 
@@ -137,7 +137,7 @@ def _sums(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
 
 
-def _combine(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
+def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     """Named order parameters from the sums over time."""
     found = columns(plan.metrics)
     counts = {"sample": sums[len(found)], "collision": sums[len(found) + 1]}
@@ -145,11 +145,11 @@ def _combine(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
         name: float(sums[c] / max(counts[when], 1.0) if how == "mean" else sums[c])
         for c, (name, how, when) in enumerate(found)
     }
-    combined: dict[str, float] = {}
+    named: dict[str, float] = {}
     for metric in plan.metrics:
         own = {name: over_time[name] for name in metric.Sample._fields}  # type: ignore[attr-defined]
-        combined |= metric.total(own) if metric.total else own
-    return combined
+        named |= metric.total(own) if metric.total else own
+    return named
 
 
 def cores() -> int:
