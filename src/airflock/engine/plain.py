@@ -19,11 +19,13 @@ from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
 from airflock.engine.passes.move import ATTEMPTS
+from airflock.engine.plain_flock import of_model
 from airflock.engine.plain_scores import Scores
 from airflock.engine.plain_world import Place, Senses
 from airflock.engine.tables import clock, extents
 from airflock.metrics.registry import SETS
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
 Vector = tuple[float, float, float]
@@ -69,7 +71,8 @@ def fly_plainly(
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = SETS[scenario.metrics.kind] if metrics is None else metrics
-    scores = Scores(chosen, scenario.measured_by(), place.excursion, place.image, dims)
+    scores = Scores(chosen, scenario.measured_by(), place.excursion, place.image, dims, scenario.wing)
+    solve = of_model(scenario)
     if len(flock) < scenario.agents:
         return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
     at_start, gust = states(flock), ZERO
@@ -79,9 +82,13 @@ def fly_plainly(
             past[(step + delay) // every] = states(flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
-            decisions(scenario, seed, place, flock, number, past.pop(number, at_start), step * dt)
+            shared = solve(states(flock)) if solve else None
+            decisions(scenario, seed, place, flock, number, past.pop(number, at_start), step * dt, shared=shared)
         if step % times["collide_every"] == 0:
-            scores.look("collision", states(flock))
+            events = scores.look("collision", states(flock)).get("n_coll", 0.0)
+            if events > 0.5 and scenario.metrics.stop == "collision":
+                frames = frames[: -(-step // times["sample_every"])]
+                break
         if step % times["sample_every"] == 0:
             scores.look("sample", states(flock))
             frames[step // times["sample_every"]] = components(flock, dims)
@@ -123,12 +130,23 @@ def given(start: NDArray[Any], dims: int) -> list[Agent]:
 def begin(scenario: Scenario, seed: int, place: Place) -> list[Agent]:
     """Agents at random places in the arena, far enough apart; fewer than asked for if one finds no room."""
     flock: list[Agent] = []
+    if scenario.start.kind in FORMATIONS:
+        return [in_formation(scenario, seed, i) for i in range(scenario.agents)]
     for i in range(scenario.agents):
         spot = find_room(scenario, seed, place, i, flock)
         if spot is None:
             break
         flock.append(Agent(State(*spot, *start_velocity(scenario, seed, i))))
     return flock
+
+
+def in_formation(scenario: Scenario, seed: int, i: int) -> Agent:
+    """Agent i at its place in the formation, off it by start.jitter."""
+    s = scenario.start
+    place = FORMATIONS[s.kind](i, s.spacing_x, s.spacing_y, s.spacing_z)
+    gx, gy, gz, _ = normals(seed, random.START, 0, i, draw=2)
+    z = place[2] + s.jitter * gz if scenario.dimensions == 3 else 0.0
+    return Agent(State(place[0] + s.jitter * gx, place[1] + s.jitter * gy, z, *ZERO))
 
 
 def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequence[Agent]) -> Vector | None:
@@ -168,7 +186,7 @@ def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tup
 
 def decisions(
     scenario: Scenario, seed: int, place: Place, flock: list[Agent], number: int, past: list[State], time: float,
-    turn: Sequence[int] | None = None,
+    turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
     if scenario.sensors.noise > 0.0:
@@ -186,7 +204,8 @@ def decisions(
         made = decide(
             scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
             time=time, period=period, index=i,
-            percept=Senses.of(place, own, time, seed, number, i),
+            percept=Senses.of(place, own, time, seed, number, i), shared=shared[i] if shared else None,
+            wing=scenario.wing,
         )  # fmt: skip
         x, y, z = made.command
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)

@@ -10,6 +10,7 @@ from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
+from airflock.engine.plain_flock import Survey, of_metric
 
 Record = Any  # a NamedTuple of floats that a metric declares
 
@@ -19,6 +20,7 @@ class Scores:
 
     metrics   : what is measured; q : their parameters
     excursion : how far outside (m) a position x, y, z lies; negative where flying is allowed
+    wing      : parameters of the wing, for metrics that survey the whole flock
     image     : offset to the nearest image in a periodic box
     """
 
@@ -29,7 +31,10 @@ class Scores:
         excursion: Callable[[float, float, float], float],
         image: Callable[[float, float, float], tuple[float, float, float]] = lambda x, y, z: (x, y, z),
         dimensions: int = 2,
+        wing: Any = None,
     ):
+        self.wing = wing
+        self.surveys: dict[str, Survey | None] = {}
         self.image = image
         self.dimensions = float(dimensions)
         self.metrics = tuple(metrics)
@@ -68,6 +73,7 @@ class Scores:
     def _sample(self, metric: Metric, flock: Sequence[State]) -> Record:
         given: dict[str, Any] = {"n": float(len(flock)), "mean": mean_of(flock), "q": self.q}
         given["dimensions"] = self.dimensions
+        given["wing"] = self.wing
         if metric.agent is not None:
             given["agents"] = self._agents(metric, metric.agent, flock, given["mean"])
         if metric.cluster is not None:
@@ -77,6 +83,10 @@ class Scores:
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
             self.memories.setdefault(metric.name, [metric.Memory()] * len(flock))
+        if metric.name not in self.surveys:
+            self.surveys[metric.name] = of_metric(metric, len(flock), self.q, self.wing)
+        survey = self.surveys[metric.name]
+        shared = survey(flock) if survey else [None] * len(flock)
         terms = []
         for i, state in enumerate(flock):
             speed = norm(state.vx, state.vy, state.vz)
@@ -87,6 +97,8 @@ class Scores:
                 "excursion": self.excursion(state.x, state.y, state.z),
                 "pair": self._pairs(metric, flock, i),
                 "mean": mean,
+                "shared": shared[i],
+                "wing": self.wing,
                 "q": self.q,
             }
             if metric.Memory is None:
