@@ -25,6 +25,7 @@ class Model:
     boundary     : surface rule → Walls
     flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
     workspace    : `workspace(n, p, wing)` → NamedTuple of (rows, columns), the scratch arrays that `flock` works in
+    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
@@ -40,6 +41,7 @@ class Model:
     Sums: type | None = None
     boundary: Callable[..., Any] | None = None
     Walls: type | None = None
+    wall_reach: Callable[..., float] | None = None
     Memory: type | None = None
     flock: Callable[..., None] | None = None
     Shared: type | None = None
@@ -66,7 +68,7 @@ def model(namespace: Any, name: str = "") -> Model:
     for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):
         if rule in found and record not in found:
             raise RuleError(f"model {name} has a rule {rule} but no {record}")
-    for kind in ("reach", "sight", "neighbour", "boundary", "flock", "decide"):
+    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide"):
         if kind in found:
             asks(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))
@@ -84,6 +86,7 @@ def model(namespace: Any, name: str = "") -> Model:
         Sums=found.get("Sums"),
         boundary=found.get("boundary"),
         Walls=found.get("Walls"),
+        wall_reach=found.get("wall_reach"),
         Memory=found.get("Memory"),
         flock=found.get("flock"),
         Shared=found.get("Shared"),

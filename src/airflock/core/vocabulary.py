@@ -130,6 +130,7 @@ SAMPLE = {
 VOCABULARY: dict[str, dict[str, str]] = {
     "reach": {"p": "parameters"},
     "sight": {"p": "parameters"},
+    "wall_reach": {"p": "parameters"},
     "neighbour": {**PAIR, "p": "the model's parameters"},
     "boundary": {**SURFACE, "p": "the model's parameters"},
     "flock": {**FLOCK, "p": "the model's parameters"},
@@ -175,7 +176,7 @@ class Percept(NamedTuple):
     goal_z: float = 0.0
 
     def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
-        """Free distance (m) along the unit vector u to the arena's walls and obstacles, at most `length` (m)."""
+        """Free distance (m) along the unit vector u to walls, obstacles and the scene, at most `length` (m)."""
         return length
 
     def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:

@@ -103,14 +103,15 @@ def _scene(tables: Tables) -> tuple[NDArray[Any], ...]:
     aim, reached = np.zeros(4, real), np.full(len(tables.goals), -1.0, real)
     aim[:3] = tables.goals[0] if len(tables.goals) else 0.0
     near, counts = np.zeros(NEAR, np.int64), np.zeros(2, np.int64)
-    return tables.shapes, tables.nodes, tables.links, near, counts, tables.goals, aim, reached
+    later, shapes = tables.later.copy(), tables.shapes.copy() if len(tables.later) else tables.shapes
+    return shapes, tables.nodes, tables.links, near, counts, tables.goals, aim, reached, later
 
 
 def _goals(plan: Plan, scene: tuple[NDArray[Any], ...]) -> dict[str, Any]:
     """When each goal was reached, s (nan: never), and how many were."""
     if not plan.goals:
         return {}
-    times = [float(t) if t >= 0.0 else math.nan for t in scene[-1]]
+    times = [float(t) if t >= 0.0 else math.nan for t in scene[7]]
     return {"goals_reached": float(sum(t == t for t in times)), "goals": float(len(times)), "time_to_goal": times}
 
 

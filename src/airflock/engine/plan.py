@@ -24,6 +24,8 @@ ARENA = (
     "clearance",
     "goal_radius",
     "goal_speed",
+    "goal_spread",
+    "goal_behind",
     "spacing_x",
     "spacing_y",
     "spacing_z",
@@ -48,7 +50,8 @@ class Plan:
     start     : region in which agents start
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     scene     : something stands in the world that agents see with rays, feel, or must not touch
-    goals     : the flock has goals
+    goals     : the flock has goals; herd: the goal is a shepherd
+    appearing : some of the scene appears while flying
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     sequential: one agent after another perceives, decides and moves
@@ -70,6 +73,8 @@ class Plan:
     goals: bool = False
     stop: bool = False
     wing_choices: tuple[tuple[str, str], ...] = ()
+    herd: bool = False
+    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2

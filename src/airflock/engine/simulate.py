@@ -8,6 +8,7 @@ from typing import Any
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.engine import cpu
+from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
@@ -45,6 +46,8 @@ def plan_of(
         start=scenario.start.kind,
         scene=bool(len(scenario.stands().shapes)),
         goals=scenario.goals.kind != "none",
+        herd=scenario.goals.kind != "none" and scenario.goals.role == "herd",
+        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
@@ -63,6 +66,11 @@ def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tup
     found = SETS[scenario.metrics.kind] if metrics is None else metrics
     used = scenario.model.flock is not None or any(metric.survey is not None for metric in found)
     return tuple(sorted(choices(scenario.wing).items())) if used else ()
+
+
+def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
+    """Text of the driver that flies a scenario: all rules are inside, so equal texts are equal physics."""
+    return flight_text(plan_of(scenario, precision=precision))
 
 
 @lru_cache
@@ -131,6 +139,11 @@ def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
     return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
 
 
+def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
+    """Compile what flies a scenario; scenarios that differ by numbers share it."""
+    cpu.flight_driver(plan_of(scenario, precision=precision))
+
+
 def score_flights(
     scenarios: Sequence[Scenario],
     seeds: Sequence[int],
@@ -140,8 +153,8 @@ def score_flights(
     done: Callable[[], None] | None = None,
 ) -> list[dict[str, float]]:
     """Order parameters of many flights, flight i with seeds[i]; side by side on all cores."""
-    for plan in {plan_of(scenario, precision=precision) for scenario in scenarios}:
-        cpu.flight_driver(plan)  # compiled once, before threads ask for it
+    for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
+        compile_for(scenario, precision=precision)  # once, before threads ask for it
 
     def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
         return lambda: score_flight(scenario, seed, precision=precision)

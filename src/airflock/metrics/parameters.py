@@ -59,12 +59,12 @@ class Parameters(Record):
         None,
         "m/s",
         low=0.01,
-        high=200.0,
+        high=1000.0,
         source="Eq. 22",
         meaning="speed that f_speed asks for; by default the model's",
     )
     v_tol: float | None = quantity(
-        None, "m/s", low=0.001, high=200.0, source="Eq. 22", meaning="tolerance of the speed; by default 0.375 v_flock"
+        None, "m/s", low=0.001, high=1000.0, source="Eq. 22", meaning="tolerance of the speed; by default 0.375 v_flock"
     )
     r_b: float = quantity(
         0.05,

@@ -27,6 +27,12 @@ class Parameters(Record):
     high: float = quantity(60.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: highest building")
     trees: float = quantity(400, "1", low=0, high=1e6, source=OURS, meaning="forest: number of trees at density 1")
     side: float = quantity(200.0, "m", low=0.1, high=1e5, source=OURS, meaning="forest: side of its square")
+    later: float = quantity(
+        0.0, "1", low=0.0, high=1.0, meaning="share of the buildings or trees that appear while flying"
+    )
+    later_until: float = quantity(
+        60.0, "s", low=0.0, high=1e6, source=OURS, meaning="by when: each at a time that the seed draws"
+    )
     file: str = text(meaning="mesh: file of triangles (glTF, OBJ, STL and others), beside the scenario or absolute")
     unit: float = quantity(1.0, "m", low=1e-6, high=1e6, meaning="mesh: length of one unit of the file")
     up: str = choice("z", ("z", "y"), meaning="mesh: axis of the file that points up; y in glTF")

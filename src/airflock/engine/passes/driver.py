@@ -16,8 +16,9 @@ from numba.extending import intrinsic
 
 real = np.float{bits}
 integer = np.int{bits}
-JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True)
-INLINE = dict(fastmath=True, error_model="numpy")
+COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
+JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True, _nrt=COUNTED)
+INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED)
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)
@@ -62,15 +63,13 @@ def flight(plan: Plan) -> str:
         "(step + delay) % decide_every == 0", ["snapshot(((step + delay) // decide_every) % ring, m, work, past)"]
     )
     step = ["time = real(step) * c.dt", *(step if heard_late else [])]
-    if plan.goals:
-        scene.aim(build)
-        step += ["aim_(time, c.dt, n, work, row, scene)"]
+    step += _world(build, "c.dt")
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     if plan.model.neighbour is not None:
         choose += ["neighbours(k, n, m, time, late, row, whole, work, store)"]
     if plan.model.boundary is not None:
-        choose += ["boundaries(n, row, whole, work, faces, edges, spans)"]
+        choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
@@ -108,6 +107,18 @@ def flight(plan: Plan) -> str:
 def _column(plan: Plan, name: str) -> int:
     """Place of a value among all that metrics sample."""
     return [found for found, _, _ in columns(plan.metrics)].index(name)
+
+
+def _world(build: Builder, elapsed: str) -> list[str]:
+    """Lines that move the goal on and let appear what is due."""
+    lines = []
+    if build.plan.goals:
+        scene.aim(build)
+        lines += [f"aim_(time, {elapsed}, n, work, row, scene)"]
+    if build.plan.appearing:
+        scene.appear(build)
+        lines += ["appear_(time, n, work, row, scene)"]
+    return lines
 
 
 def _turns(build: Builder) -> None:
@@ -155,9 +166,7 @@ def replay(plan: Plan) -> str:
     lines += build.bind(names)
     frame = ["time = real(step) * frame_period"]
     frame += loop("i in range(n)", [f"{name}[i] = frames[step, {c}, i]" for c, name in enumerate(names)])
-    if plan.goals:
-        scene.aim(build)
-        frame += ["aim_(time, frame_period, n, work, row, scene)"]
+    frame += _world(build, "frame_period")
     for clock, every in (("collision", "collide_every"), ("sample", "sample_every")):
         if clock in _clocks(plan):
             look = [f"measure_{clock}({measure.arguments(build)})"]
@@ -180,6 +189,8 @@ def _clocks(plan: Plan) -> list[str]:
 
 def _text(build: Builder, label: str) -> str:
     head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits))
+    if not build.plan.grid:  # which sorts cells into arrays of its own
+        head = head.replace("COUNTED = True", "COUNTED = False")
     last = build.functions[-1].replace("@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {len(build.rows)}"]
     return "\n\n".join(parts) + "\n"

@@ -37,7 +37,7 @@ def measure(build: Builder, clock: str) -> None:
         lines += flock.survey(build, metric)
     for metric in metrics:
         lines += _agents(build, metric)
-        lines += _clusters(build, metric)
+        lines += build.clusters(metric) if build.clusters else _clusters(build, metric)
         lines += _sample(build, metric)
     head = f"measure_{clock}({arguments(build)})"
     build.function(head, lines, "return math.sqrt(least2)")
@@ -72,7 +72,7 @@ def _pairs(build: Builder, metrics: list[Metric]) -> list[str]:
             how = metric.reduce.get(name, "sum")
             lines += build.bind([f"{used}_{name}"])
             before += [f"p_{used}_{c} = {START[how]}"]
-            inner += [combine(how, f"p_{used}_{c}", f"(t[{c}] if ok else {START[how]})")]
+            inner += [combine(how, f"p_{used}_{c}", f"choose(ok, t[{c}], {START[how]})")]
             after += [f"{used}_{name}[i] = p_{used}_{c}"]
     root = ["r = math.sqrt(r2)"] if any(build.wants(metric.pair, "pair", "r") for metric in paired) else []
     offsets = (
@@ -83,7 +83,7 @@ def _pairs(build: Builder, metrics: list[Metric]) -> list[str]:
     square = " + ".join(f"d{a} * d{a}" for a in axes)
     outer = ["ii = integer(i)", *[f"{a}i = {a}[i]" for a in axes], *before, "near2 = FAR"]
     body = [*offsets, f"r2 = {square} + TINY", *root, "ok = (integer(j) != ii) & (integer(j) < nn)"]
-    body += [*inner, "near2 = least(near2, r2 if ok else FAR)"]
+    body += [*inner, "near2 = least(near2, choose(ok, r2, FAR))"]
     outer += loop("j in range(m)", body) + [*after, "least2 = least(least2, near2)"]
     return lines + loop("i in range(n)", outer)
 
