@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.driver import flight, replay
+from airflock.engine.passes.flock import scratch
 from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
@@ -71,8 +72,10 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
         tables.row, tables.whole, tables.faces, tables.edges, tables.spans, scene,
         np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
         work, words, past, store, gust, mem, memory, labels, values, sums,
-        np.zeros((1, 3 * dims, n), real) if frames is None else frames,
+        np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
     )  # fmt: skip
+    if frames is not None and plan.stop:
+        frames = frames[: int(sums[len(columns(plan.metrics))])]
     return Flown(combined(plan, sums) | goals_reached(plan, scene[7]), frames, work[: 2 * dims, :n].copy(), int(status))
 
 
@@ -90,6 +93,7 @@ def measure_frames(
         tables.row, tables.whole, tables.edges, tables.spans, scene, _rows((driver.ROWS, m), real),
         _memory(plan, m, real), _rows((2, m), np.int32 if plan.bits == 32 else np.int64), values, sums,
         np.ascontiguousarray(frames, real), series, real.type(period),
+        *scratch(plan, tables.row, frames.shape[2]),
     )  # fmt: skip
     return combined(plan, sums) | goals_reached(plan, scene[7]), series
 

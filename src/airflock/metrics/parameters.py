@@ -15,12 +15,16 @@ class Parameters(Record):
 
     kind: str = choice(
         "vasarhelyi",
-        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger"),
+        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"),
         source="our choice",
         meaning="which order parameters: of Vásárhelyi et al. 2018 with fitness; of Kidger (flocked, sub-swarms, "
-        "avoidance); extension, polarization and quality of Zapotecatl et al. 2016; these with sub-groups told apart; "
-        "or only polarisation, milling, speed and shape",
+        "avoidance); power of a flock of wings (Dimock & Selig 2003); extension, polarization and quality of "
+        "Zapotecatl et al. 2016; these with sub-groups told apart; or only polarisation, milling, speed and shape",
     )
+    stop: str = choice(
+        "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",
+        meaning="what ends a flight before its time; order parameters are those until then",
+    )  # fmt: skip
     period: float = quantity(
         0.2, "s", low=0.0, high=600.0, meaning="time between samples; 0: every step dt", source="our choice"
     )

@@ -13,6 +13,7 @@ from airflock.metrics import (
     milling,
     nearest,
     polarisation,
+    power,
     quality,
     rotation,
     shape,
@@ -28,12 +29,14 @@ ZAPOTECATL = (metric(quality), metric(polarisation))
 KIDGER = tuple(
     metric(module) for module in (flocked, swarms, polarisation, nearest, collisions, environment, avoidance, speed)
 )
+DIMOCK = (metric(power), metric(collisions))
 SETS: dict[str, tuple[Metric, ...]] = {
     "vasarhelyi": STANDARD,
     "zapotecatl": ZAPOTECATL,
     "groups": (*ZAPOTECATL, metric(groups), metric(shape)),
     "order": ORDER,
     "kidger": KIDGER,
+    "dimock": DIMOCK,
 }
 
 # what the engine itself keeps of a flight with goals
