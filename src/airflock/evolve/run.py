@@ -11,7 +11,7 @@ from airflock.evolve.after import Result, conclude
 from airflock.evolve.executors import Executor, Score
 from airflock.evolve.executors.here import Here
 from airflock.evolve.fitness import Objective, Own
-from airflock.evolve.folder import open_folder, versions
+from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
 from airflock.evolve.search import Watch, search
 from airflock.evolve.space import with_parameters
@@ -126,6 +126,7 @@ def run(
     try:
         with Store(folder) as store:
             store.begin(versions())
+            sweep(folder)
             try:
                 centres = search(study, store, executor, watch)
                 result = conclude(study, store, executor, centres, folder, note)

@@ -161,7 +161,8 @@ class Store:
                 self.connection.executemany(sql, rows)
                 self.connection.execute("COMMIT")
             except BaseException:
-                self.connection.execute("ROLLBACK")
+                if self.connection.in_transaction:  # a full disk has ended it already
+                    self.connection.execute("ROLLBACK")
                 raise
 
 
