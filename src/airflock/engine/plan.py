@@ -51,6 +51,7 @@ class Plan:
     grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
+    own       : each agent has a goal of its own
     appearing : some of the scene appears while flying
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
@@ -74,6 +75,7 @@ class Plan:
     stop: bool = False
     wing_choices: tuple[tuple[str, str], ...] = ()
     herd: bool = False
+    own: bool = False
     appearing: bool = False
     sequential: bool = False
     grid: bool = False

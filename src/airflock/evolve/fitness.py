@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import AirflockError
+from airflock.errors import StudyError
 
 OVER_SEEDS = ("mean", "worst", "quantile")
 Own = Callable[[Mapping[str, Any]], float]  # a fitness of the user's own, from the order parameters of one flight
@@ -33,7 +33,7 @@ class Objective:
         """Value of one flight; nan where it is not finite."""
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
-            raise AirflockError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
+            raise StudyError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
         value = float(values[self.name] if self.own is None else self.own(values))
         return value if math.isfinite(value) else math.nan
 

@@ -15,7 +15,10 @@ from airflock.scenarios import checks, geometry, schema, wings
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
-MODELS = ("vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "dimock_2003")
+MODELS = (
+    "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
+    "dimock_2003",
+)  # fmt: skip
 TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "title")
 
 

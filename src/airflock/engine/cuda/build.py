@@ -15,7 +15,7 @@ from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder
 from airflock.engine.plan import Plan
 
-STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "measure_", "watch")
+STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "appear_", "measure_")
 SCRATCH = 24  # totals that one stage reduces at once, at most
 
 
@@ -134,6 +134,7 @@ class CudaBuilder(Builder):
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
+        context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self, name).visit(s) for s in body]
         self._add(name, body, context.rows)

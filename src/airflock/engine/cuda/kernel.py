@@ -10,9 +10,9 @@ from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.plan import WHOLE, Plan
 
 ARGUMENTS = (
-    "rows", "wholes", "all_faces", "all_edges", "all_spans", "shapes", "nodes", "links", "all_goals", "starts",
-    "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums", "all_reached",
-    "all_frames",
+    "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
+    "starts", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums",
+    "all_reached", "all_frames",
 )  # fmt: skip
 CUT = 0.01  # m, slack that covers the rounding of positions in single precision
 
@@ -29,6 +29,8 @@ def flight(plan: Plan, shape: Shape) -> str:
     move.move(build)
     if plan.goals:
         scene.aim(build)
+    if plan.appearing:
+        scene.appear(build)
     for clock in clocks(plan):
         measure.measure(build, clock)
     body = _time(build)  # first: it may still name rules
@@ -56,6 +58,7 @@ def _memory(build: CudaBuilder) -> list[str]:
     lines += ["row = rows[flock]; whole = wholes[flock]"]
     lines += ["faces = all_faces[flock]; edges = all_edges[flock]; spans = all_spans[flock]"]
     lines += ["goals = all_goals[flock]; reached = all_reached[flock]; past = pasts[flock]; store = stores[flock]"]
+    lines += ["later = all_later[flock]; shapes = all_shapes[flock % all_shapes.shape[0]]"]
     wide = {"seed_low": "u32", "seed_high": "u32"}
     names = {"ring": "slots"}
     lines += [f"{names.get(w, w)} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
@@ -137,8 +140,7 @@ def _time(build: CudaBuilder) -> list[str]:
         put = ["slot = slot_in", build.stages["snapshot"].call(), "to_hear = decide_every"]
         put += ["slot_in = integer(slot_in + 1) if slot_in + 1 < slots else integer(0)"]
         step += [*branch("to_hear == 0", put), "to_hear = integer(to_hear - 1)"]
-    if plan.goals:
-        step += [build.stages["aim_"].call(elapsed="row_c.dt")]
+    step += _world(build)
     step += _watch(build)
     due = ["look"] if "collision" in clocks(plan) else []
     meets = not plan.sequential
@@ -152,6 +154,16 @@ def _time(build: CudaBuilder) -> list[str]:
     step += [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
     step += branch("step < steps", _advance(build))
     return [*lines, *loop("step in range(steps + 1)", step)]
+
+
+def _world(build: CudaBuilder) -> list[str]:
+    """The goal goes on its way, and what is due appears; both may look at every agent."""
+    plan = build.plan
+    lines = [build.stages["aim_"].call(elapsed="row_c.dt")] if plan.goals else []
+    lines += [build.stages["appear_"].call()] if plan.appearing else []
+    if plan.herd or plan.appearing:
+        return ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", *lines, "cuda.syncthreads()"]
+    return lines
 
 
 def _watch(build: CudaBuilder) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.cpu import Flown, _combine, _goals
+from airflock.engine.cpu import Flown, combined, goals_reached
 from airflock.engine.cuda.device import free_memory, multiprocessors, required, runtime
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.shape import Shape, shape_of
@@ -34,28 +34,29 @@ def fly_many(
     jobs: Sequence[Tables],
     starts: Sequence[NDArray[Any]] | None = None,
     done: Callable[[], None] | None = None,
-    per_agent: int | None = None,
-    simulated: bool = False,
+    shape: Shape | None = None,
 ) -> list[Flown]:
     """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
 
-    starts    : (component, agent) of each world where the plan asks for it
-    done      : called once per flight as results come in
-    per_agent : threads per agent instead of the number that suits population and flock size
+    starts : (component, agent) of each world where the plan asks for it
+    done   : called once per flight as results come in
+    shape  : layout of a flock instead of the one that suits population, flock size and GPU
+
+    Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
     """
-    required(simulated)
+    required(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
     results: dict[int, Flown] = {}
     for key, members in groups.items():
-        shape = _shape(plan, key[0], len(members), per_agent, simulated)
-        driver = flight_driver(plan, shape)
-        size = _batch(plan, driver, shape, [jobs[m] for m in members], simulated)
+        layout = shape or shape_of(key[0], len(members), multiprocessors(), sequential=plan.sequential)
+        driver = flight_driver(plan, layout)
+        size = _batch(plan, driver, layout, [jobs[m] for m in members])
         for first in range(0, len(members), size):
             batch = members[first : first + size]
             given = None if starts is None else [starts[m] for m in batch]
-            flown = _fly(plan, driver, shape, [jobs[m] for m in batch], given)
+            flown = _fly(plan, driver, layout, [jobs[m] for m in batch], given)
             for member, result in zip(batch, flown, strict=True):
                 results[member] = result
                 if done:
@@ -63,27 +64,12 @@ def fly_many(
     return [results[number] for number in range(len(jobs))]
 
 
-def _shape(plan: Plan, agents: int, flocks: int, per_agent: int | None, simulated: bool) -> Shape:
-    """Layout of this many flocks on the present GPU."""
-    options: dict[str, Any] = {"simulated": simulated}
-    processors = 132 if simulated else multiprocessors()
-    shape = shape_of(agents, flocks, processors, sequential=plan.sequential, **options)
-    if simulated:  # every thread costs; lanes stay whole words
-        threads = max(1, per_agent or 1)
-        if plan.sequential:
-            return Shape(shape.lanes, threads, threads, registers=False, simulated=True)
-        return Shape(shape.lanes, threads, -(-agents // 1) * threads, registers=True, simulated=True)
-    if per_agent and shape.registers:
-        return Shape(shape.lanes, per_agent, shape.lanes * per_agent, registers=True)
-    return shape
-
-
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
     whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
     frames = whole["steps"] // whole["sample_every"] if plan.record else 0
     scene = hashlib.sha256(tables.shapes.tobytes() + tables.nodes.tobytes()).digest() if len(tables.nodes) else b""
-    return whole["agents"], frames, len(tables.goals), scene
+    return whole["agents"], frames, len(tables.goals), len(tables.later), scene
 
 
 def _sizes(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> dict[str, tuple[int, ...]]:
@@ -117,9 +103,9 @@ def memory_needed(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[T
     return (numbers + tables + 64) * plan.bits // 8
 
 
-def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], simulated: bool) -> int:
+def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
     """How many flocks one launch takes; raises DeviceError if not even one fits."""
-    if simulated:
+    if shape.simulated:
         return len(jobs)
     needed, free = memory_needed(plan, driver, shape, jobs), int(SHARE * free_memory())
     if needed > free:
@@ -162,7 +148,9 @@ def _fly(
         "all_edges": _padded([t.edges for t in jobs]),
         "all_spans": _padded([t.spans for t in jobs]),
         "all_goals": _padded([t.goals for t in jobs]),
-        "shapes": _filled(jobs[0].shapes, 16),
+        # one scene for all flocks, or one of its own for each where some of it appears while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
+        "all_later": _padded([t.later for t in jobs]),
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
     }
@@ -181,7 +169,7 @@ def _flown(plan: Plan, jobs: Sequence[Tables], left: dict[str, NDArray[Any]]) ->
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
-        values = _combine(plan, sums) | _goals(plan, (left["all_reached"][flock][: len(tables.goals)],))
+        values = combined(plan, sums) | goals_reached(plan, left["all_reached"][flock][: len(tables.goals)])
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
         results.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
     return results
@@ -194,11 +182,6 @@ def _padded(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
     for flock, array in enumerate(arrays):
         found[flock, : len(array)] = array
     return found
-
-
-def _filled(array: NDArray[Any], width: int) -> NDArray[Any]:
-    """At least one row, so that no array is empty."""
-    return array if len(array) else np.zeros((1, width), array.dtype)
 
 
 def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:

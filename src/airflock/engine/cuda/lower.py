@@ -31,6 +31,7 @@ class Context:
     renamed  : free names that the kernel calls otherwise
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
+    alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
     """
 
     shape: Shape
@@ -40,6 +41,7 @@ class Context:
     renamed: dict[str, str] = field(default_factory=dict)
     turn: bool = False
     carried: bool = False
+    alone: bool = False
 
 
 def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
@@ -98,6 +100,8 @@ class _Totals:
     def agents(self, loop: ast.For) -> list[ast.stmt]:
         """A loop over agents."""
         context, shape = self.context, self.context.shape
+        if context.alone and any(isinstance(s, ast.If) for s in loop.body):
+            return [_Everyone(context).visit(loop)] if shape.registers else [loop]
         totals = carried_totals(loop.body)
         paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in ast.walk(loop))
         body = _Pairs(context).walk(loop.body)
@@ -194,6 +198,24 @@ class _Others(ast.NodeTransformer):
         return node
 
 
+class _Everyone(ast.NodeTransformer):
+    """A loop over all agents in the shared table, for a thread that looks at them one after another."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Name) and node.slice.id == "i":
+            table, column = self.context.columns[node.value.id]
+            pair = ast.Tuple([ast.Name("every", ast.Load()), ast.Constant(column)], ast.Load())
+            return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return ast.Name("every", node.ctx) if node.id == "i" else node
+
+
 class _Registers(ast.NodeTransformer):
     """Rows of the own agent: registers."""
 
@@ -217,7 +239,8 @@ class _Registers(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt:
         # a row under another name: gx_ = g0 if step % 2 == 0 else g2
-        if self.context.shape.registers and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+        carried = self.context.shape.registers and self.context.carried
+        if carried and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
             value = node.value
             parts = [value.body, value.orelse] if isinstance(value, ast.IfExp) else [value]
             if all(isinstance(part, ast.Name) and part.id in self.context.rows for part in parts):

@@ -36,7 +36,7 @@ class Shape:
         return self.lanes // WARP
 
 
-def shape_of(agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, **options: int) -> Shape:
+def shape_of(agents: int, flocks: int, processors: int = 132, *, sequential: bool = False) -> Shape:
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
     Few flocks leave most of a GPU idle: then several threads share the pairs of one agent. When there are flocks enough
@@ -45,11 +45,11 @@ def shape_of(agents: int, flocks: int, processors: int = 132, *, sequential: boo
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs
-        return Shape(lanes, WARP, WARP, registers=False, **options)  # type: ignore[arg-type]
+        return Shape(lanes, WARP, WARP, registers=False)
     if agents > MOST_REGISTERED:
-        return Shape(lanes, 1, MOST_THREADS, registers=False, **options)  # type: ignore[arg-type]
+        return Shape(lanes, 1, MOST_THREADS, registers=False)
     per_agent = 1
     busy = flocks * lanes / (processors * 3.0 * 128.0)  # 1.0: as full as pays
     while per_agent < 4 and 2 * per_agent * lanes <= MOST_THREADS and busy * per_agent < 1.0:
         per_agent *= 2
-    return Shape(lanes, per_agent, lanes * per_agent, **options)  # type: ignore[arg-type]
+    return Shape(lanes, per_agent, lanes * per_agent)

@@ -149,6 +149,7 @@ def decide(build: Builder) -> None:
     if "percept" in used:
         lines += build.records("w") + build.whole("world", "seed_low", "seed_high", "corners", "obstacles")
         body += scene.parts("aim") if plan.goals else []
+        lines += build.bind([f"goal_{a}" for a in axes]) if plan.own else []
         body += scene.look(build, model)
         body += [f"percept = {percept.record(build)}({percept.values(build)})"]
     body += [f"o = {build.call(model.decide, 'decide', {'period': 'c.period'}, model.name)}"]

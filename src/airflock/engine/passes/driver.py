@@ -115,6 +115,9 @@ def _world(build: Builder, elapsed: str) -> list[str]:
     if build.plan.goals:
         scene.aim(build)
         lines += [f"aim_(time, {elapsed}, n, work, row, scene)"]
+    if build.plan.own:
+        scene.glide(build)
+        lines += ["glide_(time, n, work, row, scene)"]
     if build.plan.appearing:
         scene.appear(build)
         lines += ["appear_(time, n, work, row, scene)"]
