@@ -7,6 +7,7 @@ from airflock.metrics import (
     correlation,
     environment,
     excursion,
+    fitness_dimock,
     fitness_vasarhelyi,
     flocked,
     groups,
