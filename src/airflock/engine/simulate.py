@@ -175,7 +175,7 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
 def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
     """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
     if scenario.metrics.kind == "dimock":
-        return {**values, **fitness_dimock.fitness(values)}
+        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
     if scenario.metrics.kind != "vasarhelyi":
         return values
     return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
