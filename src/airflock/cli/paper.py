@@ -27,7 +27,7 @@ def paper(
 
     import airflock.papers as papers
 
-    known = [item.name for item in iter_modules(papers.__path__) if item.name[-1:].isdigit()]
+    known = [item.name for item in iter_modules(papers.__path__) if item.ispkg]
     if name not in known:
         from difflib import get_close_matches
 

@@ -7,26 +7,42 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 
-def statistics(rows: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:
-    """Mean, standard deviation and median of each column."""
-    found: dict[str, dict[str, float]] = {"mean": {}, "std": {}, "median": {}}
-    for key in rows[0]:
-        values = sorted(float(row[key]) for row in rows)
-        n = len(values)
-        mean = math.fsum(values) / n
-        found["mean"][key] = mean
-        found["std"][key] = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (n - 1)) if n > 1 else 0.0
-        found["median"][key] = 0.5 * (values[(n - 1) // 2] + values[n // 2])
+def statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Mean, standard deviation and median of each column; of a column of lists, those of each place.
+
+    A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
+    """
+    found: dict[str, dict[str, Any]] = {"mean": {}, "std": {}, "median": {}}
+    for key, first in rows[0].items():
+        if isinstance(first, (list, tuple)):
+            places = [_moments([row[key][c] for row in rows]) for c in range(len(first))]
+            moments: Any = [list(column) for column in zip(*places, strict=True)] or [[], [], []]
+        else:
+            moments = _moments([row[key] for row in rows])
+        for name, value in zip(found, moments, strict=True):
+            found[name][key] = value
     return found
 
 
-def number(x: float) -> str:
-    """A number with four significant digits."""
-    return f"{x:.4g}"
+def _moments(given: Sequence[Any]) -> tuple[float, float, float]:
+    values = sorted(v for v in map(float, given) if not math.isnan(v))
+    n = len(values)
+    if not n:
+        return math.nan, math.nan, math.nan
+    mean = math.fsum(values) / n
+    spread = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (n - 1)) if n > 1 else 0.0
+    return mean, spread, 0.5 * (values[(n - 1) // 2] + values[n // 2])
+
+
+def number(x: Any) -> str:
+    """A number with four significant digits, `never` where it is nan; a list of numbers side by side."""
+    if isinstance(x, (list, tuple)):
+        return ", ".join(f"{v:.3g}" if v == v else "never" for v in x)
+    return f"{x:.4g}" if x == x else "never"
 
 
 def score_table(
-    title: str, rows: Sequence[Mapping[str, float]], published: Mapping[str, tuple[float, float | None]]
+    title: str, rows: Sequence[Mapping[str, Any]], published: Mapping[str, tuple[float, float | None]]
 ) -> None:
     """Print order parameters beside what a paper reports."""
     from rich import box
@@ -48,7 +64,9 @@ def score_table(
     for key in found["mean"]:
         unit, meaning = REPORTS.get(key, ("", ""))
         mean = number(found["mean"][key])
-        cells = [key, f"{mean} ± {found['std'][key]:.2g}" if len(rows) > 1 else mean]
+        spread = found["std"][key]
+        single = len(rows) == 1 or isinstance(spread, list) or spread != spread
+        cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
         cells += [number(found["median"][key])] if len(rows) > 1 else []
         if published:
             entry = published.get(key)

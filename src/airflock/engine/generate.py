@@ -31,6 +31,7 @@ class Source:
         self.constants = constants
         self.blocks: list[str] = []
         self._names: dict[Any, str] = {}
+        self._apart = False
 
     def name(self, item: Any) -> str:
         """Name in the driver of a plain function or a NamedTuple class; adds its text on first use."""
@@ -50,6 +51,13 @@ class Source:
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
             self.blocks.append(self._function(item, name))
+        return name
+
+    def solver(self, rule: Callable[..., Any]) -> str:
+        """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
+        self._apart = True
+        name = self.name(rule)
+        self._apart = False
         return name
 
     def record(self, name: str, fields: tuple[str, ...]) -> str:
@@ -73,7 +81,7 @@ class Source:
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
-        decorator = INLINED if loops and self.decorator else self.decorator
+        decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
         return f"{decorator}\n{ast.unparse(rewritten)}"
 
 
@@ -146,7 +154,7 @@ class _Rewrite(ast.NodeTransformer):
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         self.generic_visit(node)
         inner = node.value
-        if isinstance(inner, ast.Subscript) and isinstance(inner.value, ast.Name):  # a[i][j] → a[i, j]
+        if isinstance(inner, ast.Subscript) and isinstance(inner.value, (ast.Name, ast.Attribute)):  # a[i][j] → a[i, j]
             pair = ast.Tuple([inner.slice, node.slice], ast.Load())
             return ast.Subscript(inner.value, pair, node.ctx)
         return node

@@ -18,16 +18,14 @@ from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
-from airflock.engine.passes.move import ATTEMPTS
+from airflock.engine.plain_flock import of_model
 from airflock.engine.plain_scores import Scores
-from airflock.engine.plain_world import Place, Senses
-from airflock.engine.tables import clock, extents
+from airflock.engine.plain_start import ZERO, Vector, begin, given, normals
+from airflock.engine.plain_world import Course, Place, Senses
+from airflock.engine.tables import clock
 from airflock.metrics.registry import SETS
 from airflock.scenarios.scenario import Scenario
-from airflock.world import start as start_rules
 
-Vector = tuple[float, float, float]
-ZERO: Vector = (0.0, 0.0, 0.0)
 LIMIT = 1e8  # m; no radio reaches farther
 
 
@@ -38,7 +36,7 @@ class Agent:
     state      : true position (m) and velocity (m/s)
     command    : what its model decided last
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
-    memory     : the model's Memory
+    memory     : the model's Memory; rays: how many it cast at its last decision
     packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
     """
 
@@ -47,6 +45,7 @@ class Agent:
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     memory: Any = None
+    rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
 
 
@@ -65,33 +64,42 @@ def fly_plainly(
     """
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
-    flock = begin(scenario, seed, place) if start is None else given(start, dims)
+    begun = begin(scenario, seed, place) if start is None else given(start, dims)
+    flock = [Agent(state) for state in begun]
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = SETS[scenario.metrics.kind] if metrics is None else metrics
-    scores = Scores(chosen, scenario.measured_by(), place.excursion, place.image, dims)
+    scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
+    solve = of_model(scenario)
     if len(flock) < scenario.agents:
         return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
     at_start, gust = states(flock), ZERO
     past: dict[int, list[State]] = {}  # by the number of the decision that hears them
     for step in range(times["steps"] + 1):
+        course.advance(step * dt, dt, states(flock))
+        place.appear(step * dt, states(flock))
         if (step + delay) % every == 0:
             past[(step + delay) // every] = states(flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
-            decisions(scenario, seed, place, flock, number, past.pop(number, at_start), step * dt)
+            shared = solve(states(flock)) if solve else None
+            past_now = past.pop(number, at_start)
+            decisions(scenario, seed, (place, course), flock, number, past_now, step * dt, shared=shared)
         if step % times["collide_every"] == 0:
-            scores.look("collision", states(flock))
+            events = scores.look("collision", states(flock), step * dt).get("n_coll", 0.0)
+            if events > 0.5 and scenario.metrics.stop == "collision":
+                frames = frames[: -(-step // times["sample_every"])]
+                break
         if step % times["sample_every"] == 0:
-            scores.look("sample", states(flock))
+            scores.look("sample", states(flock), step * dt, [agent.rays for agent in flock])
             frames[step // times["sample_every"]] = components(flock, dims)
         if step < times["steps"]:
             gust = blow(scenario, seed, step, gust)
             for i, agent in enumerate(flock):
                 if scenario.flight.update == "sequential":
-                    decisions(scenario, seed, place, flock, step, states(flock), step * dt, [i])
+                    decisions(scenario, seed, (place, course), flock, step, states(flock), step * dt, [i])
                 advance(scenario, seed, step, i, agent, gust, place)
-    return Flown(scores.totals(), frames, components(flock, dims)[: 2 * dims], 0)
+    return Flown(scores.totals() | course.values(), frames, components(flock, dims)[: 2 * dims], 0)
 
 
 def states(flock: Sequence[Agent]) -> list[State]:
@@ -110,71 +118,18 @@ def plus(state: State, error: State) -> State:
     return State(*(a + b for a, b in zip(state, error, strict=True)))
 
 
-# ---------------------------------------------------------------------------------------------------------- start
-
-
-def given(start: NDArray[Any], dims: int) -> list[Agent]:
-    """Agents from positions and velocities (component, agent)."""
-    pad = (0.0,) * (3 - dims)
-    columns = [tuple(float(c) for c in column) for column in start.T]
-    return [Agent(State(*c[:dims], *pad, *c[dims:], *pad)) for c in columns]
-
-
-def begin(scenario: Scenario, seed: int, place: Place) -> list[Agent]:
-    """Agents at random places in the arena, far enough apart; fewer than asked for if one finds no room."""
-    flock: list[Agent] = []
-    for i in range(scenario.agents):
-        spot = find_room(scenario, seed, place, i, flock)
-        if spot is None:
-            break
-        flock.append(Agent(State(*spot, *start_velocity(scenario, seed, i))))
-    return flock
-
-
-def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequence[Agent]) -> Vector | None:
-    """Position (m) for agent i inside the arena and away from those already placed; None if there is none."""
-    reach, apart = extents(scenario), scenario.separation()
-    for attempt in range(ATTEMPTS):
-        words = random.words(seed, random.START, 0, attempt, i)
-        x, y, z = (start_rules.spread(random.uniform(w), -half, half) for w, half in zip(words, reach, strict=False))
-        z = z if scenario.dimensions == 3 else 0.0
-        if scenario.start.kind == "ball" and not start_rules.in_ball(x, y, z, reach[0]):
-            continue
-        gaps = ((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2 for s in states(flock))
-        near = apart > 0.0 and any(gap < apart * apart for gap in gaps)
-        if not near and place.excursion(x, y, z) <= 0.0:
-            return x, y, z
-    return None
-
-
-def start_velocity(scenario: Scenario, seed: int, i: int) -> Vector:
-    """Velocity of agent i at the start, m/s: start.speed in a random direction."""
-    if scenario.start.speed == 0.0:
-        return ZERO
-    gx, gy, gz, _ = normals(seed, random.START, 0, i, draw=1)
-    gz = gz if scenario.dimensions == 3 else 0.0
-    f = scenario.start.speed / norm(gx, gy, gz)
-    return f * gx, f * gy, f * gz
-
-
-def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tuple[float, float, float, float]:
-    """Four normal random numbers of one consumer."""
-    a, b, c, d = random.words(seed, stream, 0, step, agent, draw)
-    return *random.normal_pair(a, b), *random.normal_pair(c, d)
-
-
 # ------------------------------------------------------------------------------------------------------- decision
 
 
 def decisions(
-    scenario: Scenario, seed: int, place: Place, flock: list[Agent], number: int, past: list[State], time: float,
-    turn: Sequence[int] | None = None,
+    scenario: Scenario, seed: int, world: tuple[Place, Course], flock: list[Agent], number: int, past: list[State],
+    time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
     if scenario.sensors.noise > 0.0:
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent)
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
     said = [plus(state, agent.sent) for state, agent in zip(past, flock, strict=True)]
     for i in range(len(flock)) if turn is None else turn:
         agent = flock[i]
@@ -183,11 +138,12 @@ def decisions(
             Heard(h.who, place.beside(own, h.state), h.age)
             for h in hear(scenario, seed, number, i, flock, said, time, place)
         ]
+        senses = Senses.of(place, course, own, time, seed, number, i)
         made = decide(
             scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
-            time=time, period=period, index=i,
-            percept=Senses.of(place, own, time, seed, number, i),
+            time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
         )  # fmt: skip
+        agent.rays = float(senses.rays)
         x, y, z = made.command
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
         agent.memory = made.memory

@@ -10,6 +10,8 @@ from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
+from airflock.engine.plain_flock import Survey, of_metric
+from airflock.engine.plain_world import Place
 
 Record = Any  # a NamedTuple of floats that a metric declares
 
@@ -18,33 +20,41 @@ class Scores:
     """Running sums of the order parameters of one flight.
 
     metrics   : what is measured; q : their parameters
-    excursion : how far outside (m) a position x, y, z lies; negative where flying is allowed
-    image     : offset to the nearest image in a periodic box
+    place     : the world of the flight: excursion of a position, touches on a way, offsets to nearest images
+    wing      : parameters of the wing, for metrics that survey the whole flock
     """
 
     def __init__(
         self,
         metrics: Sequence[Metric],
         q: Any,
-        excursion: Callable[[float, float, float], float],
-        image: Callable[[float, float, float], tuple[float, float, float]] = lambda x, y, z: (x, y, z),
+        place: Place,
         dimensions: int = 2,
+        wing: Any = None,
     ):
-        self.image = image
+        self.wing = wing
+        self.surveys: dict[str, Survey | None] = {}
+        self.place = place
+        self.image = place.image
         self.dimensions = float(dimensions)
         self.metrics = tuple(metrics)
         self.q = q
-        self.excursion = excursion
+        self.before: Sequence[State] = ()
+        self.rays: Sequence[float] = ()
         self.memories: dict[str, list[Record]] = {}
         self.sums = {
             name: START[how if how in ("min", "max") else "sum"] for m in self.metrics for name, how in _over_time(m)
         }
         self.counts = {"sample": 0, "collision": 0}
 
-    def look(self, clock: str, flock: Sequence[State]) -> dict[str, float]:
-        """Measure the flock now by the metrics of one clock, add to the sums, and return the values."""
+    def look(self, clock: str, flock: Sequence[State], time: float, rays: Sequence[float] = ()) -> dict[str, float]:
+        """Measure the flock now by the metrics of one clock, add to the sums, and return the values.
+
+        time : since the start, s; rays : cast by each agent at its last decision
+        """
         values: dict[str, float] = {}
         self.counts[clock] += 1
+        self.time, self.rays = time, rays or [0.0] * len(flock)
         for metric in self.metrics:
             if metric.clock != clock:
                 continue
@@ -52,6 +62,8 @@ class Scores:
             for (name, how), value in zip(_over_time(metric), sample, strict=True):
                 self.sums[name] = combined("sum" if how == "mean" else how, self.sums[name], value)
                 values[name] = value
+        if clock == "collision":
+            self.before = list(flock)
         return values
 
     def totals(self) -> dict[str, float]:
@@ -67,7 +79,7 @@ class Scores:
 
     def _sample(self, metric: Metric, flock: Sequence[State]) -> Record:
         given: dict[str, Any] = {"n": float(len(flock)), "mean": mean_of(flock), "q": self.q}
-        given["dimensions"] = self.dimensions
+        given |= {"dimensions": self.dimensions, "time": self.time, "wing": self.wing}
         if metric.agent is not None:
             given["agents"] = self._agents(metric, metric.agent, flock, given["mean"])
         if metric.cluster is not None:
@@ -77,6 +89,10 @@ class Scores:
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
             self.memories.setdefault(metric.name, [metric.Memory()] * len(flock))
+        if metric.name not in self.surveys:
+            self.surveys[metric.name] = of_metric(metric, len(flock), self.q, self.wing)
+        survey = self.surveys[metric.name]
+        shared = survey(flock) if survey else [None] * len(flock)
         terms = []
         for i, state in enumerate(flock):
             speed = norm(state.vx, state.vy, state.vz)
@@ -84,9 +100,13 @@ class Scores:
                 **state._asdict(),
                 **dict(zip(("hx", "hy", "hz"), heading(state), strict=True)),
                 "speed": speed,
-                "excursion": self.excursion(state.x, state.y, state.z),
+                "excursion": self.place.excursion(state.x, state.y, state.z),
+                "touches": self._touches(metric, state, i),
+                "rays": self.rays[i],
                 "pair": self._pairs(metric, flock, i),
                 "mean": mean,
+                "shared": shared[i],
+                "wing": self.wing,
                 "q": self.q,
             }
             if metric.Memory is None:
@@ -97,6 +117,11 @@ class Scores:
                 terms.append(term)
         assert metric.Agent is not None
         return reduced(metric.Agent, metric.reduce, terms)
+
+    def _touches(self, metric: Metric, state: State, i: int) -> float:
+        if metric.clock != "collision":
+            return 0.0
+        return self.place.touches(self.before[i] if self.before else state, state, self.q.r_body)
 
     def _pairs(self, metric: Metric, flock: Sequence[State], i: int) -> Record:
         if metric.pair is None:

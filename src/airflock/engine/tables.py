@@ -10,8 +10,11 @@ from airflock.core.parameters import row
 from airflock.engine.plan import ARENA, CLOCK, WHOLE, Plan
 from airflock.scenarios.geometry import counter_clockwise, half_sizes
 from airflock.scenarios.scenario import Scenario
+from airflock.scenes.tree import Scene
 from airflock.scenes.tree import scene as make_scene
+from airflock.world.shapes import APPEARS
 
+AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
 EMPTY = make_scene([])
 
 
@@ -25,6 +28,7 @@ class Tables:
     edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles'
     spans : (obstacle, 2) first and last edge of each obstacle
     shapes, nodes, links : what stands in the scene, as in `scenes.tree`
+    later : (shape, 8) bounds (m), time (s) and number of each shape that appears while flying
     goals : (goal, 3) points in their order, m
     """
 
@@ -36,6 +40,7 @@ class Tables:
     shapes: NDArray[Any]
     nodes: NDArray[Any]
     links: NDArray[np.int64]
+    later: NDArray[Any]
     goals: NDArray[Any]
 
 
@@ -107,6 +112,14 @@ def polygon_edges(scenario: Scenario) -> tuple[list[list[float]], int, list[list
     return edges, own, spans
 
 
+def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shapes as they stand at the start, and what appears later: its bounds (m), time (s) and number."""
+    shapes, k = scene.shapes.copy(), scene.later
+    later = np.column_stack([shapes[k, :6], shapes[k, APPEARS], k])
+    shapes[k, :6] = AWAY
+    return shapes, later
+
+
 def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     """Numbers of one world for a plan's driver."""
     real = np.float32 if plan.bits == 32 else np.float64
@@ -116,15 +129,16 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     begin, goals = scenario.start, scenario.goals
     arena = dict(zip(ARENA, (
         *half_sizes(scenario.world), *extents(scenario), scenario.separation(), begin.speed, begin.clearance,
-        goals.radius,
-        goals.speed,
+        goals.radius, goals.speed, goals.spread, goals.behind,
+        begin.spacing_x, begin.spacing_y, begin.spacing_z, begin.jitter,
     ), strict=True))  # fmt: skip
     scene = scenario.stands() if plan.scene else EMPTY
+    shapes, later = unbuilt(scene)
     timing = dict(zip(CLOCK, (dt, times["decide_every"] * dt), strict=True))
     numbers = [
         *row(scenario.parameters), *row(scenario.body), *row(scenario.sensors), *row(scenario.radio),
         *row(scenario.wind), *(arena[name] for name in ARENA), *row(scenario.measured_by()),
-        *(timing[name] for name in CLOCK),
+        *(timing[name] for name in CLOCK), *row(scenario.wing),
     ]  # fmt: skip
     counts = families + [0] * (2 - len(families))
     whole = times | {
@@ -143,7 +157,8 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
         faces=np.array(surfaces, real).reshape(-1, 4),
         edges=np.array(edges, real).reshape(-1, 4),
         spans=np.array(spans, np.int64).reshape(-1, 2),
-        shapes=scene.shapes.astype(real),
+        shapes=shapes.astype(real),
+        later=later.astype(real),
         nodes=scene.nodes.astype(real),
         links=scene.links,
         goals=scenario.waypoints().astype(real),

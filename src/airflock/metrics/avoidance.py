@@ -5,6 +5,12 @@ An agent avoids when its ray ahead is not free, so that it casts more than one.
 
 from typing import NamedTuple
 
+REPORTS = {
+    "avoiding": ("", "share of agents whose way ahead is not free"),
+    "n_avoid": ("", "avoidances begun per agent"),
+    "rays": ("", "rays cast per agent and decision"),
+}
+
 OVER_TIME = {"n_avoid": "sum"}
 
 

@@ -6,6 +6,8 @@ separation.
 
 from typing import NamedTuple
 
+REPORTS = {"n_env_coll": ("", "collisions with the environment")}
+
 CLOCK = "collision"
 OVER_TIME = {"n_env_coll": "sum"}
 

@@ -8,6 +8,11 @@ from typing import NamedTuple
 
 from airflock.core.maths import FAR
 
+REPORTS = {
+    "flocked": ("", "share of agents within metrics.r_flock of the flock's centre"),
+    "time_to_flock": ("s", "until all are flocked for the first time"),
+}
+
 OVER_TIME = {"time_to_flock": "min"}
 
 

@@ -15,12 +15,16 @@ class Parameters(Record):
 
     kind: str = choice(
         "vasarhelyi",
-        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger"),
+        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"),
         source="our choice",
         meaning="which order parameters: of Vásárhelyi et al. 2018 with fitness; of Kidger (flocked, sub-swarms, "
-        "avoidance); extension, polarization and quality of Zapotecatl et al. 2016; these with sub-groups told apart; "
-        "or only polarisation, milling, speed and shape",
+        "avoidance); power of a flock of wings (Dimock & Selig 2003); extension, polarization and quality of "
+        "Zapotecatl et al. 2016; these with sub-groups told apart; or only polarisation, milling, speed and shape",
     )
+    stop: str = choice(
+        "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",
+        meaning="what ends a flight before its time; order parameters are those until then",
+    )  # fmt: skip
     period: float = quantity(
         0.2, "s", low=0.0, high=600.0, meaning="time between samples; 0: every step dt", source="our choice"
     )
@@ -55,12 +59,12 @@ class Parameters(Record):
         None,
         "m/s",
         low=0.01,
-        high=200.0,
+        high=1000.0,
         source="Eq. 22",
         meaning="speed that f_speed asks for; by default the model's",
     )
     v_tol: float | None = quantity(
-        None, "m/s", low=0.001, high=200.0, source="Eq. 22", meaning="tolerance of the speed; by default 0.375 v_flock"
+        None, "m/s", low=0.001, high=1000.0, source="Eq. 22", meaning="tolerance of the speed; by default 0.375 v_flock"
     )
     r_b: float = quantity(
         0.05,

@@ -13,6 +13,7 @@ from airflock.metrics import (
     milling,
     nearest,
     polarisation,
+    power,
     quality,
     rotation,
     shape,
@@ -28,15 +29,26 @@ ZAPOTECATL = (metric(quality), metric(polarisation))
 KIDGER = tuple(
     metric(module) for module in (flocked, swarms, polarisation, nearest, collisions, environment, avoidance, speed)
 )
+DIMOCK = (metric(power), metric(collisions))
 SETS: dict[str, tuple[Metric, ...]] = {
     "vasarhelyi": STANDARD,
     "zapotecatl": ZAPOTECATL,
     "groups": (*ZAPOTECATL, metric(groups), metric(shape)),
     "order": ORDER,
     "kidger": KIDGER,
+    "dimock": DIMOCK,
+}
+
+# what the engine itself keeps of a flight with goals
+GOALS = {
+    "goals_reached": ("", "goals reached by the flock's centre"),
+    "goals": ("", "goals given"),
+    "time_to_goal": ("s", "when each was reached"),
 }
 
 # of every order parameter that is reported: its unit and what it means, from the modules that define them
-REPORTS: dict[str, tuple[str, str]] = {
-    name: about for found in SETS.values() for each in found for name, about in each.reports.items()
-} | fitness_vasarhelyi.REPORTS
+REPORTS: dict[str, tuple[str, str]] = (
+    {name: about for found in SETS.values() for each in found for name, about in each.reports.items()}
+    | fitness_vasarhelyi.REPORTS
+    | GOALS
+)

@@ -2,6 +2,11 @@
 
 from typing import NamedTuple
 
+REPORTS = {
+    "n_clusters": ("", "sub-swarms, stragglers included"),
+    "n_stragglers": ("", "agents alone"),
+}
+
 
 class Cluster(NamedTuple):
     """Sub-swarms (two agents or more); agents that are alone."""

@@ -16,7 +16,8 @@ Differences from the thesis, each because its text leaves the point open or its 
 * The cast is one of a sphere (radius + margin) against everything, and the nearest hit counts (the thesis's bug 2 was
   the first edge found); cast = "thin" is the thesis's ray.
 * Where no ray is free the longest is flown, no farther than it is free; the thesis suggests nothing then.
-* Gravity (m/s downwards) adds to what the others suggest; a free ray is flown as it was cast.
+* Gravity is a steady sinking (m/s) below what the others suggest; previous movement and alignment take movements
+  without it, or it would add up frame by frame. A free ray is flown as it was cast.
 """
 
 import math
@@ -213,11 +214,13 @@ def others(t, own, sums, percept, p):
     t = take(t, k * sums.sx, k * sums.sy, k * sums.sz, p.s_sep, p)
     k = p.speed / norm(sums.cx, sums.cy, sums.cz)
     t = take(t, k * sums.cx, k * sums.cy, k * sums.cz, p.s_cohes, p)
-    k = min(sums.n_align, 1.0) / (sums.n_align + 1.0)
-    t = take(t, k * (sums.ax + own.vx), k * (sums.ay + own.vy), k * (sums.az + own.vz), p.s_align, p)
+    some = min(sums.n_align, 1.0)
+    k = some / (sums.n_align + 1.0)
+    sunk = some * p.gravity
+    t = take(t, k * (sums.ax + own.vx), k * (sums.ay + own.vy), k * (sums.az + own.vz) + sunk, p.s_align, p)
     k = p.speed / norm(percept.goal_x, percept.goal_y, percept.goal_z)
     t = take(t, k * percept.goal_x, k * percept.goal_y, k * percept.goal_z, p.s_goal, p)
-    return take(t, own.vx, own.vy, own.vz, p.s_prev, p)
+    return take(t, own.vx, own.vy, own.vz + p.gravity, p.s_prev, p)
 
 
 def sphere_point(k, n):

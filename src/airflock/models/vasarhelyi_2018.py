@@ -109,6 +109,11 @@ def interaction_range(p):
     return max(p.r0_rep, p.r0_frict + braking_distance(p.v_flock, p.a_frict, p.p_frict))
 
 
+def wall_reach(p):
+    """Distance beyond which a surface says nothing, m: an agent at twice v_flock could still stop before it."""
+    return max(p.r0_shill, 0.0) + braking_distance(p.v_shill + 2.0 * p.v_flock, p.a_shill, p.p_shill)
+
+
 def neighbour(dx, dy, dz, r, dvx, dvy, dvz, dv, p):
     """Repulsion (Eq. 2) and alignment (Eqs 4-6) from one neighbour, m/s; offsets in m."""
     away = -p.p_rep * max(p.r0_rep - r, 0.0) / r

@@ -73,6 +73,11 @@ def interaction_range(p):
     return max(p.r0_rep, 10.0 * math.sqrt(p.c_frict))
 
 
+def wall_reach(p):
+    """Distance beyond which a surface says nothing, m."""
+    return p.d_wall
+
+
 def neighbour(dx, dy, dz, r, dvx, dvy, dvz, p):
     """Half-spring repulsion and friction from one neighbour, m/s; offsets in m."""
     away = -p.p_rep * max(p.r0_rep - r, 0.0) / r

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from airflock.errors import SceneError
 from airflock.scenes.city import buildings, half_side
 from airflock.scenes.forest import trees
-from airflock.scenes.tree import TALL, Scene, boxes, scene, segments
+from airflock.scenes.tree import TALL, Scene, boxes, ground, scene, segments
 from airflock.world import bvh, goals, scenery
-from airflock.world.shapes import BOX, CYLINDER
+from airflock.world.shapes import APPEARS, BOX, CYLINDER
 
 __all__ = ["Scene", "clearance", "scene_of", "waypoints"]
 
@@ -32,15 +32,28 @@ def scene_of(p: scenery.Parameters, dimensions: int, polygons: Polygons = ()) ->
         from airflock.scenes.meshes import load_mesh
 
         rows, notes = load_mesh(p, dimensions)
+    elif p.kind == "boxes":
+        given = np.array(p.boxes, float).reshape(-1, 7)
+        rows = boxes(given[:, :6])
+        rows[:, APPEARS] = given[:, 6]
     else:
         rows = buildings(p) if p.kind == "city" else trees(p)
+        rows[:, APPEARS] = appearances(p, len(rows))
     if dimensions == 2:
         flat = (rows[:, 6] == BOX) | (rows[:, 6] == CYLINDER)
         rows[flat, 2], rows[flat, 5] = -TALL, TALL
         return scene([rows, *walls], notes)
     half = half_side(p, rows) + MARGIN
-    ground = [boxes([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
-    return scene([*ground, rows, *walls], notes)
+    below = [ground([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
+    return scene([*below, rows, *walls], notes)
+
+
+def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
+    """When each of so many shapes appears, s; 0: it stands from the start. A tree's trunk and crown come together."""
+    parts = 2 if p.kind == "forest" else 1
+    rng = np.random.default_rng([int(p.seed), 2])
+    late, when = rng.uniform(0.0, 1.0, (2, count // parts))
+    return np.tile(np.where(late < p.later, np.maximum(when * p.later_until, 1e-6), 0.0), parts)
 
 
 def clearance(found: Scene, position: Any) -> float:
@@ -58,7 +71,7 @@ def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> ND
     """
     if g.kind == "none":
         return np.zeros((0, 3))
-    if g.kind == "points":
+    if g.kind in ("points", "own"):
         found = np.array(g.points, float).reshape(-1, 3)
         return found * (1.0, 1.0, 0.0) if dimensions == 2 else found
     place = scene_of(p, dimensions)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.world.shapes import BOX, COLUMNS, CYLINDER, SEGMENT, TRIANGLE
+from airflock.world.shapes import APPEARS, BOX, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
 
 LEAF = 4  # shapes of a leaf
 TALL = 1e6  # m; half height of what has no end in height
@@ -18,7 +18,7 @@ TALL = 1e6  # m; half height of what has no end in height
 class Scene:
     """What stands in a world.
 
-    shapes : (shape, 16) rows as in `world.shapes`, in the order of the tree's leaves
+    shapes : (shape, 17) rows as in `world.shapes`, in the order of the tree's leaves
     nodes  : (node, 6) bounds, m; links : (node, 3) skip, first, last as in `world.bvh`
     notes  : what was adjusted while it was made, for a person to read
     """
@@ -34,6 +34,11 @@ class Scene:
         return self.shapes.tolist(), self.nodes.tolist(), self.links.tolist()
 
     @property
+    def later(self) -> NDArray[np.int64]:
+        """Numbers of the shapes that appear while flying."""
+        return np.flatnonzero(self.shapes[:, APPEARS] > 0.0)
+
+    @property
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner (2, 3), m; zeros if empty."""
         if not len(self.shapes):
@@ -45,6 +50,12 @@ def boxes(corners: Any) -> NDArray[np.float64]:
     """Rows of boxes from (box, 6) lowest and highest corners, m."""
     given = np.asarray(corners, float).reshape(-1, 6)
     return _rows(BOX, given, given[:, :0])
+
+
+def ground(corners: Any) -> NDArray[np.float64]:
+    """Row of the ground from its (6,) lowest and highest corner, m."""
+    given = np.asarray(corners, float).reshape(-1, 6)
+    return _rows(GROUND, given, given[:, :0])
 
 
 def cylinders(given: Any) -> NDArray[np.float64]:

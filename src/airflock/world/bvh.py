@@ -11,7 +11,7 @@ import math
 from airflock.core.maths import FAR, TINY
 from airflock.world.arena import Surface
 from airflock.world.casts import entry, inverse, to_shape
-from airflock.world.shapes import from_shape
+from airflock.world.shapes import GROUND, from_shape
 
 
 def beside(x, y, z, boxes, i):
@@ -88,6 +88,11 @@ def cast(x, y, z, ux, uy, uz, length, radius, shapes, nodes, links):
 
 def nearest(x, y, z, reach, shapes, nodes, links):
     """Distance (m) and unit vector away from the nearest shape within reach (m); FAR if there is none."""
+    return nearest_of(x, y, z, reach, 2.0, shapes, nodes, links)
+
+
+def nearest_of(x, y, z, reach, ground, shapes, nodes, links):
+    """The same among what stands on the ground (0.0), the ground alone (1.0), or all (2.0)."""
     found = Surface(FAR, 0.0, 0.0, 1.0)
     best = reach
     i = 0
@@ -95,7 +100,8 @@ def nearest(x, y, z, reach, shapes, nodes, links):
         bound = max(best, 0.0)
         if beside(x, y, z, nodes, i) <= bound * bound:
             for k in range(links[i][1], links[i][2]):
-                if beside(x, y, z, shapes, k) <= bound * bound:
+                meant = (ground > 1.5) | ((shapes[k][6] == GROUND) == (ground > 0.5))
+                if meant & (beside(x, y, z, shapes, k) <= bound * bound):
                     s = from_shape(x, y, z, shapes, k)
                     if s.distance < best:
                         best = s.distance

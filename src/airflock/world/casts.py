@@ -7,7 +7,7 @@ at all if it moves away; otherwise nothing that once came too near could leave a
 import math
 
 from airflock.core.maths import FAR, TINY
-from airflock.world.shapes import BOX, CYLINDER, TRIANGLE, from_shape
+from airflock.world.shapes import BOX, CYLINDER, GROUND, TRIANGLE, from_shape
 
 SKIN = 1e-4  # m; a sphere as near as this has met a shape: below what positions resolve in single precision
 STEPS = 32  # of the search for the point of contact; each at least doubles the digits, except where a sphere grazes
@@ -95,7 +95,7 @@ def ray_to_triangle(x, y, z, ux, uy, uz, ax, ay, az, bx, by, bz, cx, cy, cz):
 def ray_to_shape(x, y, z, ux, uy, uz, shapes, k, start):
     """Distance (m) along a ray to row k of the shapes; start is where it enters the bounds."""
     kind = shapes[k][6]
-    if kind == BOX:
+    if (kind == BOX) | (kind == GROUND):
         return start
     if kind == CYLINDER:
         return ray_to_cylinder(

@@ -16,7 +16,10 @@ class Parameters(Record):
     """Where a flock shall go. A goal is reached when the flock's centre is within `radius`; then the next counts."""
 
     kind: str = choice(
-        "none", ("none", "points", "scene"), meaning="no goal, given points, or free points of the scene"
+        "none",
+        ("none", "points", "scene", "own"),
+        meaning="no goal, given points, free points of the scene; or to each agent a point of its own, all under way "
+        "for the same time",
     )
     points: tuple[tuple[float, ...], ...] = points("m", 2, axes=3, meaning="goals in their order, [east, north, up]")
     count: float = quantity(5, "1", low=1, high=1000, source=OURS, meaning="free points of the scene, a whole number")
@@ -37,6 +40,24 @@ class Parameters(Record):
     speed: float = quantity(
         0.0, "m/s", low=0.0, high=1e3, source=OURS, meaning="of the goal on its way to the next point; 0: it jumps"
     )
+    role: str = choice(
+        "lead",
+        ("lead", "herd"),
+        source="the thesis; Strömbom et al. 2014",
+        meaning="the goal leads to the points; or it is a shepherd that drives the flock there from behind, which "
+        "takes a model that flees it (kidger: a negative s_goal)",
+    )
+    spread: float = quantity(
+        40.0,
+        "m",
+        low=0.0,
+        high=1e5,
+        source="our choice: the thesis's radius of cohesion",
+        meaning="a shepherd first gathers who is farther than this from the flock's centre",
+    )
+    behind: float = quantity(
+        15.0, "m", low=0.0, high=1e5, source=OURS, meaning="a shepherd keeps this far behind whom it drives"
+    )
 
 
 class Aim(NamedTuple):
@@ -46,6 +67,16 @@ class Aim(NamedTuple):
     y: float
     z: float
     reached: float
+
+
+def glide(a, b, time, duration):
+    """Coordinate (m) of an agent's own goal on its way from a to b, at rest at both ends (a cubic in time).
+
+    All agents take the same time: then straight ways of an assignment with the least sum of squared lengths keep the
+    agents apart (Turpin, Michael and Kumar 2014).
+    """
+    u = min(time / max(duration, 1e-6), 1.0)
+    return a + (b - a) * u * u * (3.0 - 2.0 * u)
 
 
 def pursue(x, y, z, wx, wy, wz, cx, cy, cz, radius, travel):
@@ -61,3 +92,30 @@ def pursue(x, y, z, wx, wy, wz, cx, cy, cz, radius, travel):
     square = (cx - wx) * (cx - wx) + (cy - wy) * (cy - wy) + (cz - wz) * (cz - wz)
     reached = 1.0 if (k >= 1.0) & (square <= radius * radius) else 0.0
     return Aim(x + k * dx, y + k * dy, z + k * dz, reached)
+
+
+def herd(x, y, z, wx, wy, wz, cx, cy, cz, fx, fy, fz, spread, behind, radius, travel):
+    """Shepherd at x y z that drives a flock with its centre at c and its farthest agent at f to the point w.
+
+    One step of at most travel (m): behind the farthest agent as seen from the centre while that agent is farther than
+    spread (m) from it, else behind the flock as seen from the point (Strömbom et al. 2014, collecting and driving).
+    The point is reached when the centre is within radius (m) of it.
+    """
+    sx = fx - cx
+    sy = fy - cy
+    sz = fz - cz
+    stray = math.sqrt(sx * sx + sy * sy + sz * sz + TINY)
+    ox = cx - wx
+    oy = cy - wy
+    oz = cz - wz
+    off = math.sqrt(ox * ox + oy * oy + oz * oz + TINY)
+    collect = stray > spread
+    k = behind / stray if collect else (stray + behind) / off
+    px = fx + k * sx if collect else cx + k * ox
+    py = fy + k * sy if collect else cy + k * oy
+    pz = fz + k * sz if collect else cz + k * oz
+    dx = px - x
+    dy = py - y
+    dz = pz - z
+    s = min(travel / math.sqrt(dx * dx + dy * dy + dz * dz + TINY), 1.0)
+    return Aim(x + s * dx, y + s * dy, z + s * dz, 1.0 if off <= radius else 0.0)

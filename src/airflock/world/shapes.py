@@ -1,9 +1,10 @@
 """Shapes of a scene as rows of numbers: boxes, upright cylinders, triangles and upright segments; distances to them.
 
-A row has 16 columns: bounds x0 y0 z0 x1 y1 z1 (m), the kind, then up to nine numbers of the kind:
-box (none: its bounds say all), cylinder (x, y, radius), triangle (ax ay az bx by bz cx cy cz), segment (ax ay bx by).
-A segment is the ground plan of a wall without end in height. Distances are exact: signed for the solids (negative
-within), unsigned for triangles and segments. All shapes are convex, so a distance along a straight line is convex too.
+A row has 17 columns: bounds x0 y0 z0 x1 y1 z1 (m), the kind, up to nine numbers of the kind, and the time (s) at which
+the shape appears. Numbers of the kinds: box and ground (none: the bounds say all), cylinder (x, y, radius), triangle
+(ax ay az bx by bz cx cy cz), segment (ax ay bx by): the ground plan of a wall without end in height. Distances are
+exact: signed for the solids (negative within), unsigned for triangles and segments. All shapes are convex, so a
+distance along a straight line is convex too.
 """
 
 import math
@@ -15,7 +16,9 @@ BOX = 0.0
 CYLINDER = 1.0
 TRIANGLE = 2.0
 SEGMENT = 3.0
-COLUMNS = 16
+GROUND = 4.0  # a box that is the ground, so that it can be told from what stands on it
+APPEARS = 16  # column of the time, s
+COLUMNS = 17
 
 
 def from_box(x, y, z, x0, y0, z0, x1, y1, z1):
@@ -135,7 +138,7 @@ def from_triangle(x, y, z, ax, ay, az, bx, by, bz, cx, cy, cz):
 def from_shape(x, y, z, shapes, k):
     """Distance (m) from row k of the shapes, and the unit vector away from its nearest point."""
     kind = shapes[k][6]
-    if kind == BOX:
+    if (kind == BOX) | (kind == GROUND):
         return from_box(x, y, z, shapes[k][0], shapes[k][1], shapes[k][2], shapes[k][3], shapes[k][4], shapes[k][5])
     if kind == CYLINDER:
         return from_cylinder(x, y, z, shapes[k][7], shapes[k][8], shapes[k][9], shapes[k][2], shapes[k][5])

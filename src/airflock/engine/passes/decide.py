@@ -3,9 +3,9 @@
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
-from airflock.engine.passes import grid, percept, scene
-from airflock.engine.passes.build import Builder, loop
-from airflock.world import arena
+from airflock.engine.passes import flock, grid, percept, scene
+from airflock.engine.passes.build import Builder, branch, loop
+from airflock.world import arena, bvh
 
 EXTREME = {"min": "least", "max": "most"}
 START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
@@ -72,8 +72,7 @@ def neighbours(build: Builder) -> None:
     given = {"age": "age[j]" if selective else "late", "lower": "(ONE if integer(j) < ii else ZERO)"}
     given |= {f"h{a}": f"own_h{a}" for a in "xyz"}
     inner += [f"t = {build.call(rule, 'neighbour', given, model.name)}"]
-    inner += [combine(how[c], f"t{c}", f"t[{c}] if ok else {START[how[c]]}") for c in sums if how[c] == "sum"]
-    inner += [combine(how[c], f"t{c}", f"(t[{c}] if ok else {START[how[c]]})") for c in sums if how[c] != "sum"]
+    inner += [combine(how[c], f"t{c}", f"choose(ok, t[{c}], {START[how[c]]})") for c in sums]
     after = [f"sum{c}[i] = t{c}" for c in sums]
     if plan.grid:
         inner = [line.replace("integer(j)", "who[j]") for line in inner]
@@ -84,7 +83,10 @@ def neighbours(build: Builder) -> None:
 
 
 def boundaries(build: Builder) -> None:
-    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest."""
+    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
+
+    Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
+    """
     plan, axes, model = build.plan, build.plan.axes, build.plan.model
     rule, fields = model.boundary, getattr(model.Walls, "_fields", ())
     if rule is None:
@@ -103,11 +105,19 @@ def boundaries(build: Builder) -> None:
         name = build.source.name(surface)
         inner = build.each([f"f = {name}({position}, ea, eb, ec, ed)", *add])
         body += loop(f"e in range({bounds[family]}, {bounds[family + 1]})", [face, *inner])
-    if plan.obstacles:
+    if plan.obstacles and model.sight is None:  # who casts meets them in the scene
         name = build.source.name(arena.convex_obstacle)
         inner = build.each([f"f = {name}({position}, edges, spans[o, 0], spans[o, 1])", *add])
         body += loop("o in range(obstacles)", inner)
-    build.stage("boundaries", "n, row, whole, work, faces, edges, spans", lines, body)
+    if plan.scene:
+        lines += scene.parts("shapes", "nodes", "links")
+        look = "LIMIT" if model.wall_reach is None else build.call(model.wall_reach, "wall_reach", {}, model.name)
+        lines += [f"look = least({look}, LIMIT)"]
+        name = build.source.name(bvh.nearest_of)
+        for ground in ("ZERO", "ONE") if plan.dimensions == 3 else ("ZERO",):
+            inner = [f"f = {name}({position}, look, {ground}, shapes, nodes, links)"]
+            body += build.each([*inner, *branch("f.distance < look", add)])
+    build.stage("boundaries", "n, row, whole, work, faces, edges, spans, scene", lines, body)
 
 
 def decide(build: Builder) -> None:
@@ -115,7 +125,8 @@ def decide(build: Builder) -> None:
     plan, axes, model = build.plan, build.plan.axes, build.plan.model
     used = set(asks(model.decide, "decide", model.name))
     memory = getattr(model.Memory, "_fields", ()) if "memory" in used else ()
-    lines = build.records("p c") + build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
+    lines = build.records("p c wing" if "wing" in used else "p c")
+    lines += build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
     lines += build.bind([f"c{a}" for a in axes])
     body = [f"v{a} = mv{a}[i]" for a in axes] + ([] if plan.dimensions == 3 else ["vz = ZERO"])
     if "own" in used:
@@ -129,13 +140,17 @@ def decide(build: Builder) -> None:
             lines += build.bind([f"{rows}{c}" for c in kept]) if present else []
             values = [f"{rows}{c}[i]" if c in kept and present else "ZERO" for c in range(len(record._fields))]  # type: ignore[attr-defined]
             body += [f"{word} = {build.source.name(record)}({', '.join(values)})"]
+    if "shared" in used:
+        lines += flock.columns_of(build, model.Shared, "model")
+        body += flock.shared(build, model.Shared, "model", bound=True)
     if memory:
         values = [f"mem[{c}, i]" for c in range(len(memory))]
         body += [f"memory = {build.source.name(model.Memory)}({', '.join(values)})"]
     if "percept" in used:
         lines += build.records("w") + build.whole("world", "seed_low", "seed_high", "corners", "obstacles")
         body += scene.parts("aim") if plan.goals else []
-        body += scene.look(build, model) if model.sight is not None else []
+        lines += build.bind([f"goal_{a}" for a in axes]) if plan.own else []
+        body += scene.look(build, model)
         body += [f"percept = {percept.record(build)}({percept.values(build)})"]
     body += [f"o = {build.call(model.decide, 'decide', {'period': 'c.period'}, model.name)}"]
     body += [f"c{a}[i] = o[{c}]" for c, a in enumerate(axes)]

@@ -4,7 +4,7 @@ from airflock.core import random
 from airflock.core.vocabulary import BOUND, Percept
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import Builder, loop
-from airflock.world import rays
+from airflock.world import bvh, rays
 
 FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
 REST = "w.half_x, w.half_y, w.half_z, i, k_, world, seed_low, seed_high, corners, obstacles, edges, spans"
@@ -12,7 +12,7 @@ REST = "w.half_x, w.half_y, w.half_z, i, k_, world, seed_low, seed_high, corners
 
 def record(build: Builder) -> str:
     """Record that a driver hands to `decide`: the public fields, then what the bound methods need."""
-    casts = scene.CAST if build.plan.model.sight is not None else ()
+    casts = scene.carried(build)
     return build.source.record("PERCEPT", (*Percept._fields, *FIELDS, "edges", "spans", *casts))
 
 
@@ -20,8 +20,10 @@ def values(build: Builder) -> str:
     """What agent i at its measured position puts into that record."""
     axes, plan = build.plan.axes, build.plan
     position = ", ".join(f"-m{a}[i]" if a in axes else "ZERO" for a in "xyz")
-    goal = ", ".join(f"aim[{c}] - m{a}[i]" if plan.goals and a in axes else "ZERO" for c, a in enumerate("xyz"))
-    casts = scene.CAST if plan.model.sight is not None else ()
+    aims = [f"goal_{a}[i]" if plan.own else f"aim[{c}]" for c, a in enumerate("xyz")]
+    known = axes if plan.goals or plan.own else ()
+    goal = ", ".join(f"{aim} - m{a}[i]" if a in known else "ZERO" for aim, a in zip(aims, "xyz", strict=True))
+    casts = scene.carried(build)
     return ", ".join(["time", position, goal, REST, *casts])
 
 
@@ -51,4 +53,8 @@ def _ray(build: Builder) -> list[str]:
         edge = build.source.name(rays.to_edges)
         spans = "percept.edges, percept.spans[o, 0], percept.spans[o, 1]"
         lines += loop("o in range(percept.obstacles)", [f"t = least(t, {edge}(x, y, ux, uy, {spans}))"])
+    if build.plan.scene:
+        tree = build.source.name(bvh.cast)
+        given = "x, y, z, ux, uy, uz, t, ZERO, percept.shapes, percept.nodes, percept.links"
+        lines += [f"t = least(t, {tree}({given}))"]
     return [*lines, "return t"]

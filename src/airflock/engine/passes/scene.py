@@ -2,14 +2,15 @@
 
 `scene` is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts (rays
 cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and reached
-(time of each, s; -1 before).
+(time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once it has).
+A shape that is not there yet has its bounds far away, so that nothing meets it.
 """
 
 from airflock.core.contract import Model
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.world import bvh, goals, rays
 
-PARTS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached")
+PARTS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
 CAST = ("shapes", "nodes", "links", "near", "counts", "gathered")  # what a percept carries for its casts
 NEAR = 64  # shapes gathered at most; where more are in sight, each cast goes through the tree
 
@@ -24,13 +25,21 @@ def sees(build: Builder) -> bool:
     return build.plan.scene and build.plan.model.sight is not None
 
 
+def carried(build: Builder) -> tuple[str, ...]:
+    """What a percept carries for its rays and casts."""
+    if build.plan.model.sight is not None:
+        return CAST
+    return CAST[:3] if build.plan.scene else ()
+
+
 def look(build: Builder, model: Model) -> list[str]:
-    """Lines that gather what agent i can see before it decides."""
+    """Lines that take what agent i needs for its rays, and gather what it can see before it decides."""
+    if model.sight is None:
+        return parts(*carried(build))
     lines = [*parts(*CAST[:-1]), "counts[0] = 0"]
     if not sees(build):
         return [*lines, "gathered = 0"]
     position = f"mx[i], my[i], {build.z('mz[i]')}"
-    assert model.sight is not None
     sight = build.call(model.sight, "sight", {}, model.name)
     return [*lines, f"gathered = {build.source.name(bvh.gather)}({position}, {sight}, shapes, nodes, links, near)"]
 
@@ -99,8 +108,52 @@ def aim(build: Builder) -> None:
     centre = ", ".join(f"s{a} / real(n)" for a in "xyz")
     travel = "(w.goal_speed * elapsed if w.goal_speed > ZERO else FAR)"
     target = ", ".join(f"goals[number, {c}]" for c in range(3))
-    rule = build.source.name(goals.pursue)
-    lines += [f"g = {rule}(aim[0], aim[1], aim[2], {target}, {centre}, w.goal_radius, {travel})"]
+    place = f"aim[0], aim[1], aim[2], {target}, {centre}"
+    if plan.herd:
+        lines += ["cx, cy, cz = " + centre, "stray = -ONE; fx = cx; fy = cy; fz = cz"]
+        gap = " + ".join(f"({a}[i] - c{a}) * ({a}[i] - c{a})" for a in plan.axes)
+        away = [f"stray = {gap}", *[f"f{a} = {a}[i]" for a in plan.axes]]
+        lines += loop("i in range(n)", branch(f"{gap} > stray", away))
+        given = f"{place}, fx, fy, fz, w.goal_spread, w.goal_behind, w.goal_radius, {travel}"
+        lines += [f"g = {build.source.name(goals.herd)}({given})"]
+    else:
+        lines += [f"g = {build.source.name(goals.pursue)}({place}, w.goal_radius, {travel})"]
     lines += [f"aim[{c}] = g[{c}]" for c in range(3)]
     lines += branch("g.reached > HALF", ["reached[number] = time", "aim[3] += ONE"])
     build.function("aim_(time, elapsed, n, work, row, scene)", lines, "return 0")
+
+
+def appear(build: Builder) -> None:
+    """Function appear_(time, n, work, row, scene): what is due stands from now on, as soon as nobody is in its place.
+
+    A shape waits until every agent is at start.clearance from its bounds, as nobody builds onto a drone in flight.
+    """
+    axes = build.plan.axes
+    lines = [*build.records("w"), *parts("shapes", "later"), *build.bind(axes)]
+    position = f"x[i], y[i], {build.z('z[i]')}"
+    beside = build.source.name(bvh.beside)
+    wait = branch(f"{beside}({position}, later, r) <= w.clearance * w.clearance", ["free = False"])
+    put = ["shape = int(later[r, 7]); later[r, 6] = -ONE", *loop("c in range(6)", ["shapes[shape, c] = later[r, c]"])]
+    due = ["free = True", *loop("i in range(n)", wait), *branch("free", put)]
+    lines += loop("r in range(len(later))", branch("(later[r, 6] >= ZERO) and (later[r, 6] <= time)", due))
+    build.function("appear_(time, n, work, row, scene)", lines, "return 0")
+
+
+def glide(build: Builder) -> None:
+    """Function glide_(time, n, work, row, scene): each agent's own goal on its way from where the agent started.
+
+    aim[3] keeps how long all are under way, s: the longest way at goals.speed, which a smooth course exceeds by half.
+    """
+    axes = build.plan.axes
+    lines = [*build.records("w"), *parts("goals", "aim"), *build.bind(axes)]
+    lines += build.bind([f"{word}_{a}" for word in ("goal", "from") for a in axes])
+    square = " + ".join(f"(goals[i, {c}] - {a}[i]) * (goals[i, {c}] - {a}[i])" for c, a in enumerate(axes))
+    begin = [
+        "far = ZERO",
+        *loop("i in range(n)", [*[f"from_{a}[i] = {a}[i]" for a in axes], f"far = most(far, {square})"]),
+    ]
+    begin += ["aim[3] = real(1.5) * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO"]
+    rule = build.source.name(goals.glide)
+    way = [f"goal_{a}[i] = {rule}(from_{a}[i], goals[i, {c}], time, aim[3])" for c, a in enumerate(axes)]
+    lines += [*branch("time <= ZERO", begin), *loop("i in range(n)", way)]
+    build.function("glide_(time, n, work, row, scene)", lines, "return 0")

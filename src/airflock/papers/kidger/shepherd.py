@@ -1,0 +1,58 @@
+"""The negative goal: it repels, and a shepherd that steers its place herds a flock to where it shall go."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from airflock.papers import statistics
+from airflock.papers.claims import Claim, judged
+from airflock.papers.flights import Flights
+from airflock.recordings.flights import simulate
+from airflock.scenarios.files import load
+
+SEEDS = 20
+POINTS = [[150.0, 0.0, 20.0], [150.0, 150.0, 20.0], [-100.0, 100.0, 20.0], [0.0, 0.0, 20.0]]
+OPEN = {"scene.density": 0.0, "goals.kind": "points", "goals.speed": 0.0}
+
+
+class Flown(NamedTuple):
+    """How much farther from the goal a flock is after 10 s, m, by scale and seed; order parameters when herded."""
+
+    farther: dict[float, list[float]]
+    herded: pd.DataFrame
+
+
+def fly(flights: Flights) -> Flown:
+    """Fly away from a standing goal, and in front of a shepherd."""
+    seeds = flights.count(SEEDS, 3)
+    still = {**OPEN, "goals.points": [[80.0, 0.0, 40.0]], "duration": 10.0, "goals.radius": 0.01}
+    farther: dict[float, list[float]] = {}
+    for scale in (-0.25, 0.25):
+        scenario = load("kidger/city", {**still, "model.s_goal": scale})
+        goal = scenario.waypoints()[0]
+        farther[scale] = []
+        for seed in range(seeds):
+            centre = simulate(scenario, seed)["position"].values[[0, -1], :, 0, :].mean(axis=2)
+            start, end = np.linalg.norm(centre - goal, axis=1)
+            farther[scale].append(float(end - start))
+    herd = {"model.s_goal": -0.25, "goals.role": "herd", "goals.points": POINTS, "goals.speed": 120.0}
+    return Flown(farther, flights.score("Herding", {"herd": load("kidger/city", {**OPEN, **herd})}, seeds))
+
+
+def claims(flown: Flown) -> list[Claim]:
+    """The goal repels; the shepherd succeeds."""
+    away, near = (statistics.mean(flown.farther[scale]) for scale in (-0.25, 0.25))
+    share = statistics.mean(flown.herded["goals_reached"] / flown.herded["goals"])
+    return [
+        Claim(
+            id="shepherd.repels", statement="a negative goal scale repels: change of distance to the goal in 10 s, m",
+            source="Kidger, section 5.3, Goal Scale", test="95 % interval above 0", **away.fields(),
+            **judged(away.low > 0.0, f"with the positive scale {near.ours:.3g} m"),
+        ),
+        Claim(
+            id="shepherd.herds", statement="a shepherd drives the flock to four points: share reached in 120 s",
+            source="ours, after Strömbom et al. 2014", test="none", verdict="finding", **share.fields(),
+            reason=f"flocked {flown.herded['flocked'].mean():.3g} of the time",
+        ),
+    ]  # fmt: skip
