@@ -166,6 +166,11 @@ def score_flights(
     return list(cpu.in_threads(jobs, threads, done))
 
 
+def takes_all_cores(scenario: Scenario) -> bool:
+    """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing."""
+    return _pays(scenario)
+
+
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
 
 

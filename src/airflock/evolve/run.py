@@ -115,11 +115,12 @@ def executor_for(
 
         return Cluster(study, scheduler, timeout=timeout)
     from airflock.engine import cpu
-    from airflock.engine.simulate import compile_for
+    from airflock.engine.simulate import compile_for, takes_all_cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     compile_for(study.scenario, precision=int(study.search.precision))
-    return Here(score_of(study), threads or cpu.cores())
+    alone = takes_all_cores(study.scenario)
+    return Here(score_of(study), 1 if alone else threads or cpu.cores())
 
 
 def run(
