@@ -16,6 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import tables
 from airflock.evolve.executors import Executor
@@ -125,7 +126,7 @@ def conclude(
         len(good), len(table), len(table) - len(sound), shown,
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
-    write(folder / BEST, scenario_document(study, winner, result), "The winner of a study, ready to fly.")
+    write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
     tables.export(store, folder)
     return result
 
@@ -186,10 +187,14 @@ def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
     return mean, sd, mean - half, mean + half
 
 
-def scenario_document(study: Study, parameters: dict[str, float], result: Result) -> dict[str, Any]:
-    """A scenario file with the winner's parameters, each with its source."""
+def scenario_document(study: Study, parameters: dict[str, float], result: Result, folder: Path) -> dict[str, Any]:
+    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along."""
     document = plain(study.scenario.document)
     document.pop("published", None)
+    law = Path(study.scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        atomic.write(folder / law.name, law.read_bytes())
+        document["model"]["kind"] = law.name
     source = f"evolved: {study.search.algorithm}, {result.candidates} evaluations, seed {study.whole('seed')}"
     units = {axis.key: axis.unit for axis in study.space.axes}
     for key, value in parameters.items():

@@ -113,6 +113,7 @@ class Study:
                     "maximise": o.maximise,
                     "over_seeds": o.over_seeds,
                     "quantile": o.quantile,
+                    **({"own": o.text} if o.own else {}),
                 }
                 for o in self.objectives
             ],
