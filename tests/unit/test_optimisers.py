@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
+import toys
 from airflock.errors import StudyError
+from airflock.evolve.executors.here import Here
 from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.genetic import BinaryGenetic, decode, genetic
 from airflock.evolve.nondominated import front
 from airflock.evolve.optimisers import optimiser
+from airflock.evolve.race import race
+from airflock.evolve.store import Store
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):
@@ -123,3 +127,18 @@ def test_objectives_over_seeds():
     assert Objective("f").of_candidate([*flights, None]) is None
     assert Objective("f").of_candidate([{"f": float("nan")}]) is None
     assert Objective("x", own=lambda v: v["f"] * 2.0).of_candidate(flights) == 5.0
+
+
+def test_race_finds_the_best_where_one_flight_says_little(tmp_path, seed):
+    """The noise of a flight is ten times what the best hundred candidates differ by."""
+    study = toys.study(pool=200, top=5)
+    rng = np.random.default_rng(seed)
+    points = rng.random((2000, 3))
+    noisy = Here(lambda p, s: {"fitness": toys.bowl(p | {"model.p_rep": 0.2}, s, noise=0.1)["fitness"]}, 2)
+    given = [study.space.parameters(point) | {"model.p_rep": 0.2} for point in points]
+    true = np.array([toys.bowl(parameters, 0, noise=0.0)["fitness"] for parameters in given])
+    with Store(tmp_path) as store:
+        winners = race(study, store, noisy, points, -(true + rng.normal(0.0, 0.1, len(true))))
+    noisy.close()
+    ranks = np.argsort(np.argsort(-true))[winners]
+    assert len(winners) == 5 and np.median(ranks) < 200

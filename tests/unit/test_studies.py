@@ -216,7 +216,21 @@ def test_own_fitness_is_read_from_beside_the_study(tmp_path):
         "[space.model]\np_rep = { low = 0.1, high = 0.2 }\n"
     )
     study = load_study(tmp_path / "study.toml")
+    before = study.document()
+    (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel'] + 0.0\n")
+    found = differences(before, load_study(tmp_path / "study.toml").document())
+    assert len(found) == 1 and found[0].startswith("objective")
     assert study.objectives[0].of_candidate([{"phi_vel": 3.0}]) == 6.0 and study.space.keys == ("model.p_rep",)
+
+
+def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
+    law = Path(airflock.__file__).parent / "models" / "viragh_2014.py"
+    (tmp_path / "mine.py").write_text(law.read_text())
+    (tmp_path / "mine.toml").write_text('duration = 1.0\nagents = 3\n[model]\nkind = "mine.py"\n')
+    study = load_study(tmp_path / "mine.toml", search={"population": 4, "generations": 1, "top": 1, "final_seeds": 2})
+    finished(tmp_path / "a", study, lambda parameters, seed: {"fitness": sum(parameters.values())})
+    again = airflock.load(tmp_path / "a" / "best.toml")
+    assert again.model.name == "mine" and (tmp_path / "a" / "mine.py").is_file()
 
 
 def test_shipped_studies_hold_the_published_optima_and_table_s6():
@@ -251,3 +265,13 @@ def test_kills_at_random_moments_change_nothing(tmp_path, seed, request):
     ended = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     assert ended.returncode == 0, ended.stderr
     assert "all ends identical" in ended.stdout
+
+
+def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path):
+    """Real flights, from the call to a scenario that flies: faster is better, and the faster speed is found."""
+    space = {"model": {"v_flock": {"low": 1.0, "high": 5.0}}}
+    scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": 3.0, "agents": 10})
+    search = {"population": 6, "generations": 4, "top": 2, "pool": 0, "final_seeds": 2}
+    result = airflock.evolve(scenario, tmp_path / "a", space=space, fitness=lambda score: score["phi_vel"], **search)
+    assert result.parameters["model.v_flock"] > 4.0
+    assert airflock.load(tmp_path / "a" / "best.toml").parameters.v_flock == result.parameters["model.v_flock"]

@@ -87,7 +87,10 @@ def _progress(study: Any, total: int, quiet: bool) -> Iterator[tuple[Any, Callab
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from airflock.evolve.race import ROUNDS
+
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
     shape = (
         TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.percentage:>3.0f} %"),
         TextColumn("{task.fields[rate]:.1f} flights/s"), TimeRemainingColumn(),

@@ -226,6 +226,11 @@ def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
     return lambda: finish(scenario, fly(scenario, seed, precision=64, device="python").values)
 
 
+def takes_all_cores(scenario: Scenario) -> bool:
+    """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing."""
+    return _pays(scenario)
+
+
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
 
 

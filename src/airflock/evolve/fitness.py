@@ -20,6 +20,7 @@ class Objective:
 
     name       : an order parameter, or the name of a function of the user's own
     maximise   : False where less is better
+    own, text  : a function of the user's own, and a hash of its text
     over_seeds : mean, worst case, or the value that all but a share `quantile` of the flights reach
     """
 
@@ -28,6 +29,7 @@ class Objective:
     over_seeds: str = "mean"
     quantile: float = 0.1
     own: Own | None = None
+    text: str = ""
 
     def of_flight(self, values: Mapping[str, Any]) -> float:
         """Value of one flight; nan where it is not finite."""

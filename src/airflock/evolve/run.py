@@ -1,5 +1,6 @@
 """The public door: a study from beginning to end in one folder, begun or continued."""
 
+import hashlib
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -90,8 +91,17 @@ def study_of(
     else:
         study = load_study(what, settings=settings, search=search_keys, tables=tables)
     if fitness is not None:
-        study = replace(study, objectives=(Objective(getattr(fitness, "__name__", "fitness"), own=fitness),))
+        code = getattr(fitness, "__code__", None)
+        text = _text_of(code) if code is not None else ""
+        name = getattr(fitness, "__name__", "fitness")
+        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
     return study
+
+
+def _text_of(code: Any) -> str:
+    """Hash of what a function does, the same in every process."""
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
 def score_of(study: Study) -> Score:
@@ -115,11 +125,12 @@ def executor_for(
 
         return Cluster(study, scheduler, timeout=timeout)
     from airflock.engine import cpu
-    from airflock.engine.simulate import compile_for
+    from airflock.engine.simulate import compile_for, takes_all_cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     compile_for(study.scenario, precision=int(study.search.precision))
-    return Here(score_of(study), threads or cpu.cores())
+    alone = takes_all_cores(study.scenario)
+    return Here(score_of(study), 1 if alone else threads or cpu.cores())
 
 
 def run(
