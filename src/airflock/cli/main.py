@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import inspect, look, paper, run, sweep
+from airflock.cli import display, inspect, look, paper, run, sweep
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, plot.
@@ -42,6 +42,7 @@ app.command("score")(run.score)
 app.command("sweep")(sweep.sweep)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
+app.command("display")(display.display)
 app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
 app.command("validate")(inspect.validate)
