@@ -14,6 +14,7 @@ from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
+from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
 
 
@@ -71,6 +72,9 @@ def fly(
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
+        inside = start_inside(scenario, start) if plan.scene else ""
+        if inside:
+            raise FlightError(f"{scenario.name}: {inside}")
     flown = cpu.fly(plan, tables(scenario, plan, seed), start)
     if flown.status < 0:
         raise FlightError(
