@@ -47,7 +47,6 @@ class Plan:
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
-    appearing : some of the scene appears while flying
     sequential: one agent after another perceives, decides and moves
     record    : keep every sample (position, velocity, command) besides the running sums
     """
@@ -67,7 +66,6 @@ class Plan:
     goals: bool = False
     herd: bool = False
     own: bool = False
-    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2
