@@ -16,6 +16,7 @@ from airflock.errors import FlightError, ScenarioError
 from airflock.metrics import fitness_dimock
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
+from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
 
 
@@ -48,7 +49,6 @@ def plan_of(
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
-        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
@@ -97,6 +97,9 @@ def fly(
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
+        inside = start_inside(scenario, start) if plan.scene else ""
+        if inside:
+            raise FlightError(f"{scenario.name}: {inside}")
     chosen = picked([scenario], device, precision=precision, say=say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
