@@ -125,15 +125,22 @@ class CudaBuilder(Builder):
             found |= {f"hv{a}": ("truth", len(axes) + c) for c, a in enumerate(axes)}
         return found
 
+    def cells(self) -> tuple[str, ...]:
+        """Lines around a pair loop that runs over cells; none where it runs over all pairs."""
+        return ()
+
+    def prepared(self, name: str, lines: list[str]) -> list[str]:
+        """Text of a stage before it is lowered."""
+        return [line.replace("ring[", "past[") for line in lines] if name in ("snapshot", "perceive") else lines
+
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
-        if name in ("snapshot", "perceive"):
-            lines = [line.replace("ring[", "past[") for line in lines]
-        statements = parse(lines)
+        statements = parse(self.prepared(name, lines))
         if name == "neighbours" and self.receive is not None:
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
+        context.cells = self.cells()
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self, name).visit(s) for s in body]

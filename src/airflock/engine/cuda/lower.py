@@ -31,6 +31,7 @@ class Context:
     renamed  : free names that the kernel calls otherwise
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
+    cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
     """
 
@@ -42,6 +43,7 @@ class Context:
     turn: bool = False
     carried: bool = False
     alone: bool = False
+    cells: tuple[str, ...] = ()
 
 
 def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
@@ -173,6 +175,12 @@ class _Pairs:
             loop.body = body
             return [loop, *after]
         text = "\n".join(ast.unparse(ast.fix_missing_locations(s)) for s in body)
+        if context.cells:
+            depth = "    " * sum(line.endswith(":") for line in context.cells)
+            around = [f"{'    ' * k}{line}" for k, line in enumerate(context.cells)]
+            inner = ["j = starts[line + first]", "stop = starts[line + last]", "while j < stop:"]
+            inner += [*(f"    {line}" for line in text.splitlines()), "    j = np.uint32(j + np.uint32(1))"]
+            return parse([*around, *(f"{depth}{line}" for line in inner)])
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
         once = [f"    {line}" for line in [*text.splitlines(), step]]
