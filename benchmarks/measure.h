@@ -34,7 +34,7 @@ PASS void measure_agents(flock *f, int n, const parameters *p, sums *t)
     t->polarisation += length(shx / n, shy / n);
 }
 
-/* Of STRIPE agents from `first`, the least squared distances to the agents from..n-1 other than themselves, m². */
+/* A vector of agents side by side. */
 typedef real stripe __attribute__((vector_size(VECTOR)));
 typedef whole stripe_mask __attribute__((vector_size(VECTOR)));
 enum { STRIPE = VECTOR / sizeof(real) };
@@ -52,6 +52,7 @@ INLINE stripe lower(stripe a, stripe b)
 #endif
 }
 
+/* Of STRIPE agents from `first`, the least squared distances to the agents from..n-1 other than themselves, m². */
 INLINE stripe nearest2(const flock *f, int first, int from, int n)
 {
     const int next = first + STRIPE;

@@ -50,10 +50,10 @@ def power(positions, w):
 
 def block(offset, m, h, core=0.0):
     """Influence matrix (control point, segment) of a wing on one that lies at `offset` (m) from it."""
-    row = [[0.0] * (2 * m)]
+    row = [[0.0] * (m + wing.lanes(m))]
     influences(row, 0, *(float(d) for d in offset), m, h, core * core)
     k, e = np.indices((m, m))
-    return np.array(row[0])[e - k + m - 1]
+    return np.array(row[0])[k - e + wing.lanes(m) - 1]
 
 
 def influence_matrix(positions, m, h, core=0.0):

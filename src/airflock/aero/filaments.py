@@ -2,10 +2,13 @@
 
 A wing is m horseshoes side by side: bound segments across, two trailing legs each, straight back to infinity. Seen from
 another wing the downwash depends on the offset d = receiver - source alone, and with equal segments the influence of
-segment e on control point k depends on e - k alone: one row of 2 m - 1 numbers stands for a block of m x m.
+segment e on control point k depends on k - e alone: one row of 2 m - 1 numbers stands for a block of m x m. Column
+k - e + shift(m) of a row holds it; the columns before the first are zeros.
 """
 
 import math
+
+from airflock.aero.wing import lanes
 
 HOLE = 1e-20  # m², under a root or a quotient: on its own axis a filament induces nothing
 SHARE = 1.0 / (4.0 * math.pi)
@@ -38,24 +41,56 @@ def leg_slopes(dx, y, dz, core2):
 
 
 def influences(table, row, dx, dy, dz, m, h, core2):
-    """Write one row: downwash (m/s) per unit circulation at control point k of segment e, at index e - k + m - 1.
+    """Write one row: downwash (m/s) per unit circulation at control point k of segment e.
 
-    table : (rows, 2 m); dx, dy, dz : centre of the receiving wing minus centre of the source, m; h : pitch, m
+    table : (rows, m + lanes(m)); dx, dy, dz : centre of the receiving wing minus centre of the source, m; h : pitch, m
     """
+    first = lanes(m) - m
     for k in range(2 * m):
-        table[row][k] = leg(dx, dy + (float(m - 1 - k) + 0.5) * h, dz, core2)
+        table[row][first + k] = leg(dx, dy + (float(k - m) + 0.5) * h, dz, core2)
     for k in range(2 * m - 1):
-        table[row][k] = (table[row][k] - table[row][k + 1]) * SHARE
+        table[row][first + k] = (table[row][first + k + 1] - table[row][first + k]) * SHARE
+
+
+def add_wash(wash, i, table, row, circulation, j, m):
+    """Add to row i of `wash` what the circulations in row j induce: one row of the table stands for the block."""
+    last = lanes(m) - m
+    for first in range((m + 3) // 4):
+        e = 4 * first
+        a = circulation[j][e]
+        b = circulation[j][e + 1]
+        c = circulation[j][e + 2]
+        d = circulation[j][e + 3]
+        for k in range(m):
+            n = k - e + m + last
+            wash[i][k] = wash[i][k] + (
+                table[row][n - 1] * a + table[row][n - 2] * b + table[row][n - 3] * c + table[row][n - 4] * d
+            )
+
+
+def add_product(result, i, matrix, vector, j, m):
+    """Add to row i of `result` the product of a symmetric matrix (lanes(m), m) with row j of `vector`."""
+    for first in range((m + 3) // 4):
+        e = 4 * first
+        a = vector[j][e]
+        b = vector[j][e + 1]
+        c = vector[j][e + 2]
+        d = vector[j][e + 3]
+        for k in range(m):
+            result[i][k] = result[i][k] + (
+                matrix[e][k] * a + matrix[e + 1][k] * b + matrix[e + 2][k] * c + matrix[e + 3][k] * d
+            )
 
 
 def influence_slopes(slopes, row, dx, dy, dz, m, h, core2):
     """Write three rows, from `row` on: derivatives of `influences` with respect to dx, dy and dz."""
+    first = lanes(m) - m
     for k in range(2 * m):
-        sx, sy, sz = leg_slopes(dx, dy + (float(m - 1 - k) + 0.5) * h, dz, core2)
-        slopes[row][k] = sx
-        slopes[row + 1][k] = sy
-        slopes[row + 2][k] = sz
-    for k in range(2 * m - 1):
-        slopes[row][k] = (slopes[row][k] - slopes[row][k + 1]) * SHARE
-        slopes[row + 1][k] = (slopes[row + 1][k] - slopes[row + 1][k + 1]) * SHARE
-        slopes[row + 2][k] = (slopes[row + 2][k] - slopes[row + 2][k + 1]) * SHARE
+        sx, sy, sz = leg_slopes(dx, dy + (float(k - m) + 0.5) * h, dz, core2)
+        slopes[row][first + k] = sx
+        slopes[row + 1][first + k] = sy
+        slopes[row + 2][first + k] = sz
+    for j in range(3):
+        for k in range(2 * m - 1):
+            e = first + k
+            slopes[row + j][e] = (slopes[row + j][e + 1] - slopes[row + j][e]) * SHARE

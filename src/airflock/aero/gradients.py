@@ -9,18 +9,17 @@ A wing's drag is a quadratic form in the wash of the others, so its derivative w
 """
 
 from airflock.aero.elimination import factorise, substitute_transposed
-from airflock.aero.filaments import influence_slopes, influences
+from airflock.aero.filaments import add_product, add_wash, influence_slopes, influences
 from airflock.aero.lifting_line import (
     SWEEPS,
     assemble,
     carry,
     induced_drag,
-    inner,
     meet,
     settle,
     wash_on,
 )
-from airflock.aero.wing import circulation_sum, pitch, segments_of, stiffness
+from airflock.aero.wing import apart, circulation_sum, lanes, pitch, segments_of, shift, stiffness
 from airflock.core.maths import FAR
 
 
@@ -41,7 +40,7 @@ def turn_about(i, n, m, work, keep):
     tables = work.tables
     kept = work.kept
     for j in range(n):
-        for k in range(2 * m - 1):
+        for k in range(m + lanes(m)):
             if keep > 0.5:
                 kept[j][k] = tables[i * n + j][k]
                 kept[n + j][k] = tables[j * n + i][k]
@@ -65,8 +64,8 @@ def drag_at(i, n, work, wing, frozen):
     for j in range(n):
         if j != i:
             influences(
-                work.tables, j * n + i, place[0][j] - place[0][i], place[1][j] - place[1][i],
-                place[2][j] - place[2][i], m, pitch(wing), core * core,
+                work.tables, j * n + i, apart(place[0][j], place[0][i], wing), apart(place[1][j], place[1][i], wing),
+                apart(place[2][j], place[2][i], wing), m, pitch(wing), core * core,
             )  # fmt: skip
         for k in range(m):
             trial[j][k] = circulation[j][k]
@@ -108,6 +107,7 @@ def slopes_of(n, work, wing):
     place = work.place
     tables = work.tables
     mirror = work.mirror
+    first = shift(m)
     core = wing.core * wing.span
     for i in range(n):
         for j in range(n):
@@ -116,8 +116,9 @@ def slopes_of(n, work, wing):
                     work.slopes, 3 * (i * n + j), place[0][i] - place[0][j], place[1][i] - place[1][j],
                     place[2][i] - place[2][j], m, pitch(wing), core * core,
                 )  # fmt: skip
-                for k in range(2 * m - 1):
-                    mirror[i * n + j][k] = tables[i * n + j][2 * m - 2 - k]
+                for k in range(m):
+                    mirror[i * n + j][first + k] = tables[i * n + j][first - k]
+                    mirror[i * n + j][first - k] = tables[i * n + j][first + k]
 
 
 def own_part(i, work, wing):
@@ -127,10 +128,13 @@ def own_part(i, work, wing):
     undoes the wing's own equation, it is alone + 2 speed · response · circulation / stiffness.
     """
     m = segments_of(wing)
-    circulation = work.circulation
+    source = work.source
     f = 2.0 * wing.speed / stiffness(wing)
     for k in range(m):
-        work.source[i][k] = work.alone[0][k] + f * inner(work.response, k, 0, circulation, i, m)
+        source[i][k] = 0.0
+    add_product(source, i, work.response, work.circulation, i, m)
+    for k in range(m):
+        source[i][k] = work.alone[0][k] + f * source[i][k]
 
 
 def sensitivities(i, n, work, wing):
@@ -139,6 +143,7 @@ def sensitivities(i, n, work, wing):
     adjoint = work.adjoint
     source = work.source
     wash = work.wash
+    spare = work.spare
     limit = wing.tolerance * circulation_sum(wing)
     for j in range(n):
         for k in range(m):
@@ -150,8 +155,10 @@ def sensitivities(i, n, work, wing):
             j = (i + e) % n
             back_wash(j, n, m, work.mirror, adjoint, wash)
             for k in range(m):
-                fresh = -inner(work.response, k, 0, wash, j, m)
-                fresh = fresh + source[i][k] if j == i else fresh
+                spare[0][k] = 0.0
+            add_product(spare, 0, work.response, wash, j, m)
+            for k in range(m):
+                fresh = source[i][k] - spare[0][k] if j == i else -spare[0][k]
                 change = max(change, abs(fresh - adjoint[j][k]))
                 adjoint[j][k] = fresh
         if change <= limit:
@@ -165,11 +172,10 @@ def sensitivities(i, n, work, wing):
 def back_wash(j, n, m, mirror, adjoint, wash):
     """What the sensitivities of all other wings make of a unit circulation on wing j."""
     for k in range(m):
-        s = 0.0
-        for i in range(n):
-            if i != j:
-                s = s + inner(mirror, i * n + j, m - 1 - k, adjoint, i, m)
-        wash[j][k] = s
+        wash[j][k] = 0.0
+    for i in range(n):
+        if i != j:
+            add_wash(wash, j, mirror, i * n + j, adjoint, i, m)
 
 
 def unspread(i, n, m, work):
@@ -177,27 +183,32 @@ def unspread(i, n, m, work):
     column = work.column
     adjoint = work.adjoint
     wash = work.wash
-    mirror = work.mirror
+    spare = work.spare
     for j in range(n):
         for k in range(m):
-            s = 0.0
-            if j != i:
-                s = inner(mirror, i * n + j, m - 1 - k, work.source, i, m)
-            column[0][j * m + k] = s
+            wash[j][k] = 0.0
+        if j != i:
+            add_wash(wash, j, work.mirror, i * n + j, work.source, i, m)
+        for k in range(m):
+            column[0][j * m + k] = wash[j][k]
     substitute_transposed(work.dense, work.pivots, column, 0, n * m)
     for j in range(n):
         for k in range(m):
             wash[j][k] = column[0][j * m + k]
+            spare[0][k] = 0.0
+        add_product(spare, 0, work.response, wash, j, m)
         for k in range(m):
-            own = work.source[i][k] if j == i else 0.0
-            adjoint[j][k] = own - inner(work.response, k, 0, wash, j, m)
+            adjoint[j][k] = (work.source[i][k] if j == i else 0.0) - spare[0][k]
 
 
-def bilinear(weights, i, slopes, row, circulation, j, m):
-    """Sum over control points k and segments e of weights[i][k] slopes[row][e - k] circulation[j][e]."""
+def bilinear(weights, i, slopes, row, circulation, j, m, spare):
+    """What the circulations of wing j induce by one row of slopes, weighted over the control points of wing i."""
+    for k in range(m):
+        spare[0][k] = 0.0
+    add_wash(spare, 0, slopes, row, circulation, j, m)
     s = 0.0
     for k in range(m):
-        s = s + weights[i][k] * inner(slopes, row, m - 1 - k, circulation, j, m)
+        s = s + weights[i][k] * spare[0][k]
     return s
 
 
@@ -207,6 +218,7 @@ def analytic(i, n, work, wing, frozen):
     flat = level(i, n, work)
     circulation = work.circulation
     slopes = work.slopes
+    spare = work.spare
     gx = 0.0
     gy = 0.0
     gz = 0.0
@@ -217,20 +229,20 @@ def analytic(i, n, work, wing, frozen):
         if j != i:
             row = 3 * (i * n + j)
             if frozen > 0.5:
-                gx = gx + bilinear(work.source, i, slopes, row, circulation, j, m)
-                gy = gy + bilinear(work.source, i, slopes, row + 1, circulation, j, m)
+                gx = gx + bilinear(work.source, i, slopes, row, circulation, j, m, spare)
+                gy = gy + bilinear(work.source, i, slopes, row + 1, circulation, j, m, spare)
                 if not flat:
-                    gz = gz + bilinear(work.source, i, slopes, row + 2, circulation, j, m)
+                    gz = gz + bilinear(work.source, i, slopes, row + 2, circulation, j, m, spare)
             else:
                 adjoint = work.adjoint
-                gx = gx + bilinear(adjoint, i, slopes, row, circulation, j, m)
-                gy = gy + bilinear(adjoint, i, slopes, row + 1, circulation, j, m)
+                gx = gx + bilinear(adjoint, i, slopes, row, circulation, j, m, spare)
+                gy = gy + bilinear(adjoint, i, slopes, row + 1, circulation, j, m, spare)
                 row = 3 * (j * n + i)
-                gx = gx - bilinear(adjoint, j, slopes, row, circulation, i, m)
-                gy = gy - bilinear(adjoint, j, slopes, row + 1, circulation, i, m)
+                gx = gx - bilinear(adjoint, j, slopes, row, circulation, i, m, spare)
+                gy = gy - bilinear(adjoint, j, slopes, row + 1, circulation, i, m, spare)
                 if not flat:
-                    gz = gz - bilinear(adjoint, j, slopes, row + 2, circulation, i, m)
+                    gz = gz - bilinear(adjoint, j, slopes, row + 2, circulation, i, m, spare)
                     row = 3 * (i * n + j)
-                    gz = gz + bilinear(adjoint, i, slopes, row + 2, circulation, j, m)
+                    gz = gz + bilinear(adjoint, i, slopes, row + 2, circulation, j, m, spare)
     f = wing.density * pitch(wing)
     return f * gx, f * gy, f * gz

@@ -12,8 +12,8 @@ Dimock & Selig 2003, Eqs 5-7; theory after Katz and Plotkin, Low-Speed Aerodynam
 from typing import NamedTuple
 
 from airflock.aero.elimination import factorise, invert_definite, substitute
-from airflock.aero.filaments import influences
-from airflock.aero.wing import circulation_sum, pitch, segments_of, stiffness
+from airflock.aero.filaments import add_product, add_wash, influences
+from airflock.aero.wing import apart, circulation_sum, lanes, pitch, segments_of, shift, stiffness
 from airflock.core.maths import FAR
 
 SWEEPS = 60  # over all wings, before the dense system is factorised; flocks without overlap need three to eight
@@ -22,16 +22,19 @@ SWEEPS = 60  # over all wings, before the dense system is factorised; flocks wit
 class Work(NamedTuple):
     """Scratch of one flock of n wings with m segments, kept from one call to the next.
 
+    Columns of sources are filled up with zeros to w = lanes(m).
+
     place       : (3, n) where the aerodynamics sees the wings, m
-    alone       : (3, m) circulation without wash; its share per sum of 1; [2][0] is 1 once all this is prepared,
+    alone       : (3, w) circulation without wash; its share per sum of 1; [2][0] is 1 once all this is prepared,
                   [2][1] the sum of a wing's response to one radian
-    response    : (m, m) change of circulation per wash, m
+    response    : (w, m) change of circulation per wash, m
     square      : (m, 2 m) for the self block and its inverse
-    tables      : (n n, 2 m) influence of wing j on wing i in row i n + j, 1/m
-    circulation : (n, m) m²/s; wash : (n, m) downwash of all other wings, m/s
-    kept, trial : (2 n + 1, 2 m) and (n, m) while one wing is moved to see what its drag would be
-    slopes      : (3 n n, 2 m) derivatives of the tables; mirror : (n n, 2 m) the tables backwards
-    adjoint     : (n, m) sensitivity of one wing's drag to all washes; source : (n, m) its own part
+    tables      : (n n, m + w) influence of wing j on wing i in row i n + j, 1/m
+    circulation : (n, w) m²/s; wash : (n, w) downwash of all other wings, m/s
+    spare       : (1, m) any product
+    kept, trial : (2 n + 1, m + w) and (n, w) while one wing is moved to see what its drag would be
+    slopes      : (3 n n, m + w) derivatives of the tables; mirror : (n n, m + w) the tables backwards
+    adjoint     : (n, w) sensitivity of one wing's drag to all washes; source : (n, w) its own part
     dense       : (n m, n m) factors; pivots, column : (1, n m); touched only where sweeps do not settle
     """
 
@@ -42,6 +45,7 @@ class Work(NamedTuple):
     tables: object
     circulation: object
     wash: object
+    spare: object
     kept: object
     trial: object
     slopes: object
@@ -55,13 +59,14 @@ class Work(NamedTuple):
 
 def shapes(n, m, gradient):
     """Shapes (rows, columns) of the scratch; gradient: "none", "cells" or "analytic"."""
+    w = lanes(m)
     cells = gradient == "cells"
     slope = gradient == "analytic"
     return Work(
-        place=(3, n), alone=(3, m), response=(m, m), square=(m, 2 * m), tables=(n * n, 2 * m), circulation=(n, m),
-        wash=(n, m), kept=(2 * n + 1 if cells else 1, 2 * m), trial=(n, m),
-        slopes=(3 * n * n if slope else 1, 2 * m), mirror=(n * n if slope else 1, 2 * m),
-        adjoint=(n if slope else 1, m), source=(n if slope else 1, m),
+        place=(3, n), alone=(3, w), response=(w, m), square=(m, 2 * m), tables=(n * n, m + w), circulation=(n, w),
+        wash=(n, w), spare=(1, m), kept=(2 * n + 1 if cells else 1, m + w), trial=(n, w),
+        slopes=(3 * n * n if slope else 1, m + w), mirror=(n * n if slope else 1, m + w),
+        adjoint=(n if slope else 1, w), source=(n if slope else 1, w),
         dense=(n * m, n * m), pivots=(1, n * m), column=(1, n * m),
     )  # fmt: skip
 
@@ -73,10 +78,11 @@ def prepare(work, wing):
     alone = work.alone
     response = work.response
     kept = work.kept
+    first = shift(m)
     influences(kept, 0, 0.0, 0.0, 0.0, m, pitch(wing), 0.0)
     for i in range(m):
         for j in range(m):
-            square[i][j] = kept[0][j - i + m - 1] / wing.speed
+            square[i][j] = kept[0][i - j + first] / wing.speed
         square[i][i] = square[i][i] + 1.0 / stiffness(wing)
     invert_definite(square, m)
     total = 0.0
@@ -114,36 +120,30 @@ def meet(n, i, work, wing):
     for j in range(n):
         if j != i:
             influences(
-                work.tables, i * n + j, place[0][i] - place[0][j], place[1][i] - place[1][j],
-                place[2][i] - place[2][j], segments_of(wing), pitch(wing), core * core,
+                work.tables, i * n + j, apart(place[0][i], place[0][j], wing), apart(place[1][i], place[1][j], wing),
+                apart(place[2][i], place[2][j], wing), segments_of(wing), pitch(wing), core * core,
             )  # fmt: skip
-
-
-def inner(a, row, first, b, j, m):
-    """Sum over m columns of a[row][first + e] b[j][e]."""
-    s = 0.0
-    for e in range(m):
-        s = s + a[row][first + e] * b[j][e]
-    return s
 
 
 def wash_on(i, n, m, tables, circulation, wash):
     """Downwash of all other wings on wing i, m/s, from their circulations."""
     for k in range(m):
-        s = 0.0
-        for j in range(n):
-            if j != i:
-                s = s + inner(tables, i * n + j, m - 1 - k, circulation, j, m)
-        wash[i][k] = s
+        wash[i][k] = 0.0
+    for j in range(n):
+        if j != i:
+            add_wash(wash, i, tables, i * n + j, circulation, j, m)
 
 
 def carry(i, m, work, circulation):
     """Circulation of wing i in its wash, with lift equal to weight; returns the largest change, m²/s."""
-    wash = work.wash
+    spare = work.spare
     alone = work.alone
+    for k in range(m):
+        spare[0][k] = 0.0
+    add_product(spare, 0, work.response, work.wash, i, m)
     change = 0.0
     for k in range(m):
-        fresh = alone[0][k] - inner(work.response, k, 0, wash, i, m)
+        fresh = alone[0][k] - spare[0][k]
         change = max(change, abs(fresh - circulation[i][k]))
         circulation[i][k] = fresh
     return change
@@ -172,14 +172,15 @@ def assemble(n, m, work):
     dense = work.dense
     response = work.response
     tables = work.tables
+    last = shift(m)
     for i in range(n):
         for j in range(n):
             for k in range(m):
                 for e in range(m):
                     s = 0.0
                     if i != j:
-                        for c in range(m):
-                            s = s + response[k][c] * tables[i * n + j][e - c + m - 1]
+                        for first in range(m):
+                            s = s + response[k][first] * tables[i * n + j][first - e + last]
                     elif k == e:
                         s = 1.0
                     dense[i * m + k][j * m + e] = s
@@ -203,7 +204,10 @@ def spread(n, m, work, circulation):
 def angle_of_attack(i, work, wing):
     """Angle of attack of wing i from its zero-lift line at which lift is weight, rad."""
     m = segments_of(wing)
-    return circulation_sum(wing) / work.alone[2][1] + inner(work.alone, 1, 0, work.wash, i, m) / wing.speed
+    s = 0.0
+    for k in range(m):
+        s = s + work.alone[1][k] * work.wash[i][k]
+    return circulation_sum(wing) / work.alone[2][1] + s / wing.speed
 
 
 def induced_drag(i, work, circulation, wing):

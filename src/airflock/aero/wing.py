@@ -78,10 +78,32 @@ def segments_of(wing):
     return 80
 
 
+def lanes(m):
+    """Places for m segments as sources, taken four at a time: the last few may be zeros."""
+    return 4 * ((m + 3) // 4)
+
+
+def shift(m):
+    """Column of a row of influences that holds the influence of a segment on its own control point: lanes(m) - 1."""
+    return 4 * ((m + 3) // 4) - 1
+
+
 def pitch(wing):
     """Distance of two filaments, m: the paper's delta y; with a tip inset the span is m + 1/2 of them."""
     m = segments_of(wing)
     return wing.span / (float(m) + 0.5 if wing.layout == "inset" else float(m))
+
+
+def rounded(s, h):
+    """The nearest multiple of h; both m."""
+    return h * float(math.floor(s / h + 0.5))
+
+
+def apart(s, other, wing):
+    """Offset s - other, m; on the grid an exact multiple of the pitch, so that wings side by side are exactly so."""
+    if wing.positions == "grid":
+        return rounded(s - other, pitch(wing))
+    return s - other
 
 
 def stiffness(wing):

@@ -27,6 +27,9 @@ def evolve(
     timeout: Annotated[
         float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
     ] = None,
+    sensitivity: Annotated[
+        str, typer.Option(metavar="METHOD", help="Also which parameters matter: sobol or morris.", show_default=False)
+    ] = "",
     device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu.")] = "cpu",
     changes: options.Set = None,
     agents: options.Agents = None,
@@ -43,6 +46,7 @@ def evolve(
     from airflock.evolve.folder import open_folder
     from airflock.evolve.run import executor_for, run, study_of
     from airflock.evolve.search import total_flights
+    from airflock.evolve.sensitivity import METHODS
 
     given = {
         "algorithm": algorithm,
@@ -57,13 +61,15 @@ def evolve(
         options.settings(changes, agents, duration),
         search_keys={key: value for key, value in given.items() if value is not None},
     )
+    if sensitivity and sensitivity not in METHODS:
+        raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
     if device != "cpu":
         raise StudyError(f"--device {device}: studies fly on the cpu in this version")
     open_folder(out, study, resume=resume)
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
     with _progress(study, total_flights(study), quiet or as_json) as (watch, note):
-        result = run(study, out, executor, watch, note)
+        result = run(study, out, executor, watch, note, sensitivity=sensitivity)
     if as_json:
         tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
@@ -81,7 +87,10 @@ def _progress(study: Any, total: int, quiet: bool) -> Iterator[tuple[Any, Callab
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from airflock.evolve.race import ROUNDS
+
     finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
     shape = (
         TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.percentage:>3.0f} %"),
         TextColumn("{task.fields[rate]:.1f} flights/s"), TimeRemainingColumn(),

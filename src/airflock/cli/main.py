@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import evolve, inspect, look, paper, run, sweep
+from airflock.cli import evolve, harden, inspect, look, paper, run, sweep
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -41,6 +41,7 @@ app.command("run")(run.run)
 app.command("score")(run.score)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
+app.command("harden")(harden.harden)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("paper")(paper.paper)

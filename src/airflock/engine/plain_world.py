@@ -1,5 +1,6 @@
 """The world of a plain flight: surfaces, edges, rays and casts, goals, and what an agent perceives of them."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -116,10 +117,16 @@ class Course:
     def __init__(self, scenario: Scenario):
         self.given, self.points = scenario.goals, [tuple(map(float, p)) for p in scenario.waypoints()]
         self.number, self.times = 0, [float("nan")] * len(self.points)
+        self.starts: list[Any] = []
+        self.own: list[list[float]] = []
+        self.duration = 0.0
         self.at: tuple[float, float, float] = self.points[0] if self.points else (0.0, 0.0, 0.0)  # type: ignore[assignment]
 
     def advance(self, time: float, elapsed: float, flock: list[State]) -> None:
         """Move the goal on for the flock's centre as it is."""
+        if self.given.kind == "own":
+            self._glide(time, flock)
+            return
         if self.number >= len(self.points):
             return
         g, n = self.given, float(len(flock))
@@ -138,9 +145,22 @@ class Course:
             self.times[self.number] = time
             self.number += 1
 
+    def _glide(self, time: float, flock: list[State]) -> None:
+        """Each agent's own goal on its way."""
+        if time <= 0.0:
+            self.starts = [state[:3] for state in flock]
+            far = max(math.dist(a, b) for a, b in zip(self.starts, self.points, strict=True))
+            self.duration = 1.5 * far / self.given.speed if self.given.speed > 0.0 else 0.0
+        pairs = zip(self.starts, self.points, strict=True)
+        self.own = [[goals.glide(a, b, time, self.duration) for a, b in zip(*pair, strict=True)] for pair in pairs]  # type: ignore[call-arg]
+
+    def of(self, agent: int) -> Any:
+        """Where the goal of an agent is."""
+        return self.own[agent] if self.given.kind == "own" else self.at
+
     def values(self) -> dict[str, Any]:
         """What is reported of it."""
-        if not self.points:
+        if not self.points or self.given.kind == "own":
             return {}
         count = float(len(self.points))
         return {"goals_reached": float(self.number), "goals": count, "time_to_goal": self.times}
@@ -159,7 +179,7 @@ class Senses(Percept):
         cls, place: Place, course: Course, own: State, time: float, seed: int, decision: int, agent: int
     ) -> "Senses":
         """What one agent perceives at one decision."""
-        goal = [a - b for a, b in zip(course.at, own, strict=False)] if course.points else [0.0] * 3
+        goal = [a - b for a, b in zip(course.of(agent), own, strict=False)] if course.points else [0.0] * 3
         found = cls(time, -own.x, -own.y, -own.z, *goal)
         found.rays = 0
         found.place, found.own, found.asker = place, own, (seed, decision, agent)

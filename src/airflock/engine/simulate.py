@@ -13,6 +13,7 @@ from airflock.engine.plan import Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
+from airflock.metrics import fitness_dimock
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
 from airflock.scenarios.scenario import Scenario
@@ -44,18 +45,28 @@ def plan_of(
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
         scene=bool(len(scenario.stands().shapes)),
-        goals=scenario.goals.kind != "none",
-        herd=scenario.goals.kind != "none" and scenario.goals.role == "herd",
+        goals=scenario.goals.kind in ("points", "scene"),
+        herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
+        own=scenario.goals.kind == "own",
         appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
+        stop=scenario.metrics.stop == "collision",
+        wing_choices=_wing_choices(scenario, metrics),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
         record=record,
     )
+
+
+def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
+    """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
+    found = SETS[scenario.metrics.kind] if metrics is None else metrics
+    used = scenario.model.flock is not None or any(metric.survey is not None for metric in found)
+    return tuple(sorted(choices(scenario.wing).items())) if used else ()
 
 
 def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
@@ -163,6 +174,8 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
 
 def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
     """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
+    if scenario.metrics.kind == "dimock":
+        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
     if scenario.metrics.kind != "vasarhelyi":
         return values
     return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
@@ -211,6 +224,11 @@ def score_flights(
 def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
     """A flight in plain Python, yet to be flown."""
     return lambda: finish(scenario, fly(scenario, seed, precision=64, device="python").values)
+
+
+def takes_all_cores(scenario: Scenario) -> bool:
+    """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing."""
+    return _pays(scenario)
 
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores

@@ -1,8 +1,9 @@
 """After the search: who is best when luck is taken out, and which parameters work.
 
 The best of 15,000 noisy evaluations is the luckiest as much as the best. The final mean of each run and the top
-candidates fly again on the same fresh seeds, the winner once more on other fresh seeds for an unbiased score; working
-ranges are those of Table S1: where candidates of the search reached at least the winner's mean.
+candidates (of a race, `airflock.evolve.race`) fly again on the same fresh seeds, the winner once more on other fresh
+seeds for an unbiased score; working ranges are those of Table S1: where candidates of the search reached at least the
+winner's mean.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,11 +16,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import tables
 from airflock.evolve.executors import Executor
 from airflock.evolve.folder import plain, write
 from airflock.evolve.nondominated import front
+from airflock.evolve.race import race
 from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
@@ -98,7 +101,7 @@ def conclude(
     if not len(sound):
         reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
         raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
-    points, origins = finalists(study, store, sound, centres)
+    points, origins = finalists(study, store, executor, sound, centres, note)
     n = study.whole("final_seeds")
     fresh = [study.seed(1, j) for j in range(n)]
     rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
@@ -123,29 +126,43 @@ def conclude(
         len(good), len(table), len(table) - len(sound), shown,
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
-    write(folder / BEST, scenario_document(study, winner, result), "The winner of a study, ready to fly.")
+    write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
     tables.export(store, folder)
     return result
 
 
 def finalists(
-    study: Study, store: Store, sound: pd.DataFrame, centres: Sequence[NDArray[np.float64]]
+    study: Study,
+    store: Store,
+    executor: Executor,
+    sound: pd.DataFrame,
+    centres: Sequence[NDArray[np.float64]],
+    note: Callable[[bool], None] | None = None,
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Points (candidate, axis) that fly again: the mean of each run, then the top of the search or its front."""
-    top = sound
-    if len(study.objectives) > 1:
-        signs = [-1.0 if objective.maximise else 1.0 for objective in study.objectives]
-        known = sound[sound[[o.name for o in study.objectives]].notna().all(axis=1)]
-        losses = known[[o.name for o in study.objectives]].to_numpy() * signs
-        top = known.iloc[front(losses)].sort_values(study.objectives[0].name, kind="stable")
-        spread = np.unique(np.linspace(0, len(top) - 1, min(study.whole("top"), len(top))).round().astype(int))
-        top = top.iloc[spread]
-    top = top.drop_duplicates(list(study.space.keys)).head(study.whole("top"))
-    places = top[["run", "generation", "candidate"]].astype(int).to_numpy().tolist()
-    chosen = [np.array(store.asked(Batch("search", run, g))[i]) for run, g, i in places]
-    if not chosen and not centres:
+    names, top = [objective.name for objective in study.objectives], study.whole("top")
+    signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
+    known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
+    losses = known[names].to_numpy() * signs
+    if len(names) > 1:
+        best = front(losses)
+        best = best[np.argsort(losses[best, 0], kind="stable")]
+        chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
+    elif study.whole("pool") > top > 0:
+        chosen = race(study, store, executor, _points(store, known), losses[:, 0], note)
+    else:
+        chosen = np.arange(min(top, len(known)))
+    if not len(chosen) and not centres:
         raise StudyError("search.top = 0 leaves nobody to fly again; give at least 1")
-    return np.array([*centres, *chosen]), ["mean"] * len(centres) + ["top"] * len(chosen)
+    return np.array([*centres, *_points(store, known.iloc[chosen])]), ["mean"] * len(centres) + ["top"] * len(chosen)
+
+
+def _points(store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
+    """Points (candidate, axis) of candidates of the search, as they were asked for."""
+    pairs = {(int(run), int(g)) for run, g in zip(table["run"], table["generation"], strict=True)}
+    batches = {pair: store.asked(Batch("search", *pair)) for pair in pairs}
+    places = zip(table["run"], table["generation"], table["candidate"], strict=True)
+    return np.array([batches[run, generation][candidate] for run, generation, candidate in places])
 
 
 def _winner(study: Study, rows: Sequence[Sequence[float | None]]) -> int:
@@ -170,10 +187,14 @@ def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
     return mean, sd, mean - half, mean + half
 
 
-def scenario_document(study: Study, parameters: dict[str, float], result: Result) -> dict[str, Any]:
-    """A scenario file with the winner's parameters, each with its source."""
+def scenario_document(study: Study, parameters: dict[str, float], result: Result, folder: Path) -> dict[str, Any]:
+    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along."""
     document = plain(study.scenario.document)
     document.pop("published", None)
+    law = Path(study.scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        atomic.write(folder / law.name, law.read_bytes())
+        document["model"]["kind"] = law.name
     source = f"evolved: {study.search.algorithm}, {result.candidates} evaluations, seed {study.whole('seed')}"
     units = {axis.key: axis.unit for axis in study.space.axes}
     for key, value in parameters.items():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import AirflockError
+from airflock.errors import StudyError
 
 OVER_SEEDS = ("mean", "worst", "quantile")
 Own = Callable[[Mapping[str, Any]], float]  # a fitness of the user's own, from the order parameters of one flight
@@ -20,6 +20,7 @@ class Objective:
 
     name       : an order parameter, or the name of a function of the user's own
     maximise   : False where less is better
+    own, text  : a function of the user's own, and a hash of its text
     over_seeds : mean, worst case, or the value that all but a share `quantile` of the flights reach
     """
 
@@ -28,12 +29,13 @@ class Objective:
     over_seeds: str = "mean"
     quantile: float = 0.1
     own: Own | None = None
+    text: str = ""
 
     def of_flight(self, values: Mapping[str, Any]) -> float:
         """Value of one flight; nan where it is not finite."""
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
-            raise AirflockError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
+            raise StudyError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
         value = float(values[self.name] if self.own is None else self.own(values))
         return value if math.isfinite(value) else math.nan
 

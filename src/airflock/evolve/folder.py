@@ -10,7 +10,6 @@ from typing import Any
 
 from airflock import atomic
 from airflock.errors import StudyError
-from airflock.evolve.store import FILE
 from airflock.evolve.study import Study, same_or_refuse
 
 STUDY = "study.toml"
@@ -30,13 +29,21 @@ def open_folder(folder: Path, study: Study, *, resume: bool) -> None:
         return
     if resume:
         raise StudyError(f"{folder}: holds no study to resume ({STUDY} is missing)")
-    if (folder / FILE).exists() or (folder.is_dir() and any(folder.iterdir())):
+    # hidden files: what a process that was killed had begun to write
+    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
         raise StudyError(f"{folder}: is not empty and holds no {STUDY}; give a new folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write(found, study.document(), "A study of Airflock. Written once, when it began.")
     except OSError as fault:
         raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+
+
+def sweep(folder: Path) -> None:
+    """Remove what a process that was killed had begun to write; only for the one who holds the writer's lock."""
+    for path in folder.glob(".*.*.*"):
+        if path.suffix in (".toml", ".csv", ".parquet", ".png"):
+            path.unlink(missing_ok=True)
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """The table [objective] of a study file: what is better, and the user's own fitness functions."""
 
+import hashlib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import util
@@ -31,7 +32,7 @@ def read_objectives(
     if not isinstance(quantile, (int, float)) or isinstance(quantile, bool) or not 0.0 <= quantile <= 1.0:
         faults.append(f"objective.quantile = {quantile!r} lies outside [0, 1]")
         quantile = 0.1
-    own, more = _own(table.get("own"), folder)
+    own, text, more = _own(table.get("own"), folder)
     faults += more
     found = []
     for key in ("maximise", "minimise"):
@@ -40,24 +41,26 @@ def read_objectives(
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             faults.append(f"objective.{key} = {named!r} is no name and no list of names")
             continue
-        found += [Objective(n, key == "maximise", str(over), float(quantile), own.get(n)) for n in names]
+        how = (key == "maximise", str(over), float(quantile))
+        found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]
     if not found:
         name = USUAL.get(scenario.metrics.kind, "fitness")
-        found = [Objective(name, True, str(over), float(quantile), own.get(name))]
+        found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
     return tuple(found), faults
 
 
-def _own(name: Any, folder: Path | None) -> tuple[dict[str, Own], list[str]]:
-    """Functions of a user's own file, by name."""
+def _own(name: Any, folder: Path | None) -> tuple[dict[str, Own], str, list[str]]:
+    """Functions of a user's own file by name, a hash of its text, and faults."""
     if name is None:
-        return {}, []
+        return {}, "", []
     path = Path(str(name)) if folder is None else folder / str(name)
     spec = util.spec_from_file_location(path.stem, path) if path.suffix == ".py" and path.is_file() else None
     if spec is None or spec.loader is None:
-        return {}, [f"objective.own = {name!r}: no such Python file"]
+        return {}, "", [f"objective.own = {name!r}: no such Python file"]
     module = util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as fault:  # the user's own file may fail in any way
-        return {}, [f"objective.own: {path}: {type(fault).__name__}: {fault}"]
-    return {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}, []
+        return {}, "", [f"objective.own: {path}: {type(fault).__name__}: {fault}"]
+    own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
+    return own, hashlib.sha256(path.read_bytes()).hexdigest()[:12], []

@@ -1,19 +1,23 @@
 """The public door: a study from beginning to end in one folder, begun or continued."""
 
+import hashlib
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve.after import Result, conclude
 from airflock.evolve.executors import Executor, Score
 from airflock.evolve.executors.here import Here
 from airflock.evolve.fitness import Objective, Own
-from airflock.evolve.folder import open_folder, versions
+from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
 from airflock.evolve.search import Watch, search
+from airflock.evolve.sensitivity import METHODS
+from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study
@@ -37,6 +41,7 @@ def evolve(
     threads: int | None = None,
     device: str = "cpu",
     timeout: float | None = None,
+    sensitivity: str = "",
     watch: Watch | None = None,
     **search_keys: Any,
 ) -> Result:
@@ -51,6 +56,7 @@ def evolve(
     scheduler : address of a dask scheduler; by default flights fly in this process, `threads` at a time
     device    : "cpu"
     timeout   : s that a flight may take on a dask worker
+    sensitivity : "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv
     watch     : called with a Progress after each flight
     search_keys : keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
 
@@ -59,11 +65,13 @@ def evolve(
     """
     study = study_of(what, settings, space, objective, fitness, search_keys)
     folder = Path(out)
+    if sensitivity and sensitivity not in METHODS:
+        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
     if device != "cpu":
         raise StudyError(f"device = {device!r}: studies fly on the cpu in this version")
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
-    return run(study, folder, executor, watch)
+    return run(study, folder, executor, watch, sensitivity=sensitivity)
 
 
 def study_of(
@@ -83,8 +91,17 @@ def study_of(
     else:
         study = load_study(what, settings=settings, search=search_keys, tables=tables)
     if fitness is not None:
-        study = replace(study, objectives=(Objective(getattr(fitness, "__name__", "fitness"), own=fitness),))
+        code = getattr(fitness, "__code__", None)
+        text = _text_of(code) if code is not None else ""
+        name = getattr(fitness, "__name__", "fitness")
+        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
     return study
+
+
+def _text_of(code: Any) -> str:
+    """Hash of what a function does, the same in every process."""
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
 def score_of(study: Study) -> Score:
@@ -108,11 +125,12 @@ def executor_for(
 
         return Cluster(study, scheduler, timeout=timeout)
     from airflock.engine import cpu
-    from airflock.engine.simulate import compile_for
+    from airflock.engine.simulate import compile_for, takes_all_cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     compile_for(study.scenario, precision=int(study.search.precision))
-    return Here(score_of(study), threads or cpu.cores())
+    alone = takes_all_cores(study.scenario)
+    return Here(score_of(study), 1 if alone else threads or cpu.cores())
 
 
 def run(
@@ -121,14 +139,20 @@ def run(
     executor: Executor,
     watch: Watch | None = None,
     note: Callable[[bool], None] | None = None,
+    *,
+    sensitivity: str = "",
 ) -> Result:
     """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
     try:
         with Store(folder) as store:
             store.begin(versions())
+            sweep(folder)
             try:
                 centres = search(study, store, executor, watch)
                 result = conclude(study, store, executor, centres, folder, note)
+                if sensitivity:
+                    shares = sensitivities(study, store, executor, method=sensitivity, note=note)
+                    atomic.write(folder / "sensitivity.csv", shares.to_csv(index=False))
             except KeyboardInterrupt as stop:
                 raise Interrupted(
                     f"interrupted: {store.count()} flights of the search are stored in {folder}; continue with --resume"

@@ -40,7 +40,7 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
         if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
             fixed[other] = float(known[other][1] or 0.0)
     space = Space(tuple(axes), fixed, tied)
-    faults += _faults_between(space, known)
+    faults += _faults_between(space, known, bool(faults))
     return (None if faults else space), faults
 
 
@@ -109,7 +109,7 @@ def _range_faults(axis: Axis) -> list[str]:
     return []
 
 
-def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | None]]) -> list[str]:
+def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
     """Ties and orders that cannot hold."""
     faults = []
     axes = {axis.key: axis for axis in space.axes}
@@ -137,6 +137,6 @@ def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | No
                 faults.append(
                     f"space.{key} = {value:g} {how.unit} at {tie.of} = {end:g} lies outside [{how.low:g}, {how.high:g}]"
                 )
-    if not space.axes and not faults:
+    if not space.axes and not told:
         faults.append("space: nothing varies; give at least one key low and high")
     return faults

@@ -104,7 +104,7 @@ class Store:
     def ask(self, batch: Batch, points: Sequence[Sequence[float]], parameters: Sequence[Mapping[str, float]]) -> None:
         """Store candidates, all of a batch at once; a candidate that is there already stays."""
         rows = [
-            (*batch, i, json.dumps([float(x) for x in point]), json.dumps(dict(values)))
+            (*batch, i, _encode([float(x) for x in point]), _encode(dict(values)))
             for i, (point, values) in enumerate(zip(points, parameters, strict=True))
         ]
         self._many(
@@ -161,7 +161,8 @@ class Store:
                 self.connection.executemany(sql, rows)
                 self.connection.execute("COMMIT")
             except BaseException:
-                self.connection.execute("ROLLBACK")
+                if self.connection.in_transaction:  # a full disk has ended it already
+                    self.connection.execute("ROLLBACK")
                 raise
 
 
@@ -189,8 +190,14 @@ def plain_faults(path: Path) -> Iterator[None]:
         raise StudyError(f"{path}: {fault}; what was stored before is kept") from fault
 
 
+_encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
+
+
 def _text(values: Mapping[str, Any]) -> str:
-    return json.dumps(_finite(values), separators=(",", ":"))
+    try:
+        return _encode(values)
+    except (ValueError, TypeError):  # not finite, or no plain number
+        return _encode(_finite(values))
 
 
 def _finite(value: Any) -> Any:

@@ -64,6 +64,9 @@ class Search(Record):
     seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
     precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
     top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
+    pool: float = quantity(
+        200, "1", low=0, high=1e6, source="our choice", meaning="candidates that race for the top; 0: the luckiest win"
+    )
     final_seeds: float = quantity(
         100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"
     )
@@ -110,6 +113,7 @@ class Study:
                     "maximise": o.maximise,
                     "over_seeds": o.over_seeds,
                     "quantile": o.quantile,
+                    **({"own": o.text} if o.own else {}),
                 }
                 for o in self.objectives
             ],
@@ -207,7 +211,7 @@ def _scenario(document: Mapping[str, Any], where: str, settings: Mapping[str, An
 def _search_faults(search: Search, objectives: int) -> list[str]:
     faults = [
         f"search.{name} = {value:g} is not a whole number"
-        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "final_seeds")
+        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds")
         if (value := getattr(search, name)) != int(value)
     ]
     if search.algorithm in SEVERAL and objectives < 2:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from airflock.errors import SceneError
 from airflock.scenes.city import buildings, half_side
 from airflock.scenes.forest import trees
-from airflock.scenes.tree import TALL, Scene, ground, scene, segments
+from airflock.scenes.tree import TALL, Scene, boxes, ground, scene, segments
 from airflock.world import bvh, goals, scenery
 from airflock.world.shapes import APPEARS, BOX, CYLINDER
 
@@ -32,6 +32,10 @@ def scene_of(p: scenery.Parameters, dimensions: int, polygons: Polygons = ()) ->
         from airflock.scenes.meshes import load_mesh
 
         rows, notes = load_mesh(p, dimensions)
+    elif p.kind == "boxes":
+        given = np.array(p.boxes, float).reshape(-1, 7)
+        rows = boxes(given[:, :6])
+        rows[:, APPEARS] = given[:, 6]
     else:
         rows = buildings(p) if p.kind == "city" else trees(p)
         rows[:, APPEARS] = appearances(p, len(rows))
@@ -67,7 +71,7 @@ def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> ND
     """
     if g.kind == "none":
         return np.zeros((0, 3))
-    if g.kind == "points":
+    if g.kind in ("points", "own"):
         found = np.array(g.points, float).reshape(-1, 3)
         return found * (1.0, 1.0, 0.0) if dimensions == 2 else found
     place = scene_of(p, dimensions)

@@ -16,7 +16,10 @@ class Parameters(Record):
     """Where a flock shall go. A goal is reached when the flock's centre is within `radius`; then the next counts."""
 
     kind: str = choice(
-        "none", ("none", "points", "scene"), meaning="no goal, given points, or free points of the scene"
+        "none",
+        ("none", "points", "scene", "own"),
+        meaning="no goal, given points, free points of the scene; or to each agent a point of its own, all under way "
+        "for the same time",
     )
     points: tuple[tuple[float, ...], ...] = points("m", 2, axes=3, meaning="goals in their order, [east, north, up]")
     count: float = quantity(5, "1", low=1, high=1000, source=OURS, meaning="free points of the scene, a whole number")
@@ -64,6 +67,16 @@ class Aim(NamedTuple):
     y: float
     z: float
     reached: float
+
+
+def glide(a, b, time, duration):
+    """Coordinate (m) of an agent's own goal on its way from a to b, at rest at both ends (a cubic in time).
+
+    All agents take the same time: then straight ways of an assignment with the least sum of squared lengths keep the
+    agents apart (Turpin, Michael and Kumar 2014).
+    """
+    u = min(time / max(duration, 1e-6), 1.0)
+    return a + (b - a) * u * u * (3.0 - 2.0 * u)
 
 
 def pursue(x, y, z, wx, wy, wz, cx, cy, cz, radius, travel):

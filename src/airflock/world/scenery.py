@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity, text
+from airflock.core.parameters import choice, points, quantity, text
 
 OURS = "our choice; the thesis's scenes are not available"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """A city or a forest made from a seed, or a mesh from a file. The ground is at height 0."""
+    """A city or a forest made from a seed, a mesh from a file, or given boxes. The ground is at height 0."""
 
-    kind: str = choice("none", ("none", "city", "forest", "mesh"), meaning="what stands in the world")
+    kind: str = choice("none", ("none", "city", "forest", "mesh", "boxes"), meaning="what stands in the world")
     seed: float = quantity(0, "1", low=0, high=2**31, meaning="seed of the city or forest, a whole number")
     density: float = quantity(
         1.0, "1", low=0.0, high=5.0, source=OURS, meaning="share of the blocks or trees that stand"
@@ -32,6 +32,9 @@ class Parameters(Record):
     )
     later_until: float = quantity(
         60.0, "s", low=0.0, high=1e6, source=OURS, meaning="by when: each at a time that the seed draws"
+    )
+    boxes: tuple[tuple[float, ...], ...] = points(
+        "m and s", 2, axes=7, meaning="boxes: lowest and highest corner, and when it appears: [x, y, z, x, y, z, time]"
     )
     file: str = text(meaning="mesh: file of triangles (glTF, OBJ, STL and others), beside the scenario or absolute")
     unit: float = quantity(1.0, "m", low=1e-6, high=1e6, meaning="mesh: length of one unit of the file")

@@ -20,7 +20,9 @@ def values(build: Builder) -> str:
     """What agent i at its measured position puts into that record."""
     axes, plan = build.plan.axes, build.plan
     position = ", ".join(f"-m{a}[i]" if a in axes else "ZERO" for a in "xyz")
-    goal = ", ".join(f"aim[{c}] - m{a}[i]" if plan.goals and a in axes else "ZERO" for c, a in enumerate("xyz"))
+    aims = [f"goal_{a}[i]" if plan.own else f"aim[{c}]" for c, a in enumerate("xyz")]
+    known = axes if plan.goals or plan.own else ()
+    goal = ", ".join(f"{aim} - m{a}[i]" if a in known else "ZERO" for aim, a in zip(aims, "xyz", strict=True))
     casts = scene.carried(build)
     return ", ".join(["time", position, goal, REST, *casts])
 

@@ -31,8 +31,13 @@ _compiling = Lock()
 class Cluster:
     """Workers of a dask scheduler."""
 
-    def __init__(self, study: Study, address: str, *, timeout: float | None = None, task: Any = None):
-        """Connect. `timeout`: s for one flight; `task`: what is run on a worker instead of a flight, for tests.
+    def __init__(
+        self, study: Study, address: str, *, timeout: float | None = None, task: Any = None, answer: float = ANSWER
+    ):
+        """Connect.
+
+        timeout : s that one flight may take; answer : s to wait for the scheduler
+        task    : what is run on a worker instead of a flight, for tests
 
         Raises StudyError if nobody answers at the address, or nobody works there.
         """
@@ -42,13 +47,13 @@ class Cluster:
             raise StudyError("--scheduler needs the package distributed: pip install 'airflock[cluster]'") from fault
         self.task, self.timeout = task or Task.of(study), timeout
         try:
-            self.client: Any = Client(address, timeout=ANSWER, set_as_default=False)
-            self.client.wait_for_workers(1, timeout=ANSWER)
+            self.client: Any = Client(address, timeout=answer, set_as_default=False)
+            self.client.wait_for_workers(1, timeout=answer)
         except Exception as fault:  # whatever the network and its libraries raise
             reason = "has no workers" if hasattr(self, "client") else "does not answer"
             if hasattr(self, "client"):
                 self.client.close()
-            raise StudyError(f"--scheduler {address}: {reason} ({ANSWER:g} s waited)") from fault
+            raise StudyError(f"--scheduler {address}: {reason} ({answer:g} s waited)") from fault
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
@@ -69,14 +74,15 @@ class Cluster:
         out: dict[Any, tuple[Flight, float]] = {}
         try:
             while waiting or out:
-                threads = max(sum(self.client.nthreads().values()), 1)
+                threads = max(sum(self._answered().values()), 1)
                 while waiting and len(out) < threads * (1 if self.timeout else AHEAD):
                     flight = waiting.pop()
                     # impure: equal flights are equal anyway, and dask must not forget or share one
                     future = self.client.submit(self.task, dict(flight.parameters), flight.seed, pure=False)
                     out[future] = flight, time.monotonic()
                 try:
-                    over = wait(list(out), timeout=0.2, return_when="FIRST_COMPLETED").done
+                    with self.client.as_current():
+                        over = wait(list(out), timeout=0.2, return_when="FIRST_COMPLETED").done
                 except TimeoutError:
                     over = set()
                 for future in over:
@@ -89,6 +95,15 @@ class Cluster:
                 yield from self._late(out, waiting, tries)
         finally:
             self.client.cancel(list(out), force=True)
+
+    def _answered(self) -> dict[str, int]:
+        """Threads of each worker; StudyError once the scheduler has gone."""
+        try:
+            return dict(self.client.nthreads())
+        except Exception as fault:  # whatever the network raises
+            raise StudyError(
+                "the scheduler answers no more; what has landed is stored, continue with --resume"
+            ) from fault
 
     def _landed(self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]) -> Landed | None:
         """The outcome of a task that is over; None if it has to fly again."""

@@ -142,8 +142,8 @@ def _average(flown: Flown, scene: str, ours: float) -> str:
     by_n = flown.most.loc[scene].groupby(level=0)[["n_env_coll", "goals_reached"]].mean()
     told = ", ".join(f"N = {n}: {row.n_env_coll:.3g} and {row.goals_reached:.3g}" for n, row in by_n.iterrows())
     return (
-        f"{ours:.3g} against {worst:.3g} of scheme 2: separation and cohesion still bend the free ray in the average "
-        f"of the top N = 3. Collisions and goals reached a minute by N, which the thesis leaves open: {told}"
+        f"{ours:.3g} against {worst:.3g} of scheme 2: separation and cohesion still bend the free ray in the mean of "
+        f"the top N = 3. Collisions and goals reached a minute by N, which the thesis leaves open: {told}"
     )
 
 
