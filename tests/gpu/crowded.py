@@ -16,7 +16,7 @@ from airflock.engine.simulate import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
 
 COMMON = {"update": "synchronous", "metrics.kind": "order", "start.kind": "arena", "start.separation": 0.0,
-          "start.speed": 0.2, "dt": 0.05, "duration": 0.4, "metrics.period": 0.2, "agents": 25}  # fmt: skip
+          "start.speed": 0.2, "dt": 0.05, "duration": 0.3, "metrics.period": 0.15, "agents": 20}  # fmt: skip
 CASES = {
     "periodic": ("zapotecatl_2016/literal", {
         "world.edges": "periodic", "world.arena": "square", "world.side": 2.2, "world.height": 2.2,

@@ -131,7 +131,10 @@ class CudaBuilder(Builder):
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
-        return [line.replace("ring[", "past[") for line in lines] if name in ("snapshot", "perceive") else lines
+        if name in ("snapshot", "perceive"):
+            return [line.replace("ring[", "past[") for line in lines]
+        shared = self.shape.registers and self.shape.per_agent > 1
+        return shared_noise(lines) if name == "move" and shared else lines
 
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
@@ -177,6 +180,20 @@ class CudaBuilder(Builder):
     def bound_rows(self, read: set[str]) -> set[str]:
         """Rows of the table that a stage takes by name."""
         return {name for name in read if name in self.bound}
+
+
+def shared_noise(lines: list[str]) -> list[str]:
+    """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
+    found = []
+    for line in lines:
+        if line == "if step % 2 == 0:":
+            found += ["if step % (2 * PER_AGENT) == 0:"]
+        elif line.endswith(" if step % 2 == 0 else g2") or line.endswith(" if step % 2 == 0 else g3"):
+            name = line.partition(" = ")[0]
+            found += [line, f"{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"]
+        else:
+            found += [line.replace("(i, step // 2,", "(i, step // 2 + sub,")]
+    return found
 
 
 class _Renamed(ast.NodeTransformer):
