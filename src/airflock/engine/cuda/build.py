@@ -9,8 +9,9 @@ from textwrap import indent
 
 from airflock.core.contract import Metric
 from airflock.engine.cuda.clusters import clusters
-from airflock.engine.cuda.lower import Context, lowered, parse, used
+from airflock.engine.cuda.lower import lowered, used
 from airflock.engine.cuda.primitives import head
+from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder
 from airflock.engine.plan import Plan
