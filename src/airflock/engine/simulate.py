@@ -101,7 +101,7 @@ def fly(
         inside = start_inside(scenario, start) if plan.scene else ""
         if inside:
             raise FlightError(f"{scenario.name}: {inside}")
-    chosen = picked([scenario], device, precision=precision, say=say)
+    chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
 
@@ -115,8 +115,13 @@ def picked(
     """Device on which these flights run: the one that is named if it can fly them, else what `auto` picks."""
     if device == "cpu":
         return device
-    plans = dict.fromkeys(plan_of(scenario, precision=precision) for scenario in scenarios)
-    choice = devices.choose(device, scenarios, list(plans))
+    return _choice(device, scenarios, [plan_of(scenario, precision=precision) for scenario in scenarios], say)
+
+
+def _choice(
+    device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan], say: Callable[[str], None] | None
+) -> str:
+    choice = devices.choose(device, scenarios, list(dict.fromkeys(plans)))
     if say is not None and choice.note:
         say(choice.note)
     return choice.device
@@ -205,9 +210,9 @@ def score_flights(
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
     if device != "cpu":
-        device = picked(scenarios, device, precision=precision, say=say)
+        plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
+        device = _choice(device, scenarios, plans, say)
         if device == "cuda":
-            plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
             flown = devices.fly_on_gpu(scenarios, plans, seeds, None, done)
             together = zip(scenarios, seeds, flown, strict=True)
             return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
