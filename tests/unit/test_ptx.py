@@ -11,10 +11,9 @@ from airflock.scenarios.files import load, presets
 pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
 
 CAPABILITIES = ((8, 0), (9, 0))
-# One preset per kernel: the others of a publication differ in numbers only (test_presets_share_these_kernels).
+# One preset per publication: the others differ in numbers or in which perturbations are on. Threads of one of them.
 KERNELS = {
-    "vasarhelyi_2018/4ms": {},
-    "vasarhelyi_2018/real_4ms": {},
+    "vasarhelyi_2018/4ms": {"per_agent": 4, "threads": 512},
     "viragh_2014/4ms": {},
     "couzin_2002/torus": {},
     "vicsek_1995/ordered": {},
@@ -41,23 +40,14 @@ def doubles(text):
 def test_ptx_of_every_model(name):
     from airflock.engine.cuda.compiled import ptx
 
-    driver, plan = driver_of(name)
+    driver, plan = driver_of(name, **KERNELS[name])
     for (major, minor), text in ptx(driver, plan.bits, CAPABILITIES).items():
         assert f".target sm_{major}{minor}" in text
         assert ".entry" in text
         assert doubles(text) == []  # one double literal would cost a GPU half its speed
         assert "call.uni" not in text  # everything is inlined
-
-
-@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms"])
-def test_ptx_pair_loop_reads_whole_vectors(name):
-    """A neighbour as heard is one load of four numbers, not four loads."""
-    from airflock.engine.cuda.compiled import ptx
-
-    driver, plan = driver_of(name, per_agent=4, threads=512)
-    text = ptx(driver, plan.bits, ((9, 0),))[9, 0]
-    assert "ld.shared.v4.f32" in text
-    assert doubles(text) == []
+        if name.startswith("vasarhelyi"):
+            assert "ld.shared.v4.f32" in text  # a neighbour as heard is one load of four numbers
 
 
 def test_every_shipped_model_has_a_kernel_here():

@@ -16,6 +16,8 @@ from airflock.core import random as random_streams
 from airflock.engine import law
 from airflock.errors import RuleError
 
+# A solver is called from several places and would be compiled as often: minutes instead of seconds.
+ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True)'
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -82,7 +84,15 @@ class Source:
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
         decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
+        if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
+            decorator = ALONE
         return f"{decorator}\n{ast.unparse(rewritten)}"
+
+
+def _depth(node: ast.AST) -> int:
+    """How many loops of a function lie inside each other."""
+    inner = max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
+    return inner + isinstance(node, (ast.For, ast.While))
 
 
 class _Rewrite(ast.NodeTransformer):

@@ -7,6 +7,7 @@ from airflock.metrics import (
     correlation,
     environment,
     excursion,
+    fitness_dimock,
     fitness_vasarhelyi,
     flocked,
     groups,
@@ -18,6 +19,7 @@ from airflock.metrics import (
     rotation,
     shape,
     speed,
+    steadiness,
     swarms,
 )
 
@@ -29,7 +31,7 @@ ZAPOTECATL = (metric(quality), metric(polarisation))
 KIDGER = tuple(
     metric(module) for module in (flocked, swarms, polarisation, nearest, collisions, environment, avoidance, speed)
 )
-DIMOCK = (metric(power), metric(collisions))
+DIMOCK = (metric(power), metric(steadiness), metric(collisions))
 SETS: dict[str, tuple[Metric, ...]] = {
     "vasarhelyi": STANDARD,
     "zapotecatl": ZAPOTECATL,
@@ -49,6 +51,7 @@ GOALS = {
 # of every order parameter that is reported: its unit and what it means, from the modules that define them
 REPORTS: dict[str, tuple[str, str]] = (
     {name: about for found in SETS.values() for each in found for name, about in each.reports.items()}
+    | fitness_dimock.REPORTS
     | fitness_vasarhelyi.REPORTS
     | GOALS
 )

@@ -28,7 +28,7 @@ def trouble() -> str | None:
         return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it only serves tests"
     try:
         if not cuda.is_available():
-            return f"no usable CUDA driver or no GPU: {_driver_fault()}"
+            return f"no GPU can be used: {_driver_fault()}"
         cuda.get_current_device()
     except Exception as fault:  # the driver's own faults come in many types
         return f"the GPU cannot be used: {_first_line(fault)}"
@@ -37,16 +37,13 @@ def trouble() -> str | None:
 
 def _driver_fault() -> str:
     """What the driver says."""
-    try:
-        import_module("numba.cuda.cudadrv.driver").driver.ensure_initialized()
-    except Exception as fault:
-        return _first_line(fault)
-    return "no device found"
+    fault = runtime().cuda_error()
+    return _first_line(fault) if fault else "no device found"
 
 
-def _first_line(fault: BaseException) -> str:
+def _first_line(fault: BaseException | str) -> str:
     lines = [line.strip(" .:-") for line in str(fault).splitlines() if line.strip(" .:-")]
-    return lines[-1] if lines else type(fault).__name__
+    return lines[0] if lines else type(fault).__name__
 
 
 def simulating() -> bool:

@@ -48,7 +48,7 @@ def fly_many(
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
-    results: dict[int, Flown] = {}
+    flown_by: dict[int, Flown] = {}
     for key, members in groups.items():
         layout = shape or shape_of(key[0], len(members), multiprocessors(), sequential=plan.sequential)
         driver = flight_driver(plan, layout)
@@ -58,10 +58,10 @@ def fly_many(
             given = None if starts is None else [starts[m] for m in batch]
             flown = _fly(plan, driver, layout, [jobs[m] for m in batch], given)
             for member, result in zip(batch, flown, strict=True):
-                results[member] = result
+                flown_by[member] = result
                 if done:
                     done()
-    return [results[number] for number in range(len(jobs))]
+    return [flown_by[number] for number in range(len(jobs))]
 
 
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
@@ -126,6 +126,15 @@ def _fly(
     plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
 ) -> list[Flown]:
     """One launch."""
+    own = arrays(plan, driver, shape, jobs, starts)
+    driver.fly[len(jobs), shape.threads](*(own[name] for name in ARGUMENTS))
+    return results(plan, jobs, own)
+
+
+def arrays(
+    plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
+) -> dict[str, Any]:
+    """All arguments of a kernel, in the GPU's memory, by name."""
     cuda, real = runtime(), jobs[0].row.dtype
     sizes = _sizes(plan, driver, shape, jobs)
     written = ("pasts", "works", "states", "all_sums", "all_frames")
@@ -148,31 +157,34 @@ def _fly(
         "all_edges": _padded([t.edges for t in jobs]),
         "all_spans": _padded([t.spans for t in jobs]),
         "all_goals": _padded([t.goals for t in jobs]),
-        # one scene for all flocks, or one of its own for each where some of it appears while flying
-        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
+        # a scene of its own for each flock where something stands: some of it may appear while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if plan.scene else jobs[:1])]),
         "all_later": _padded([t.later for t in jobs]),
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
     }
     own |= {name: cuda.to_device(np.ascontiguousarray(array)) for name, array in given.items()}
-    driver.fly[len(jobs), shape.threads](*(own[name] for name in ARGUMENTS))
-    return _flown(plan, jobs, {name: own[name].copy_to_host() for name in
-                  ("all_sums", "all_frames", "states", "statuses", "all_reached")})  # fmt: skip
+    return own
 
 
-def _flown(plan: Plan, jobs: Sequence[Tables], left: dict[str, NDArray[Any]]) -> list[Flown]:
+def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flown]:
     """Results of a launch, flight by flight."""
+    names = ("all_sums", "states", "statuses", *(("all_frames",) if plan.record else ()))
+    names += ("all_reached",) if plan.goals else ()
+    left = {name: own[name].copy_to_host() for name in names}
     count = len(columns(plan.metrics))
-    results = []
+    found = []
     for flock, tables in enumerate(jobs):
         n = int(tables.whole[WHOLE.index("agents")])
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
-        values = combined(plan, sums) | goals_reached(plan, left["all_reached"][flock][: len(tables.goals)])
+        values = combined(plan, sums) | goals_reached(
+            plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
+        )
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
-        results.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
-    return results
+        found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
+    return found
 
 
 def _padded(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
