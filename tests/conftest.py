@@ -1,5 +1,7 @@
 """Options and fixtures of all tests."""
 
+import os
+
 import pytest
 
 
@@ -14,6 +16,18 @@ def pytest_collection_modifyitems(config, items):
         for item in items:
             if item.get_closest_marker("papers"):
                 item.add_marker(skip)
+    for item in items:
+        if item.get_closest_marker("gpu") and not os.environ.get("AIRFLOCK_NEED_GPU"):
+            item.fixturenames.insert(0, "gpu")
+
+
+@pytest.fixture
+def gpu():
+    """Skips a test where no GPU can be used; with AIRFLOCK_NEED_GPU set nothing is skipped, and the test fails."""
+    from airflock.engine.cuda.device import trouble
+
+    if trouble() is not None:
+        pytest.skip(f"{trouble()}; AIRFLOCK_NEED_GPU makes this a failure")
 
 
 @pytest.fixture

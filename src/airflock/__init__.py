@@ -16,6 +16,7 @@ _WHERE = {
     "Parameters": "airflock.core.parameters",
     "simulate": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
+    "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",
     "load_recording": "airflock.recordings.files",
 }
@@ -24,7 +25,8 @@ __all__ = [*_WHERE, "__version__"]
 
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
-        return getattr(import_module(_WHERE[name]), name)
+        module = import_module(_WHERE[name])
+        return module if name == "evolve" else getattr(module, name)  # a module that can be called
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 

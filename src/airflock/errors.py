@@ -10,10 +10,10 @@ class ParameterError(AirflockError):
 
 
 class ScenarioError(AirflockError):
-    """A scenario file or a set of its keys cannot be used; carries every fault that was found."""
+    """A scenario file or a set of its keys cannot be used; carries every fault that was found, one line each."""
 
     def __init__(self, faults: list[str]):
-        self.faults = list(faults)
+        self.faults = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in fault) for fault in faults]
         super().__init__("\n".join(self.faults))
 
 
@@ -31,3 +31,11 @@ class FlightError(AirflockError):
 
 class SceneError(AirflockError):
     """A scene cannot be used: a mesh that is open, inverted, in a wrong unit or damaged, or one without free room."""
+
+
+class DeviceError(AirflockError):
+    """A device cannot be used, or not for this flight: says why, how much memory is needed and what fits."""
+
+
+class StudyError(AirflockError):
+    """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from airflock.engine.plain import fly_plainly
+from airflock.scenarios.files import load
 from flocks import PENTAGON, SILENT, flown, from_start, ideal, scenario
 
 OPEN = {"world__side": 1e4, "world__height": 1e4}
@@ -67,13 +68,17 @@ def test_a_flight_in_the_plane_of_space_is_the_flight_in_the_plane(seed):
     np.testing.assert_allclose(three[:, [0, 1, 3, 4, 6, 7]], two, atol=1e-8)
 
 
-def test_the_nearest_wall_of_each_axis_is_enough_at_4_m_s(seed):
-    """Table S1, 4 m/s: the far walls of the square never act, so both readings of the walls agree to rounding."""
-    start = crowd(seed, 5, 2).T + np.array([[115.0], [-100.0], [1.0], [-1.0]])  # in a corner
-    every, nearest = (
-        fly_plainly(scenario(agents=5, duration=20.0, world__walls=walls), seed, start).frames
-        for walls in ("every_edge", "nearest_per_axis")
-    )
+@pytest.mark.parametrize(("speed", "duration"), [(4, 20.0), (8, 16.0), (16, 16.0)])
+def test_the_nearest_wall_of_each_axis_is_enough_up_to_16_m_s(speed, duration, seed):
+    """Table S1: the far walls of the square never act, so both readings of the walls agree to rounding."""
+    name = f"vasarhelyi_2018/{speed}ms"
+    flights = {}
+    for walls in ("every_edge", "nearest_per_axis"):
+        found = load(name, {"agents": 5, "duration": duration, "world.walls": walls})
+        corner = 0.5 * found.world.side - 10.0
+        start = crowd(seed, 5, 2).T + np.array([[corner], [0.8 * -corner], [1.0], [-1.0]])
+        flights[walls] = fly_plainly(found, seed, start).frames
+    every, nearest = flights.values()
     assert np.abs(np.diff(np.sign(every[:, 2]), axis=0)).sum() > 0.0  # somebody turned
     np.testing.assert_allclose(every, nearest, atol=1e-9)
 

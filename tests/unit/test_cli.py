@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -151,9 +152,14 @@ def test_interrupt_ends_with_one_line_and_status_2():
     import time
 
     command = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--seeds", "2000"]
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=Path.home())
-    time.sleep(4.0)
-    running.send_signal(signal.SIGINT)
-    _, stderr = running.communicate(timeout=120)
+    # A shell that runs the tests in the background has them ignore SIGINT; a person's terminal does not.
+    listen = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=Path.home(), preexec_fn=listen) as running:
+        try:
+            time.sleep(4.0)
+            running.send_signal(signal.SIGINT)
+            _, stderr = running.communicate(timeout=120)
+        finally:
+            running.kill()
     assert running.returncode == 2
     assert stderr.startswith("airflock: interrupted") and len(stderr.strip().splitlines()) == 1

@@ -86,7 +86,7 @@ def _validate(name: str, changed: dict[str, Any]) -> None:
 
 
 def doctor(as_json: options.Json = False) -> None:
-    """Show versions, processor and cache, and fly a ten-second self-check.
+    """Show versions, processor, GPUs and cache, and fly a ten-second self-check on each device.
 
     Example: airflock doctor
     """
@@ -119,6 +119,8 @@ def doctor(as_json: options.Json = False) -> None:
     found["second_flight_s"] = round(time.perf_counter() - began, 4)
     healthy = values == again and 0.5 < values["phi_vel"] < 5.0 and values["r_min"] > 0.0
     found["self_check"] = "passed" if healthy else "failed"
+    found |= _gpu(scenario, values)
+    healthy = healthy and found.get("gpu_self_check") != "failed"
     if as_json:
         tables.emit_json(found)
     else:
@@ -126,3 +128,26 @@ def doctor(as_json: options.Json = False) -> None:
             typer.echo(f"{key:<16} {text}")
     if not healthy:
         raise AirflockError(f"self-check failed: {values}")
+
+
+def _gpu(scenario: Any, known: dict[str, float]) -> dict[str, Any]:
+    """What GPUs there are, or why none can be used; and the same flight on the first of them."""
+    import time
+
+    from airflock.engine.cuda.device import describe, trouble
+    from airflock.engine.simulate import score_flights
+
+    fault = trouble()
+    if fault is not None:
+        return {"gpu": fault}
+    found: dict[str, Any] = {}
+    for number, device in enumerate(describe()):
+        text = "{name}, compute capability {compute_capability}, {multiprocessors} multiprocessors, {free_gb} of "
+        found[f"gpu_{number}" if number else "gpu"] = (text + "{memory_gb} GB free").format(**device)
+    for name in ("first", "second"):
+        began = time.perf_counter()
+        values = score_flights([scenario], [0], device="cuda")[0]
+        found[f"gpu_{name}_flight_s"] = round(time.perf_counter() - began, 4)
+    near = all(abs(values[key] - known[key]) < 0.02 * max(1.0, abs(known[key])) for key in ("phi_vel", "r_min_mean"))
+    found["gpu_self_check"] = "passed" if near else "failed"
+    return found

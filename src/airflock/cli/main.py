@@ -9,10 +9,10 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, inspect, look, paper, run, sweep
+from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep
 from airflock.errors import AirflockError
 
-HELP = """Decentralised flocks of drones and birds: simulate, score, plot.
+HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
 Try [bold]airflock run vasarhelyi_2018/4ms[/bold]. Every verb has --help with an example.
 """
@@ -40,6 +40,8 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("score")(run.score)
 app.command("sweep")(sweep.sweep)
+app.command("evolve")(evolve.evolve)
+app.command("harden")(harden.harden)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("display")(display.display)

@@ -23,6 +23,7 @@ Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_defau
 Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_default="the scenario's")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
+Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 PlotFile = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")

@@ -17,6 +17,7 @@ def run(
     duration: options.Duration = None,
     threads: options.Threads = None,
     precision: options.Precision = 32,
+    device: options.Device = "cpu",
     as_json: options.Json = False,
     save: options.SaveFile = None,
     plot: options.PlotFile = None,
@@ -25,7 +26,7 @@ def run(
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
-    from airflock.engine.simulate import score_flights
+    from airflock.engine.simulate import picked, score_flights
     from airflock.scenarios.files import load
 
     changed = options.settings(changes, agents, duration)
@@ -33,11 +34,12 @@ def run(
     options.writable(save, plot)
     for note in found.notes:
         tables.say(f"note: {note}")
-    numbers = list(range(first_seed, first_seed + seeds))
+    numbers, flights = list(range(first_seed, first_seed + seeds)), [found] * seeds
+    device = picked(flights, device, precision=precision, say=tables.say)
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
-        rows = score_flights([found] * seeds, numbers, threads=threads, precision=precision, done=done)
+        rows = score_flights(flights, numbers, threads=threads, precision=precision, done=done, device=device)
     if save or plot:
-        _record(found, numbers, precision, save, plot)
+        _record(found, numbers, precision, device, save, plot)
     if as_json:
         from airflock.recordings.flights import plain
 
@@ -51,13 +53,13 @@ def run(
     tables.score_table(title, rows, published)
 
 
-def _record(found, numbers, precision, save, plot) -> None:  # type: ignore[no-untyped-def]
+def _record(found, numbers, precision, device, save, plot) -> None:  # type: ignore[no-untyped-def]
     """Fly again with the trajectories kept (the same bits), and write what was asked for."""
     from airflock.recordings.files import save as save_recording
     from airflock.recordings.flights import simulate
 
     for seed in numbers if save else numbers[:1]:
-        recording = simulate(found, seed, precision=precision)
+        recording = simulate(found, seed, precision=precision, device=device)
         if save:
             many = len(numbers) > 1
             path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save

@@ -28,6 +28,7 @@ def sweep(
     duration: options.Duration = None,
     threads: options.Threads = None,
     precision: options.Precision = 32,
+    device: options.Device = "cpu",
     as_json: options.Json = False,
     table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
     plot: Annotated[
@@ -41,7 +42,7 @@ def sweep(
     """
     import pandas as pd
 
-    from airflock.engine.simulate import score_flights
+    from airflock.engine.simulate import picked, score_flights
     from airflock.scenarios.files import load
 
     options.writable(table, plot)
@@ -55,9 +56,11 @@ def sweep(
         tables.say(f"note: {note}")
     numbers = range(first_seed, first_seed + seeds)
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in numbers]
+    flights = [found for _, found, _ in jobs]
+    device = picked(flights, device, precision=precision, say=tables.say)
     with options.progress(f"{scenario}: flights", len(jobs), quiet=as_json) as done:
         rows = score_flights(
-            [j[1] for j in jobs], [j[2] for j in jobs], threads=threads, precision=precision, done=done
+            flights, [j[2] for j in jobs], threads=threads, precision=precision, done=done, device=device
         )
     if show not in rows[0]:
         raise ScenarioError([f"--show {show}: no such order parameter; known: {', '.join(rows[0])}"])

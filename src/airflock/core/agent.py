@@ -55,6 +55,8 @@ def decide(
     index: int = 0,
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
     percept: Percept | None = None,
+    shared: Any = None,
+    wing: Any = None,
 ) -> Decision:
     """Decision of one agent.
 
@@ -65,6 +67,7 @@ def decide(
     memory     : Memory from the last decision; None before the first
     time       : since the start of the flight, s; period : between two decisions, s
     index      : own index in the flock; centre : of the arena, m
+    shared     : what the model's `flock` found for this agent; wing : parameters of the wing
     percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
 
     Raises RuleError where a rule asks for what the model does not provide.
@@ -78,6 +81,8 @@ def decide(
         "memory": first_memory(model) if memory is None else memory,
         "percept": percept or Percept(time, centre[0] - own.x, centre[1] - own.y, centre[2] - own.z),
         "period": period,
+        "shared": shared,
+        "wing": wing,
         "p": p,
     }
     result = answer(model.decide, "decide", given, model.name)

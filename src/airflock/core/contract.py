@@ -23,6 +23,8 @@ class Model:
     sight        : `sight(p)`, how far percept.cast looks, m
     neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
     boundary     : surface rule → Walls
+    flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
+    workspace    : `workspace(n, p, wing)` → NamedTuple of (rows, columns), the scratch arrays that `flock` works in
     wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
@@ -41,6 +43,9 @@ class Model:
     Walls: type | None = None
     wall_reach: Callable[..., float] | None = None
     Memory: type | None = None
+    flock: Callable[..., None] | None = None
+    Shared: type | None = None
+    workspace: Callable[..., Any] | None = None
     reduce: Mapping[str, str] = field(default_factory=dict)
     usual: Mapping[str, float] = field(default_factory=dict)
     preferred_speed: Callable[..., float] | None = None
@@ -48,7 +53,7 @@ class Model:
     doc: str = ""
 
     def __hash__(self) -> int:
-        return hash((self.name, self.decide, self.neighbour, self.boundary))
+        return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
 
 
 def model(namespace: Any, name: str = "") -> Model:
@@ -60,10 +65,10 @@ def model(namespace: Any, name: str = "") -> Model:
             raise RuleError(f"model {name} lacks {needed}")
     if found["COMMAND"] not in COMMANDS:
         raise RuleError(f"model {name}: COMMAND = {found['COMMAND']!r} is none of {', '.join(COMMANDS)}")
-    for rule, record in (("neighbour", "Sums"), ("boundary", "Walls")):
+    for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):
         if rule in found and record not in found:
-            raise RuleError(f"model {name} has a rule {rule} but no NamedTuple {record}")
-    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "decide"):
+            raise RuleError(f"model {name} has a rule {rule} but no {record}")
+    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide"):
         if kind in found:
             asks(found[kind], kind, name)
     reduce = dict(found.get("REDUCE", {}))
@@ -83,6 +88,9 @@ def model(namespace: Any, name: str = "") -> Model:
         Walls=found.get("Walls"),
         wall_reach=found.get("wall_reach"),
         Memory=found.get("Memory"),
+        flock=found.get("flock"),
+        Shared=found.get("Shared"),
+        workspace=found.get("workspace"),
         reduce=reduce,
         usual=dict(found.get("USUAL", {})),
         preferred_speed=found.get("preferred_speed"),
@@ -125,6 +133,8 @@ class Metric:
     within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
               while no two agents are nearer than that. A driver may then skip the pair loop.
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
+    survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
+              `workspace(n, q, wing)` gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
     total   : from the combined values of a whole flight to named order parameters; by default they are these
     """
@@ -143,6 +153,9 @@ class Metric:
     Cluster: type | None = None
     Memory: type | None = None
     within: Callable[..., float] | None = None
+    survey: Callable[..., None] | None = None
+    Shared: type | None = None
+    workspace: Callable[..., Any] | None = None
     reduce: Mapping[str, str] = field(default_factory=dict)
     over_time: Mapping[str, str] = field(default_factory=dict)
     clock: str = "sample"
@@ -157,12 +170,12 @@ def metric(module: Any) -> Metric:
     """Gather an order parameter from its module; refuse what the contract does not know."""
     found = dict(vars(module))
     name = str(found["__name__"]).rpartition(".")[2]
-    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within"):
+    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
         if kind in found:
             asks(found[kind], kind, name)
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "total",
+        "Memory", "within", "total", "survey", "Shared", "workspace",
     )  # fmt: skip
     return Metric(
         name=name,

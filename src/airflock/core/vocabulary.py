@@ -41,6 +41,18 @@ SURFACE = {
     "vy": "the same, north, m/s",
     "vz": "the same, up, m/s",
 }
+FLOCK = {
+    "n": "number of agents",
+    "x": "true positions of all agents, east, m; x[i] is that of agent i",
+    "y": "the same, north, m",
+    "z": "the same, up, m",
+    "vx": "their velocities, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "wing": "parameters of the wing (aero.wing)",
+    "work": "scratch arrays in the shapes that `workspace` gives, kept from call to call; work.name[row][column]",
+    "shared": "columns of Shared to fill: shared.name[i] for every agent i",
+}
 AGENT = {
     "own": "Own: velocity vx vy vz (m/s) and heading hx hy hz as measured",
     "sums": "what `neighbour` summed up over all neighbours",
@@ -49,6 +61,8 @@ AGENT = {
     "percept": "Percept: time (s), the offsets centre_x centre_y centre_z to the arena's centre "
     "and goal_x goal_y goal_z to the goal (m), rays and noise",
     "period": "time between two decisions, s",
+    "shared": "what `flock` found for this agent",
+    "wing": "parameters of the wing (aero.wing)",
 }
 BODY = {
     "vx": "true velocity, east, m/s",
@@ -85,9 +99,13 @@ MEASURED = {
     "pair": "what this metric's `pair` gathered for this agent",
     "memory": "this metric's Memory of this agent",
     "mean": "Mean over the flock: x y z (m), vx vy vz (m/s), hx hy hz, and number n",
+    "shared": "what this metric's `survey` found for this agent",
+    "wing": "parameters of the wing (aero.wing)",
 }
 MEMBER = {
-    name: text for name, text in MEASURED.items() if name not in ("excursion", "touches", "rays", "memory", "mean")
+    name: text
+    for name, text in MEASURED.items()
+    if name not in ("excursion", "touches", "rays", "memory", "mean", "shared", "wing")
 } | {
     "mean": "Mean over the agent's own cluster",
 }
@@ -115,6 +133,7 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "wall_reach": {"p": "parameters"},
     "neighbour": {**PAIR, "p": "the model's parameters"},
     "boundary": {**SURFACE, "p": "the model's parameters"},
+    "flock": {**FLOCK, "p": "the model's parameters"},
     "decide": {**AGENT, "p": "the model's parameters"},
     "move": {**BODY, "b": "the body's parameters"},
     "pair": {name: PAIR[name] for name in ("dx", "dy", "dz", "r", "r2", "lower")} | {"q": "metric parameters"},
@@ -123,6 +142,7 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "member": {**MEMBER, "q": "metric parameters"},
     "cluster": {**CLUSTER, "q": "metric parameters"},
     "sample": {**SAMPLE, "q": "metric parameters"},
+    "survey": {**FLOCK, "q": "metric parameters"},
     "within": {"q": "metric parameters"},
 }
 COMMANDS = ("velocity", "acceleration", "heading")

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.driver import flight, replay
+from airflock.engine.passes.flock import scratch
 from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
+LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
 
 
 @dataclass(frozen=True)
@@ -56,13 +58,13 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
     whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
     n, dims = whole["agents"], plan.dimensions
     m = -(-n // LANES) * LANES
-    work, words, gust = np.zeros((driver.ROWS, m), real), np.zeros((4, m), np.uint32), np.zeros(3, real)
-    past = np.zeros((whole["ring"], 2 * dims, m), real)
+    work, words, gust = _rows((driver.ROWS, m), real), _rows((4, m), np.uint32), np.zeros(3, real)
+    past = _rows((whole["ring"], 2 * dims, m), real)
     store = np.zeros((n, 2 * dims + 1, m), real) if plan.links else np.zeros((1, 2 * dims + 1, 1), real)
     store[:, 2 * dims] = -1e9
     memory = _memory(plan, m, real)
     mem = _starts(plan.model.Memory, m, real)
-    labels = np.zeros((2, m), np.int32 if plan.bits == 32 else np.int64)
+    labels = _rows((2, m), np.int32 if plan.bits == 32 else np.int64)
     values, sums = _sums(plan)
     frames = np.zeros((whole["steps"] // whole["sample_every"] + 1, 3 * dims, n), real) if plan.record else None
     scene = _scene(tables)
@@ -70,9 +72,11 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
         tables.row, tables.whole, tables.faces, tables.edges, tables.spans, scene,
         np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
         work, words, past, store, gust, mem, memory, labels, values, sums,
-        np.zeros((1, 3 * dims, n), real) if frames is None else frames,
+        np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
     )  # fmt: skip
-    return Flown(_combine(plan, sums) | _goals(plan, scene), frames, work[: 2 * dims, :n].copy(), int(status))
+    if frames is not None and plan.stop:
+        frames = frames[: int(sums[len(columns(plan.metrics))])]
+    return Flown(combined(plan, sums) | goals_reached(plan, scene[7]), frames, work[: 2 * dims, :n].copy(), int(status))
 
 
 def measure_frames(
@@ -86,11 +90,21 @@ def measure_frames(
     scene = _scene(tables)
     series = np.full((frames.shape[0], len(values)), np.nan)
     driver.measure_frames(
-        tables.row, tables.whole, tables.edges, tables.spans, scene, np.zeros((driver.ROWS, m), real),
-        _memory(plan, m, real), np.zeros((2, m), np.int32 if plan.bits == 32 else np.int64), values, sums,
+        tables.row, tables.whole, tables.edges, tables.spans, scene, _rows((driver.ROWS, m), real),
+        _memory(plan, m, real), _rows((2, m), np.int32 if plan.bits == 32 else np.int64), values, sums,
         np.ascontiguousarray(frames, real), series, real.type(period),
+        *scratch(plan, tables.row, frames.shape[2]),
     )  # fmt: skip
-    return _combine(plan, sums) | _goals(plan, scene), series
+    return combined(plan, sums) | goals_reached(plan, scene[7]), series
+
+
+def _rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
+    """Zeros whose rows begin on a cache line."""
+    count = math.prod(shape) * np.dtype(kind).itemsize
+    room = np.zeros(count + LINE, np.uint8)
+    first = -room.ctypes.data % LINE
+    rows: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
+    return rows
 
 
 def _scene(tables: Tables) -> tuple[NDArray[Any], ...]:
@@ -103,11 +117,11 @@ def _scene(tables: Tables) -> tuple[NDArray[Any], ...]:
     return shapes, tables.nodes, tables.links, near, counts, tables.goals, aim, reached, later
 
 
-def _goals(plan: Plan, scene: tuple[NDArray[Any], ...]) -> dict[str, Any]:
+def goals_reached(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:
     """When each goal was reached, s (nan: never), and how many were."""
     if not plan.goals:
         return {}
-    times = [float(t) if t >= 0.0 else math.nan for t in scene[7]]
+    times = [float(t) if t >= 0.0 else math.nan for t in reached]
     return {"goals_reached": float(sum(t == t for t in times)), "goals": float(len(times)), "time_to_goal": times}
 
 
@@ -127,7 +141,7 @@ def _sums(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
 
 
-def _combine(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
+def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     """Named order parameters from the sums over time."""
     found = columns(plan.metrics)
     counts = {"sample": sums[len(found)], "collision": sums[len(found) + 1]}
@@ -135,11 +149,11 @@ def _combine(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
         name: float(sums[c] / max(counts[when], 1.0) if how == "mean" else sums[c])
         for c, (name, how, when) in enumerate(found)
     }
-    combined: dict[str, float] = {}
+    named: dict[str, float] = {}
     for metric in plan.metrics:
         own = {name: over_time[name] for name in metric.Sample._fields}  # type: ignore[attr-defined]
-        combined |= metric.total(own) if metric.total else own
-    return combined
+        named |= metric.total(own) if metric.total else own
+    return named
 
 
 def cores() -> int:

@@ -16,6 +16,8 @@ from airflock.core import random as random_streams
 from airflock.engine import law
 from airflock.errors import RuleError
 
+# A solver is called from several places and would be compiled as often: minutes instead of seconds.
+ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True)'
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -31,6 +33,7 @@ class Source:
         self.constants = constants
         self.blocks: list[str] = []
         self._names: dict[Any, str] = {}
+        self._apart = False
 
     def name(self, item: Any) -> str:
         """Name in the driver of a plain function or a NamedTuple class; adds its text on first use."""
@@ -50,6 +53,13 @@ class Source:
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
             self.blocks.append(self._function(item, name))
+        return name
+
+    def solver(self, rule: Callable[..., Any]) -> str:
+        """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
+        self._apart = True
+        name = self.name(rule)
+        self._apart = False
         return name
 
     def record(self, name: str, fields: tuple[str, ...]) -> str:
@@ -73,8 +83,16 @@ class Source:
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
-        decorator = INLINED if loops and self.decorator else self.decorator
+        decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
+        if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
+            decorator = ALONE
         return f"{decorator}\n{ast.unparse(rewritten)}"
+
+
+def _depth(node: ast.AST) -> int:
+    """How many loops of a function lie inside each other."""
+    inner = max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
+    return inner + isinstance(node, (ast.For, ast.While))
 
 
 class _Rewrite(ast.NodeTransformer):
@@ -146,7 +164,7 @@ class _Rewrite(ast.NodeTransformer):
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         self.generic_visit(node)
         inner = node.value
-        if isinstance(inner, ast.Subscript) and isinstance(inner.value, ast.Name):  # a[i][j] → a[i, j]
+        if isinstance(inner, ast.Subscript) and isinstance(inner.value, (ast.Name, ast.Attribute)):  # a[i][j] → a[i, j]
             pair = ast.Tuple([inner.slice, node.slice], ast.Load())
             return ast.Subscript(inner.value, pair, node.ctx)
         return node

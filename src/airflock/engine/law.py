@@ -57,7 +57,9 @@ def faults(rule: Callable[..., Any]) -> list[str]:
 def _touches_float(item: ast.BinOp) -> bool:
     # Index arithmetic (i + 1) is integer on purpose: names of one letter i-n, or anything that range() made.
     names = [n.id for n in ast.walk(item) if isinstance(n, ast.Name)]
-    return not all(name in {"i", "j", "k", "e", "n", "first", "last", "word", "stream", "draw"} for name in names)
+    return not all(
+        name in {"i", "j", "k", "e", "m", "n", "row", "first", "last", "word", "stream", "draw"} for name in names
+    )
 
 
 def check(rule: Callable[..., Any]) -> None:

@@ -18,16 +18,14 @@ from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
-from airflock.engine.passes.move import ATTEMPTS
+from airflock.engine.plain_flock import of_model
 from airflock.engine.plain_scores import Scores
+from airflock.engine.plain_start import ZERO, Vector, begin, given, normals
 from airflock.engine.plain_world import Course, Place, Senses
-from airflock.engine.tables import clock, extents
+from airflock.engine.tables import clock
 from airflock.metrics.registry import SETS
 from airflock.scenarios.scenario import Scenario
-from airflock.world import start as start_rules
 
-Vector = tuple[float, float, float]
-ZERO: Vector = (0.0, 0.0, 0.0)
 LIMIT = 1e8  # m; no radio reaches farther
 
 
@@ -66,11 +64,13 @@ def fly_plainly(
     """
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
-    flock = begin(scenario, seed, place) if start is None else given(start, dims)
+    begun = begin(scenario, seed, place) if start is None else given(start, dims)
+    flock = [Agent(state) for state in begun]
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = SETS[scenario.metrics.kind] if metrics is None else metrics
-    scores, course = Scores(chosen, scenario.measured_by(), place, dims), Course(scenario)
+    scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
+    solve = of_model(scenario)
     if len(flock) < scenario.agents:
         return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
     at_start, gust = states(flock), ZERO
@@ -82,9 +82,14 @@ def fly_plainly(
             past[(step + delay) // every] = states(flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
-            decisions(scenario, seed, (place, course), flock, number, past.pop(number, at_start), step * dt)
+            shared = solve(states(flock)) if solve else None
+            past_now = past.pop(number, at_start)
+            decisions(scenario, seed, (place, course), flock, number, past_now, step * dt, shared=shared)
         if step % times["collide_every"] == 0:
-            scores.look("collision", states(flock), step * dt)
+            events = scores.look("collision", states(flock), step * dt).get("n_coll", 0.0)
+            if events > 0.5 and scenario.metrics.stop == "collision":
+                frames = frames[: -(-step // times["sample_every"])]
+                break
         if step % times["sample_every"] == 0:
             scores.look("sample", states(flock), step * dt, [agent.rays for agent in flock])
             frames[step // times["sample_every"]] = components(flock, dims)
@@ -113,65 +118,12 @@ def plus(state: State, error: State) -> State:
     return State(*(a + b for a, b in zip(state, error, strict=True)))
 
 
-# ---------------------------------------------------------------------------------------------------------- start
-
-
-def given(start: NDArray[Any], dims: int) -> list[Agent]:
-    """Agents from positions and velocities (component, agent)."""
-    pad = (0.0,) * (3 - dims)
-    columns = [tuple(float(c) for c in column) for column in start.T]
-    return [Agent(State(*c[:dims], *pad, *c[dims:], *pad)) for c in columns]
-
-
-def begin(scenario: Scenario, seed: int, place: Place) -> list[Agent]:
-    """Agents at random places in the arena, far enough apart; fewer than asked for if one finds no room."""
-    flock: list[Agent] = []
-    for i in range(scenario.agents):
-        spot = find_room(scenario, seed, place, i, flock)
-        if spot is None:
-            break
-        flock.append(Agent(State(*spot, *start_velocity(scenario, seed, i))))
-    return flock
-
-
-def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequence[Agent]) -> Vector | None:
-    """Position (m) for agent i inside the arena and away from those already placed; None if there is none."""
-    reach, apart = extents(scenario), scenario.separation()
-    for attempt in range(ATTEMPTS):
-        words = random.words(seed, random.START, 0, attempt, i)
-        x, y, z = (start_rules.spread(random.uniform(w), -half, half) for w, half in zip(words, reach, strict=False))
-        z = z if scenario.dimensions == 3 else 0.0
-        if scenario.start.kind == "ball" and not start_rules.in_ball(x, y, z, reach[0]):
-            continue
-        gaps = ((x - s.x) ** 2 + (y - s.y) ** 2 + (z - s.z) ** 2 for s in states(flock))
-        near = apart > 0.0 and any(gap < apart * apart for gap in gaps)
-        if not near and place.roomy(x, y, z):
-            return x, y, z
-    return None
-
-
-def start_velocity(scenario: Scenario, seed: int, i: int) -> Vector:
-    """Velocity of agent i at the start, m/s: start.speed in a random direction."""
-    if scenario.start.speed == 0.0:
-        return ZERO
-    gx, gy, gz, _ = normals(seed, random.START, 0, i, draw=1)
-    gz = gz if scenario.dimensions == 3 else 0.0
-    f = scenario.start.speed / norm(gx, gy, gz)
-    return f * gx, f * gy, f * gz
-
-
-def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tuple[float, float, float, float]:
-    """Four normal random numbers of one consumer."""
-    a, b, c, d = random.words(seed, stream, 0, step, agent, draw)
-    return *random.normal_pair(a, b), *random.normal_pair(c, d)
-
-
 # ------------------------------------------------------------------------------------------------------- decision
 
 
 def decisions(
     scenario: Scenario, seed: int, world: tuple[Place, Course], flock: list[Agent], number: int, past: list[State],
-    time: float, turn: Sequence[int] | None = None,
+    time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
     if scenario.sensors.noise > 0.0:
@@ -189,7 +141,7 @@ def decisions(
         senses = Senses.of(place, course, own, time, seed, number, i)
         made = decide(
             scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
-            time=time, period=period, index=i, percept=senses,
+            time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
         )  # fmt: skip
         agent.rays = float(senses.rays)
         x, y, z = made.command

@@ -10,6 +10,7 @@ from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
+from airflock.engine.plain_flock import Survey, of_metric
 from airflock.engine.plain_world import Place
 
 Record = Any  # a NamedTuple of floats that a metric declares
@@ -20,6 +21,7 @@ class Scores:
 
     metrics   : what is measured; q : their parameters
     place     : the world of the flight: excursion of a position, touches on a way, offsets to nearest images
+    wing      : parameters of the wing, for metrics that survey the whole flock
     """
 
     def __init__(
@@ -28,7 +30,10 @@ class Scores:
         q: Any,
         place: Place,
         dimensions: int = 2,
+        wing: Any = None,
     ):
+        self.wing = wing
+        self.surveys: dict[str, Survey | None] = {}
         self.place = place
         self.image = place.image
         self.dimensions = float(dimensions)
@@ -74,7 +79,7 @@ class Scores:
 
     def _sample(self, metric: Metric, flock: Sequence[State]) -> Record:
         given: dict[str, Any] = {"n": float(len(flock)), "mean": mean_of(flock), "q": self.q}
-        given |= {"dimensions": self.dimensions, "time": self.time}
+        given |= {"dimensions": self.dimensions, "time": self.time, "wing": self.wing}
         if metric.agent is not None:
             given["agents"] = self._agents(metric, metric.agent, flock, given["mean"])
         if metric.cluster is not None:
@@ -84,6 +89,10 @@ class Scores:
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
             self.memories.setdefault(metric.name, [metric.Memory()] * len(flock))
+        if metric.name not in self.surveys:
+            self.surveys[metric.name] = of_metric(metric, len(flock), self.q, self.wing)
+        survey = self.surveys[metric.name]
+        shared = survey(flock) if survey else [None] * len(flock)
         terms = []
         for i, state in enumerate(flock):
             speed = norm(state.vx, state.vy, state.vz)
@@ -96,6 +105,8 @@ class Scores:
                 "rays": self.rays[i],
                 "pair": self._pairs(metric, flock, i),
                 "mean": mean,
+                "shared": shared[i],
+                "wing": self.wing,
                 "q": self.q,
             }
             if metric.Memory is None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
@@ -25,6 +26,10 @@ ARENA = (
     "goal_speed",
     "goal_spread",
     "goal_behind",
+    "spacing_x",
+    "spacing_y",
+    "spacing_z",
+    "jitter",
 )
 CLOCK = ("dt", "period")
 WHOLE = (
@@ -47,6 +52,9 @@ class Plan:
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
+    appearing : some of the scene appears while flying
+    stop      : the flight ends at its first collision
+    wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     sequential: one agent after another perceives, decides and moves
     record    : keep every sample (position, velocity, command) besides the running sums
     """
@@ -64,8 +72,11 @@ class Plan:
     start: str = "arena"
     scene: bool = False
     goals: bool = False
+    stop: bool = False
+    wing_choices: tuple[tuple[str, str], ...] = ()
     herd: bool = False
     own: bool = False
+    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2
@@ -87,7 +98,7 @@ class Plan:
     @property
     def constants(self) -> dict[str, dict[str, str | float]]:
         """Choices and usual numbers by record name, inlined as constants."""
-        return {"p": dict(self.model_choices), "b": dict(self.body_choices)}
+        return {"p": dict(self.model_choices), "b": dict(self.body_choices), "wing": dict(self.wing_choices)}
 
     @property
     def periodic(self) -> bool:
@@ -111,6 +122,7 @@ class Plan:
             "w": ARENA,
             "q": number_names(metric_parameters.Parameters),
             "c": CLOCK,
+            "wing": number_names(wings.Parameters),
         }
 
 

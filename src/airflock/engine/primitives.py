@@ -1,27 +1,11 @@
 """Random primitives for a CPU, as driver text: the arithmetic of `core.random` in machine words.
 
-`least` and `most` stand for min and max of two numbers: LLVM vectorises a reduction by its own minimum instruction, but
-not one by the comparison that Numba makes of min (2.4 times on the nearest-neighbour loop). The integers are identical
-to the plain form. The normal numbers use polynomials for logarithm, sine and cosine instead of the C library, whose
-scalar calls would stop vectorisation; they agree with the plain form to rounding.
+The integers are identical to the plain form. The normal numbers use polynomials for logarithm, sine and cosine instead
+of the C library, whose scalar calls would stop vectorisation; they agree with the plain form to rounding.
 """
 
-EXTREMES = """
-def _extreme(instruction, comparison):
-    @intrinsic
-    def extreme(typing_context, a, b):
-        def emit(context, builder, signature, arguments):
-            kind = arguments[0].type
-            if isinstance(a, types.Float):
-                shape = ir.FunctionType(kind, [kind, kind])
-                return builder.call(builder.module.declare_intrinsic(instruction, [kind], shape), arguments)
-            return builder.select(builder.icmp_signed(comparison, *arguments), *arguments)
-        return a(a, a), emit
-    return extreme
+from airflock.engine import vectors
 
-least = _extreme("llvm.minnum", "<")
-most = _extreme("llvm.maxnum", ">")
-"""
 INTEGERS = """
 u32 = np.uint32
 u64 = np.uint64
@@ -143,5 +127,5 @@ def normal_pair(a, b):
 
 
 def primitives(bits: int) -> str:
-    """Text of all primitives for float32 or float64."""
-    return EXTREMES + INTEGERS + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL
+    """Text of all primitives for float32 or float64, after those of `vectors`."""
+    return vectors.TEXT + INTEGERS + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL

@@ -5,6 +5,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+from airflock.aero import wing as wings
 from airflock.core.contract import Model
 from airflock.core.vocabulary import PAIR, SURFACE, Own, Percept, asks
 from airflock.engine import law
@@ -19,6 +20,7 @@ VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
 def probe(model: Model, parameters: Any) -> None:
     """Raise a RuleError that names file, line and fault, if a rule fails or returns something else than it declares."""
     given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
+    given["wing"] = wings.Parameters(segments="5")
     given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
     for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
         if rule is not None:
@@ -37,12 +39,28 @@ def probe(model: Model, parameters: Any) -> None:
                     *([0.0] * len(record._fields))  # type: ignore[attr-defined]
                 )
             )
+    if model.flock is not None:
+        law.check(model.flock)
+        given["shared"] = _shared(model, given)
     law.check(model.decide)
     answer = _call(model.decide, "decide", given, model.name)
     expected = 4 if model.Memory is not None else 3
     if not isinstance(answer, tuple) or len(answer) != expected:
         shape = "x, y, z, Memory(...)" if expected == 4 else "x, y, z"
         raise RuleError(f"{_place(model.decide)}: {model.name}.decide must return {shape}")
+
+
+def _shared(model: Model, given: dict[str, Any]) -> Any:
+    """What the rule of the whole flock finds for the first of three agents."""
+    assert model.flock is not None and model.workspace is not None and model.Shared is not None
+    shapes = model.workspace(3, given["p"], given["wing"])
+    work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
+    fields = model.Shared._fields  # type: ignore[attr-defined]
+    shared = model.Shared(*[[0.0] * 3 for _ in fields])
+    level = dict.fromkeys(("z", "vx", "vy", "vz"), [0.1, 0.2, 0.3])
+    places = {"x": [0.0, -2.0, -2.5], "y": [0.0, 2.0, -2.1], **level}
+    _call(model.flock, "flock", {**given, **places, "n": 3, "work": work, "shared": shared}, model.name)
+    return model.Shared(*[column[0] for column in shared])
 
 
 def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str) -> Any:

@@ -7,11 +7,13 @@ from typing import Any
 
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
-from airflock.engine import cpu
+from airflock.engine import cpu, devices
+from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
+from airflock.metrics import fitness_dimock
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
 from airflock.scenarios.places import start_inside
@@ -47,15 +49,30 @@ def plan_of(
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
+        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
+        stop=scenario.metrics.stop == "collision",
+        wing_choices=_wing_choices(scenario, metrics),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
         record=record,
     )
+
+
+def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
+    """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
+    found = SETS[scenario.metrics.kind] if metrics is None else metrics
+    used = scenario.model.flock is not None or any(metric.survey is not None for metric in found)
+    return tuple(sorted(choices(scenario.wing).items())) if used else ()
+
+
+def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
+    """Text of the driver that flies a scenario: all rules are inside, so equal texts are equal physics."""
+    return flight_text(plan_of(scenario, precision=precision))
 
 
 @lru_cache
@@ -65,16 +82,57 @@ def _probed(model: Model, chosen: tuple[tuple[str, str], ...]) -> None:
 
 
 def fly(
-    scenario: Scenario, seed: int = 0, *, precision: int = 32, record: bool = False, start: Any = None
+    scenario: Scenario,
+    seed: int = 0,
+    *,
+    precision: int = 32,
+    record: bool = False,
+    start: Any = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
 ) -> cpu.Flown:
-    """Fly one world. Raises FlightError where agents find no room or a state stops being finite."""
+    """Fly one world. Raises FlightError where agents find no room or a state stops being finite.
+
+    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
+    """
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
         inside = start_inside(scenario, start) if plan.scene else ""
         if inside:
             raise FlightError(f"{scenario.name}: {inside}")
-    flown = cpu.fly(plan, tables(scenario, plan, seed), start)
+    chosen = picked([scenario], device, precision=precision, say=say)
+    return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
+
+
+def picked(
+    scenarios: Sequence[Scenario],
+    device: str = "auto",
+    *,
+    precision: int = 32,
+    say: Callable[[str], None] | None = None,
+) -> str:
+    """Device on which these flights run: the one that is named if it can fly them, else what `auto` picks."""
+    if device == "cpu":
+        return device
+    plans = dict.fromkeys(plan_of(scenario, precision=precision) for scenario in scenarios)
+    choice = devices.choose(device, scenarios, list(plans))
+    if say is not None and choice.note:
+        say(choice.note)
+    return choice.device
+
+
+def _route(device: str) -> Callable[[Scenario, Plan, int, Any], cpu.Flown]:
+    """How one world is flown on a device."""
+    if device == "cpu":
+        return lambda scenario, plan, seed, start: cpu.fly(plan, tables(scenario, plan, seed), start)
+    return lambda scenario, plan, seed, start: devices.fly_one(scenario, plan, seed, device, start)
+
+
+def checked(
+    scenario: Scenario, seed: int, flown: cpu.Flown, device: str = "cpu", precision: int = 32, start: Any = None
+) -> cpu.Flown:
+    """A flight that went well; raises FlightError for any other."""
     if flown.status < 0:
         raise FlightError(
             f"{scenario.name}: seed {seed}: agent {-flown.status - 1} of {scenario.agents} found no place at "
@@ -82,7 +140,7 @@ def fly(
         )
     bad = _first_bad(flown)
     if bad is not None:
-        step = _first_bad_step(scenario, seed, precision, start)
+        step = _first_bad_step(scenario, seed, precision, start, device)
         raise FlightError(
             f"{scenario.name}: seed {seed}: agent {bad} left the finite numbers at step {step} "
             f"(t = {step * scenario.flight.dt:g} s)"
@@ -98,7 +156,7 @@ def _first_bad(flown: cpu.Flown) -> int | None:
     return int(bad[0]) if bad.size else None
 
 
-def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any) -> int:
+def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
     """First step after which a state is not finite: flights are deterministic, so shorter ones find it by halves."""
     low, high = 0, clock(scenario)["steps"]
     plan = plan_of(scenario, precision=precision)
@@ -106,7 +164,7 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any) -
     while high - low > 1:
         middle = (low + high) // 2
         shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))
-        if _first_bad(cpu.fly(plan, tables(shorter, plan, seed), start)) is None:
+        if _first_bad(_route(device)(shorter, plan, seed, start)) is None:
             low = middle
         else:
             high = middle
@@ -120,9 +178,16 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
 
 def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
     """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
+    if scenario.metrics.kind == "dimock":
+        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
     if scenario.metrics.kind != "vasarhelyi":
         return values
     return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
+
+
+def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
+    """Compile what flies a scenario; scenarios that differ by numbers share it."""
+    cpu.flight_driver(plan_of(scenario, precision=precision))
 
 
 def score_flights(
@@ -132,10 +197,24 @@ def score_flights(
     threads: int | None = None,
     precision: int = 32,
     done: Callable[[], None] | None = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
 ) -> list[dict[str, float]]:
-    """Order parameters of many flights, flight i with seeds[i]; side by side on all cores."""
-    for plan in {plan_of(scenario, precision=precision) for scenario in scenarios}:
-        cpu.flight_driver(plan)  # compiled once, before threads ask for it
+    """Order parameters of many flights, flight i with seeds[i]; side by side on all cores, or together on a GPU.
+
+    device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
+    """
+    if device != "cpu":
+        device = picked(scenarios, device, precision=precision, say=say)
+        if device == "cuda":
+            plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
+            flown = devices.fly_on_gpu(scenarios, plans, seeds, None, done)
+            together = zip(scenarios, seeds, flown, strict=True)
+            return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
+    if device == "python":
+        return list(cpu.in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
+    for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
+        compile_for(scenario, precision=precision)  # once, before threads ask for it
 
     def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
         return lambda: score_flight(scenario, seed, precision=precision)
@@ -144,6 +223,16 @@ def score_flights(
     if any(_pays(scenario) for scenario in scenarios):
         threads = 1  # each flight takes all cores by itself
     return list(cpu.in_threads(jobs, threads, done))
+
+
+def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
+    """A flight in plain Python, yet to be flown."""
+    return lambda: finish(scenario, fly(scenario, seed, precision=64, device="python").values)
+
+
+def takes_all_cores(scenario: Scenario) -> bool:
+    """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing."""
+    return _pays(scenario)
 
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores

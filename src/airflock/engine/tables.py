@@ -130,6 +130,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     arena = dict(zip(ARENA, (
         *half_sizes(scenario.world), *extents(scenario), scenario.separation(), begin.speed, begin.clearance,
         goals.radius, goals.speed, goals.spread, goals.behind,
+        begin.spacing_x, begin.spacing_y, begin.spacing_z, begin.jitter,
     ), strict=True))  # fmt: skip
     scene = scenario.stands() if plan.scene else EMPTY
     shapes, later = unbuilt(scene)
@@ -137,7 +138,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     numbers = [
         *row(scenario.parameters), *row(scenario.body), *row(scenario.sensors), *row(scenario.radio),
         *row(scenario.wind), *(arena[name] for name in ARENA), *row(scenario.measured_by()),
-        *(timing[name] for name in CLOCK),
+        *(timing[name] for name in CLOCK), *row(scenario.wing),
     ]  # fmt: skip
     counts = families + [0] * (2 - len(families))
     whole = times | {

@@ -15,11 +15,26 @@ class Parameters(Record):
 
     kind: str = choice(
         "vasarhelyi",
-        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger"),
+        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"),
         source="our choice",
         meaning="which order parameters: of Vásárhelyi et al. 2018 with fitness; of Kidger (flocked, sub-swarms, "
-        "avoidance); extension, polarization and quality of Zapotecatl et al. 2016; these with sub-groups told apart; "
-        "or only polarisation, milling, speed and shape",
+        "avoidance); power of a flock of wings (Dimock & Selig 2003); extension, polarization and quality of "
+        "Zapotecatl et al. 2016; these with sub-groups told apart; or only polarisation, milling, speed and shape",
+    )
+    stop: str = choice(
+        "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",
+        meaning="what ends a flight before its time; order parameters are those until then",
+    )  # fmt: skip
+    fitness: str = choice(
+        "paper", ("paper", "sound"), source="Dimock & Selig 2003, Eq. 10, and its future work",
+        meaning="fitness of kind = dimock: minus power; or with penalties for closeness, oscillation, no formation",
+    )  # fmt: skip
+    t_settle: float = quantity(10.0, "s", low=0.0, high=1e6, source="our choice", meaning="a formation is settled then")
+    v_settle: float = quantity(
+        0.25, "m/s", low=0.0, high=100.0, source="our choice", meaning="it is if unrest is below this"
+    )
+    r_safe: float = quantity(
+        1.0, "m", low=0.0, high=1e4, source="our choice: two thirds of a span", meaning="nearer birds crowd each other"
     )
     period: float = quantity(
         0.2, "s", low=0.0, high=600.0, meaning="time between samples; 0: every step dt", source="our choice"

@@ -7,16 +7,19 @@ from airflock.metrics import (
     correlation,
     environment,
     excursion,
+    fitness_dimock,
     fitness_vasarhelyi,
     flocked,
     groups,
     milling,
     nearest,
     polarisation,
+    power,
     quality,
     rotation,
     shape,
     speed,
+    steadiness,
     swarms,
 )
 
@@ -28,12 +31,14 @@ ZAPOTECATL = (metric(quality), metric(polarisation))
 KIDGER = tuple(
     metric(module) for module in (flocked, swarms, polarisation, nearest, collisions, environment, avoidance, speed)
 )
+DIMOCK = (metric(power), metric(steadiness), metric(collisions))
 SETS: dict[str, tuple[Metric, ...]] = {
     "vasarhelyi": STANDARD,
     "zapotecatl": ZAPOTECATL,
     "groups": (*ZAPOTECATL, metric(groups), metric(shape)),
     "order": ORDER,
     "kidger": KIDGER,
+    "dimock": DIMOCK,
 }
 
 # what the engine itself keeps of a flight with goals
@@ -46,6 +51,7 @@ GOALS = {
 # of every order parameter that is reported: its unit and what it means, from the modules that define them
 REPORTS: dict[str, tuple[str, str]] = (
     {name: about for found in SETS.values() for each in found for name, about in each.reports.items()}
+    | fitness_dimock.REPORTS
     | fitness_vasarhelyi.REPORTS
     | GOALS
 )

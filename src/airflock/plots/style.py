@@ -112,7 +112,14 @@ def legend(axes: Axes, handles: Iterable[Any] | None = None, columns: int = 4, *
 
 
 def colour_bar(
-    figure: Figure, shown: Any, axes: Axes, label: str, *, color: str = INK, shrink: float = 0.8, pad: float = 0.02
+    figure: Figure,
+    shown: Any,
+    axes: Axes | list[Axes],
+    label: str,
+    *,
+    color: str = INK,
+    shrink: float = 0.8,
+    pad: float = 0.02,
 ) -> Colorbar:
     """Colour bar beside axes, without a frame."""
     bar = figure.colorbar(shown, ax=axes, shrink=shrink, aspect=32, pad=pad)

@@ -59,7 +59,7 @@ def fly_again(recording: xr.Dataset) -> tuple[bool, list[str]]:
     if scenario.document["model"].get("kind") != json.loads(attributes["airflock_scenario"])["model"].get("kind"):
         raise RecordingError("recording: was flown with a law given directly, which is not in the file")
     seed, precision = int(attributes["airflock_seed"]), int(attributes["airflock_precision"])
-    again = simulate(scenario, seed, precision=precision)
+    again = simulate(scenario, seed, precision=precision, device=str(attributes.get("airflock_device", "cpu")))
     now = provenance(scenario, seed, precision)
     words = {
         "airflock_version": "version of Airflock",

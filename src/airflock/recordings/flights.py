@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -10,26 +11,37 @@ import xarray as xr
 from airflock import __version__
 from airflock.engine import cpu
 from airflock.engine.passes.driver import flight
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.recordings.layout import dataset
 from airflock.scenarios.scenario import Scenario
 
 
-def simulate(scenario: Scenario, seed: int = 0, *, precision: int = 32, start: Any = None) -> xr.Dataset:
+def simulate(
+    scenario: Scenario,
+    seed: int = 0,
+    *,
+    precision: int = 32,
+    start: Any = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
+) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
     seed      : any integer from 0; the same seed gives the same bits
     precision : 32 or 64 bits per number
     start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
+    device    : cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked
     Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
-    flown = fly(scenario, seed, precision=precision, record=True, start=start)
+    device = picked([scenario], device, precision=precision, say=say)
+    flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     period = clock(scenario)["sample_every"] * scenario.flight.dt
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
+    attributes |= {"airflock_device": device} if device != "cpu" else {}
     return dataset(flown.frames, scenario.dimensions, period, attributes, scenario.model.command)
 
 

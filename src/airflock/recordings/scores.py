@@ -28,6 +28,8 @@ def score(
     threads: int | None = None,
     precision: int = 32,
     done: Callable[[], None] | None = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
@@ -35,12 +37,14 @@ def score(
     settings : for a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with
     threads  : flights side by side; by default one per core
     done     : called after each flight
+    device   : cpu, cuda (a GPU, all flights together), python, or auto, which tells `say` what it picked
     """
     if isinstance(what, xr.Dataset):
         values, _ = measure(what, settings)
         return pd.DataFrame([values])
     found = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
-    rows = score_flights([what] * len(found), found, threads=threads, precision=precision, done=done)
+    options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
+    rows = score_flights([what] * len(found), found, **options)
     return pd.DataFrame(rows, index=pd.Index(found, name="seed"))
 
 

@@ -13,17 +13,16 @@ def body_record(table: Any, found: Model | None) -> tuple[type, list[str]]:
     """Record behind the section body, by its key kind or else by what the model commands; and what is wrong with it."""
     usual = body_for(found.command if found else "velocity")
     kind = table.get("kind", usual) if isinstance(table, Mapping) else usual
-    record = BODIES.get(kind, BODIES[usual]).Parameters
-    if kind not in BODIES:
+    if not isinstance(kind, str) or kind not in BODIES:
         near = get_close_matches(str(kind), BODIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}"
-        return record, [f"body.kind = {kind!r} is no body; {hint}"]
+        return BODIES[usual].Parameters, [f"body.kind = {kind!r} is no body; {hint}"]
     if found and BODIES[kind].accepts != found.command:
         return BODIES[usual].Parameters, [
             f"body.kind = {kind!r} takes a {BODIES[kind].accepts}, but model {found.name} commands {found.command}; "
             f"body.kind = {usual!r} takes it"
         ]
-    return record, []
+    return BODIES[kind].Parameters, []
 
 
 def order_faults(flight: Any, sensors: Any, radio: Any) -> list[str]:

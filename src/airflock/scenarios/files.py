@@ -11,11 +11,14 @@ from typing import Any
 
 from airflock.core.contract import Model, model
 from airflock.errors import AirflockError, RuleError, ScenarioError
-from airflock.scenarios import checks, geometry, places, schema
+from airflock.scenarios import checks, geometry, places, schema, wings
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
-MODELS = ("vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation")
+MODELS = (
+    "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
+    "dimock_2003",
+)  # fmt: skip
 TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "title")
 
 
@@ -154,6 +157,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None) -> list[str]:
         faults += _timing_faults(flight, parts["sensors"].period, parts["metrics"])
         faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
         faults += checks.metric_faults(parts["metrics"], parts["world"])
+        faults += wings.faults(parts, found)
     return faults
 
 
@@ -222,6 +226,7 @@ def _notes(scenario: Scenario) -> list[str]:
             f"radio.delay = {delay:g} s is no multiple of sensors.period = {period:g} s: decisions use the states of "
             "exactly that long ago, taken between two measurements"
         )
+    notes += wings.notes(scenario)
     p = scenario.parameters
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
         notes.append(

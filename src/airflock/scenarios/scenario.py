@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Model
@@ -19,7 +20,7 @@ class Scenario:
     """Everything about a flight but the seed.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, wind, world, scene, goals, start, metrics : records of parameters, SI units
+    body, sensors, radio, wind, world, scene, goals, start, wing, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
@@ -37,6 +38,7 @@ class Scenario:
     scene: scenery.Parameters
     goals: goals.Parameters
     start: start.Parameters
+    wing: wings.Parameters
     metrics: metric_parameters.Parameters
     flight: Flight
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from airflock.aero import wing
 from airflock.body import motion, radio, sensors, wind
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
@@ -36,5 +37,6 @@ SECTIONS: dict[str, type[Record]] = {
     "scene": scenery.Parameters,
     "goals": goals.Parameters,
     "start": start.Parameters,
+    "wing": wing.Parameters,
     "metrics": metrics.Parameters,
 }

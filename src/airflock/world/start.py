@@ -12,9 +12,10 @@ class Parameters(Record):
 
     kind: str = choice(
         "arena",
-        ("arena", "ball", "box"),
+        ("arena", "ball", "box", "vee", "echelon"),
         source="authors' programs: arena (Vásárhelyi et al. 2018), ball (Zapotecatl et al. 2016)",
-        meaning="region: the whole arena, or a ball (in a plane a disc) or a box (a square) about its centre",
+        meaning="region: the whole arena, or a ball (in a plane a disc) or a box (a square) about its centre; or a "
+        "formation: a V, or a line whose members are a spacing apart (a column, a row, an echelon)",
     )
     radius: float = quantity(
         0.5, "m", low=1e-6, high=1e6, source="Zapotecatl et al. 2016, authors' program", meaning="radius of the ball"
@@ -28,6 +29,16 @@ class Parameters(Record):
         source="authors' program of Vásárhelyi et al. 2018: max(3 m, 2 s · v_flock)",
         meaning="smallest distance of two agents at the start; in a ball or a box 0 by default",
     )
+    spacing_x: float = quantity(
+        1.524, "m", low=0.0, high=1e4, source="Dimock & Selig 2003 give none", meaning="formation: each rank behind"
+    )
+    spacing_y: float = quantity(
+        1.9812, "m", low=-1e4, high=1e4, source="Dimock & Selig 2003 give none", meaning="formation: each rank aside"
+    )
+    spacing_z: float = quantity(0.0, "m", low=-1e4, high=1e4, meaning="formation: each rank above")
+    jitter: float = quantity(
+        0.0, "m", low=0.0, high=1e3, source="our choice", meaning="standard deviation of the places in a formation"
+    )
     clearance: float = quantity(
         1.0, "m", low=0.0, high=1e3, source="our choice", meaning="free distance to what stands in the scene"
     )
@@ -39,6 +50,19 @@ class Parameters(Record):
 def spread(u, low, high):
     """A uniform number u in (0, 1) as a coordinate between low and high, m."""
     return low + (high - low) * u
+
+
+def in_vee(i, sx, sy, sz):
+    """Place (m) of agent i in a V that points to x: agents behind the first by turns to both sides."""
+    rank = float((i + 1) // 2)
+    side = 1.0 if i % 2 == 1 else -1.0
+    return -rank * sx, side * rank * sy, rank * sz
+
+
+def in_echelon(i, sx, sy, sz):
+    """Place (m) of agent i in a line: each one behind, aside and above of the one before."""
+    rank = float(i)
+    return -rank * sx, rank * sy, rank * sz
 
 
 def in_ball(x, y, z, radius):

@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
+from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
 from airflock.world import edges
@@ -14,7 +15,12 @@ JIT = "@njit(**JIT)"
 
 
 class Builder:
-    """Names rules, rows of the work table and records of the parameter row for one plan."""
+    """Names rules, rows of the work table and records of the parameter row for one plan.
+
+    clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    """
+
+    clusters: Callable[[Metric], list[str]] | None = None
 
     def __init__(self, plan: Plan):
         self.plan = plan
@@ -66,6 +72,7 @@ class Builder:
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
         decorator = "@njit(parallel=True, **JIT)" if parallel else JIT
+        lines = ["wide_vectors()", *lines] if vectors.bits() == 512 else lines
         self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
 
     def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:

@@ -3,7 +3,7 @@
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
-from airflock.engine.passes import grid, percept, scene
+from airflock.engine.passes import flock, grid, percept, scene
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.world import arena, bvh
 
@@ -72,8 +72,7 @@ def neighbours(build: Builder) -> None:
     given = {"age": "age[j]" if selective else "late", "lower": "(ONE if integer(j) < ii else ZERO)"}
     given |= {f"h{a}": f"own_h{a}" for a in "xyz"}
     inner += [f"t = {build.call(rule, 'neighbour', given, model.name)}"]
-    inner += [combine(how[c], f"t{c}", f"t[{c}] if ok else {START[how[c]]}") for c in sums if how[c] == "sum"]
-    inner += [combine(how[c], f"t{c}", f"(t[{c}] if ok else {START[how[c]]})") for c in sums if how[c] != "sum"]
+    inner += [combine(how[c], f"t{c}", f"choose(ok, t[{c}], {START[how[c]]})") for c in sums]
     after = [f"sum{c}[i] = t{c}" for c in sums]
     if plan.grid:
         inner = [line.replace("integer(j)", "who[j]") for line in inner]
@@ -126,7 +125,8 @@ def decide(build: Builder) -> None:
     plan, axes, model = build.plan, build.plan.axes, build.plan.model
     used = set(asks(model.decide, "decide", model.name))
     memory = getattr(model.Memory, "_fields", ()) if "memory" in used else ()
-    lines = build.records("p c") + build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
+    lines = build.records("p c wing" if "wing" in used else "p c")
+    lines += build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
     lines += build.bind([f"c{a}" for a in axes])
     body = [f"v{a} = mv{a}[i]" for a in axes] + ([] if plan.dimensions == 3 else ["vz = ZERO"])
     if "own" in used:
@@ -140,6 +140,9 @@ def decide(build: Builder) -> None:
             lines += build.bind([f"{rows}{c}" for c in kept]) if present else []
             values = [f"{rows}{c}[i]" if c in kept and present else "ZERO" for c in range(len(record._fields))]  # type: ignore[attr-defined]
             body += [f"{word} = {build.source.name(record)}({', '.join(values)})"]
+    if "shared" in used:
+        lines += flock.columns_of(build, model.Shared, "model")
+        body += flock.shared(build, model.Shared, "model", bound=True)
     if memory:
         values = [f"mem[{c}, i]" for c in range(len(memory))]
         body += [f"memory = {build.source.name(model.Memory)}({', '.join(values)})"]

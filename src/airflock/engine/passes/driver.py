@@ -1,6 +1,6 @@
 """Drivers: whole flights, and whole recordings, as the order in which the passes run."""
 
-from airflock.engine.passes import decide, measure, move, perceive, scene
+from airflock.engine.passes import decide, flock, measure, move, perceive, scene
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import primitives
@@ -16,8 +16,9 @@ from numba.extending import intrinsic
 
 real = np.float{bits}
 integer = np.int{bits}
-JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True)
-INLINE = dict(fastmath=True, error_model="numpy")
+COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
+JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True, _nrt=COUNTED)
+INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED)
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)
@@ -43,6 +44,7 @@ def flight(plan: Plan) -> str:
     perceive.receive(build)
     decide.neighbours(build)
     decide.boundaries(build)
+    flock.flock(build)
     decide.decide(build)
     move.begin(build)
     move.move(build)
@@ -68,12 +70,16 @@ def flight(plan: Plan) -> str:
         choose += ["neighbours(k, n, m, time, late, row, whole, work, store)"]
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
+    if plan.model.flock is not None:
+        choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
     step += [] if plan.sequential else branch("step % decide_every == 0", choose)
     step += _watch(build)
+    if plan.stop:
+        step += branch(f"values[{_column(plan, 'n_coll')}] > 0.5", ["break"])
     sample = []
     if "sample" in _clocks(plan):
-        sample += ["measure_sample(time, n, m, row, whole, work, edges, spans, scene, memory, labels, values)"]
+        sample += [f"measure_sample({measure.arguments(build)})"]
         sample += measure.accumulate(build, "sample")
     if plan.record:
         sample += ["frame = step // sample_every"]
@@ -93,9 +99,14 @@ def flight(plan: Plan) -> str:
     step += branch("step < steps", advance)
     lines += loop("step in range(steps + 1)", step)
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
-    arguments += ", values, sums, frames"
+    arguments += ", values, sums, frames" + (", scratch" if flock.owners(plan) else "")
     build.function(f"fly({arguments})", lines, "return 0")
     return _text(build, plan.model.name)
+
+
+def _column(plan: Plan, name: str) -> int:
+    """Place of a value among all that metrics sample."""
+    return [found for found, _, _ in columns(plan.metrics)].index(name)
 
 
 def _world(build: Builder, elapsed: str) -> list[str]:
@@ -107,7 +118,7 @@ def _world(build: Builder, elapsed: str) -> list[str]:
     if build.plan.own:
         scene.glide(build)
         lines += ["glide_(time, n, work, row, scene)"]
-    if build.plan.scene:
+    if build.plan.appearing:
         scene.appear(build)
         lines += ["appear_(time, n, work, row, scene)"]
     return lines
@@ -127,7 +138,7 @@ def _watch(build: Builder) -> list[str]:
     if "collision" not in _clocks(build.plan):
         return []
     metrics = [metric for metric in build.plan.metrics if metric.clock == "collision"]
-    look = ["near = measure_collision(time, n, m, row, whole, work, edges, spans, scene, memory, labels, values)"]
+    look = [f"near = measure_collision({measure.arguments(build)})"]
     look += measure.accumulate(build, "collision")
     if not all(metric.within is not None for metric in metrics):
         return branch("step % collide_every == 0", look)
@@ -161,14 +172,14 @@ def replay(plan: Plan) -> str:
     frame += _world(build, "frame_period")
     for clock, every in (("collision", "collide_every"), ("sample", "sample_every")):
         if clock in _clocks(plan):
-            look = [f"measure_{clock}(time, n, m, row, whole, work, edges, spans, scene, memory, labels, values)"]
+            look = [f"measure_{clock}({measure.arguments(build)})"]
             look += measure.accumulate(build, clock)
             frame += branch(f"step % {every} == 0", look)
     frame += loop("c in range(len(values))", ["series[step, c] = values[c]"])
     lines += loop("step in range(frames.shape[0])", frame)
     build.function(
         "measure_frames(row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
-        " frame_period)",
+        " frame_period" + (", scratch)" if flock.owners(plan) else ")"),
         lines,
         "return 0",
     )
@@ -181,6 +192,8 @@ def _clocks(plan: Plan) -> list[str]:
 
 def _text(build: Builder, label: str) -> str:
     head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits))
+    if not build.plan.grid:  # which sorts cells into arrays of its own
+        head = head.replace("COUNTED = True", "COUNTED = False")
     last = build.functions[-1].replace("@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {len(build.rows)}"]
     return "\n\n".join(parts) + "\n"

@@ -3,7 +3,7 @@
 from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Mean, asks
-from airflock.engine.passes import scene
+from airflock.engine.passes import flock, scene
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.passes.decide import START, combine
 from airflock.engine.passes.move import beyond
@@ -11,10 +11,21 @@ from airflock.engine.passes.move import beyond
 CLOCKS = ("sample", "collision")
 
 
+def arguments(build: Builder) -> str:
+    """What a measure function is called with."""
+    rest = ", scratch" if flock.surveys(build.plan) else ""
+    return f"time, n, m, row, whole, work, edges, spans, scene, memory, labels, values{rest}"
+
+
 def measure(build: Builder, clock: str) -> None:
     """Function measure_<clock>: writes every Sample field into `values`; returns the least distance of a pair, m."""
     metrics = [metric for metric in build.plan.metrics if metric.clock == clock]
-    lines = build.records("w q c") + build.whole("corners", "obstacles") + ["least2 = FAR", "nn = integer(n)"]
+    surveyed = any(metric.survey is not None for metric in metrics)
+    lines = (
+        build.records("w q c wing" if surveyed else "w q c")
+        + build.whole("corners", "obstacles")
+        + ["least2 = FAR", "nn = integer(n)"]
+    )
     lines += _headings(build)
     lines += _pairs(build, metrics)
     lines += _excursions(build, metrics)
@@ -23,10 +34,12 @@ def measure(build: Builder, clock: str) -> None:
     if any(build.wants(metric.agent, "agent", "rays") for metric in metrics):
         lines += build.bind(["rays_"])
     for metric in metrics:
+        lines += flock.survey(build, metric)
+    for metric in metrics:
         lines += _agents(build, metric)
-        lines += _clusters(build, metric)
+        lines += build.clusters(metric) if build.clusters else _clusters(build, metric)
         lines += _sample(build, metric)
-    head = f"measure_{clock}(time, n, m, row, whole, work, edges, spans, scene, memory, labels, values)"
+    head = f"measure_{clock}({arguments(build)})"
     build.function(head, lines, "return math.sqrt(least2)")
 
 
@@ -59,7 +72,7 @@ def _pairs(build: Builder, metrics: list[Metric]) -> list[str]:
             how = metric.reduce.get(name, "sum")
             lines += build.bind([f"{used}_{name}"])
             before += [f"p_{used}_{c} = {START[how]}"]
-            inner += [combine(how, f"p_{used}_{c}", f"(t[{c}] if ok else {START[how]})")]
+            inner += [combine(how, f"p_{used}_{c}", f"choose(ok, t[{c}], {START[how]})")]
             after += [f"{used}_{name}[i] = p_{used}_{c}"]
     root = ["r = math.sqrt(r2)"] if any(build.wants(metric.pair, "pair", "r") for metric in paired) else []
     offsets = (
@@ -70,7 +83,7 @@ def _pairs(build: Builder, metrics: list[Metric]) -> list[str]:
     square = " + ".join(f"d{a} * d{a}" for a in axes)
     outer = ["ii = integer(i)", *[f"{a}i = {a}[i]" for a in axes], *before, "near2 = FAR"]
     body = [*offsets, f"r2 = {square} + TINY", *root, "ok = (integer(j) != ii) & (integer(j) < nn)"]
-    body += [*inner, "near2 = least(near2, r2 if ok else FAR)"]
+    body += [*inner, "near2 = least(near2, choose(ok, r2, FAR))"]
     outer += loop("j in range(m)", body) + [*after, "least2 = least(least2, near2)"]
     return lines + loop("i in range(n)", outer)
 
@@ -100,6 +113,8 @@ def _agents(build: Builder, metric: Metric) -> list[str]:
         lines += build.bind([f"{metric.name}_{name}" for name in metric.Pair._fields])  # type: ignore[union-attr]
         values = ", ".join(f"{metric.name}_{name}[i]" for name in metric.Pair._fields)  # type: ignore[union-attr]
         body += [f"pair = {build.source.name(metric.Pair)}({values})"]
+    if "shared" in used:
+        body += flock.shared(build, metric.Shared, metric.name)
     memory = getattr(metric.Memory, "_fields", ()) if "memory" in used else ()
     first = memory_offset(build, metric)
     if memory:

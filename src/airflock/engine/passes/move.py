@@ -6,6 +6,7 @@ from airflock.core.maths import norm
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.passes.perceive import normals
+from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
 ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
@@ -22,6 +23,9 @@ def begin(build: Builder) -> None:
     if plan.given_start:
         lines += loop("i in range(n)", [f"{name}[i] = start[{c}, i]" for c, name in enumerate(rows)])
         build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
+        return
+    if plan.start in FORMATIONS:
+        _formation(build, lines)
         return
     philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
     spread = build.source.name(start_rules.spread)
@@ -48,6 +52,22 @@ def begin(build: Builder) -> None:
     ]
     lines += loop("i in range(n)", [*body, *branch("w.speed > ZERO", turn)])
     build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
+
+
+def _formation(build: Builder, lines: list[str]) -> None:
+    """Place all agents in a formation, each off its place by start.jitter."""
+    axes = build.plan.axes
+    philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
+    place = build.source.name(FORMATIONS[build.plan.start])
+    body = [
+        f"sx, sy, sz = {place}(i, w.spacing_x, w.spacing_y, w.spacing_z)",
+        f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 512}, world, seed_low, seed_high)",
+        f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
+        *[f"{a}[i] = s{a} + w.jitter * g{a}" for a in axes],
+    ]
+    build.function(
+        "begin(n, m, row, whole, work, edges, spans, start, scene)", lines, loop("i in range(n)", body), "return 0"
+    )
 
 
 def beyond(build: Builder) -> str:

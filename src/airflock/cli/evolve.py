@@ -1,0 +1,142 @@
+"""Verb evolve: repeat or begin an optimisation."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+
+
+def evolve(
+    scenario: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file, or a study file.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
+    algorithm: Annotated[str | None, typer.Option(help="cmaes, ga, nsga2 or nsga3.", show_default="cmaes")] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates of a generation.", show_default="100")] = None,
+    generations: Annotated[int | None, typer.Option(help="Generations of a run.", show_default="150")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Flights of a candidate.", show_default="1")] = None,
+    seed: Annotated[int | None, typer.Option(help="Decides all chance of the study.", show_default="0")] = None,
+    restarts: Annotated[int | None, typer.Option(help="Independent further runs.", show_default="0")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")
+    ] = None,
+    timeout: Annotated[
+        float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
+    ] = None,
+    sensitivity: Annotated[
+        str, typer.Option(metavar="METHOD", help="Also which parameters matter: sobol or morris.", show_default=False)
+    ] = "",
+    device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu.")] = "cpu",
+    changes: options.Set = None,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
+) -> None:
+    """Evolve a flock's parameters; the folder then holds the optimum, all evaluations, tables and pictures.
+
+    Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
+    """
+    from airflock.errors import StudyError
+    from airflock.evolve.folder import open_folder
+    from airflock.evolve.run import executor_for, run, study_of
+    from airflock.evolve.search import total_flights
+    from airflock.evolve.sensitivity import METHODS
+
+    given = {
+        "algorithm": algorithm,
+        "population": population,
+        "generations": generations,
+        "seeds": seeds,
+        "seed": seed,
+        "restarts": restarts,
+    }
+    study = study_of(
+        scenario,
+        options.settings(changes, agents, duration),
+        search_keys={key: value for key, value in given.items() if value is not None},
+    )
+    if sensitivity and sensitivity not in METHODS:
+        raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
+    if device != "cpu":
+        raise StudyError(f"--device {device}: studies fly on the cpu in this version")
+    open_folder(out, study, resume=resume)
+    begin = time.perf_counter()
+    executor = executor_for(study, scheduler, threads, timeout)
+    with _progress(study, total_flights(study), quiet or as_json) as (watch, note):
+        result = run(study, out, executor, watch, note, sensitivity=sensitivity)
+    if as_json:
+        tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
+    elif not quiet:
+        _print(result)
+
+
+@contextmanager
+def _progress(study: Any, total: int, quiet: bool) -> Iterator[tuple[Any, Callable[[bool], None] | None]]:
+    """A line that moves: generation, best, mean, flights per second, time left; then the finalists."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield None, None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from airflock.evolve.race import ROUNDS
+
+    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
+    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
+    shape = (
+        TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.percentage:>3.0f} %"),
+        TextColumn("{task.fields[rate]:.1f} flights/s"), TimeRemainingColumn(),
+    )  # fmt: skip
+    begin = time.perf_counter()
+    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        searching = bar.add_task("generation 1", total=total, rate=0.0)
+        final: Any = None
+
+        def watch(p: Any) -> None:
+            rate = p.fresh / max(time.perf_counter() - begin, 1e-9)
+            told = "" if p.best is None else f" · best {p.best:.4f}"
+            told += "" if p.mean is None else f" · mean {p.mean:.4f}"
+            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
+            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{told}"
+            bar.update(searching, completed=p.done, description=text, rate=rate)
+
+        def note(_: bool) -> None:
+            nonlocal final, begin
+            if final is None:
+                begin = time.perf_counter()
+                final = bar.add_task("finalists on fresh seeds", total=finals, rate=0.0)
+            done = bar.tasks[-1].completed + 1
+            bar.update(final, completed=done, rate=done / max(time.perf_counter() - begin, 1e-9))
+
+        yield watch, note
+
+
+def _print(result: Any) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"{result.scenario.name}: {result.fitness:.4f} ± {result.sd:.2g} on {result.seeds} fresh seeds"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column("parameter", style="bold")
+    table.add_column("best", justify="right")
+    table.add_column("working range", justify="right")
+    for key, value in result.parameters.items():
+        low, high = result.ranges.get(key, (None, None))
+        table.add_row(key, f"{value:.4g}", "" if low is None else f"{low:.3g} … {high:.3g}")
+    console = Console()
+    console.print(table)
+    console.print(
+        f"95 % interval {result.low:.4f} … {result.high:.4f}; luckiest of the search {result.largest:.4f}; "
+        f"{result.above} of {result.candidates} candidates reach the mean; {result.failed} failed",
+        highlight=False,
+    )
+    console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False)

@@ -1,0 +1,100 @@
+"""Verb harden: from an optimum to parameters that may be flown."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.errors import ScenarioError
+
+
+def harden(
+    scenario: Annotated[
+        str, typer.Argument(metavar="FILE|PRESET|DIR", help="An optimum: a scenario, or a study's folder.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE.toml", help="The hardened scenario.", show_default=False)],
+    seeds: Annotated[int, typer.Option(min=2, help="Flights of each step.")] = 100,
+    first_seed: options.FirstSeed = 0,
+    r_coll: Annotated[
+        float | None,
+        typer.Option(
+            help="Not the recipe: evolve again, radius of collision so many times as large.",
+            show_default=False,
+        ),
+    ] = None,
+    delay: Annotated[
+        float | None, typer.Option(help="Likewise with a delay so many times as large.", show_default=False)
+    ] = None,
+    generations: Annotated[int, typer.Option(min=1, help="Generations of that evolution.")] = 150,
+    changes: options.Set = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+) -> None:
+    """Make an optimum safe, showing what each step costs in fitness and gains in distance.
+
+    Example: airflock harden study --out flyable.toml
+    """
+    from airflock.evolve.after import BEST
+    from airflock.evolve.folder import write
+    from airflock.evolve.harden import cautious, document, evolved_again, harden
+    from airflock.scenarios.files import load
+
+    path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
+    found = load(path, options.settings(changes, None, duration))
+    options.writable(out)
+    for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
+        if factor is not None and not 1.0 <= factor <= 100.0:
+            raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])
+    numbers = range(first_seed, first_seed + seeds)
+    if r_coll is not None or delay is not None:
+        settings = cautious(found, r_coll or 1.0, delay or 1.0)
+        folder, search = out.parent / f"{out.stem}_study", {"generations": generations}
+        steps = evolved_again(found, _space(scenario, found), settings, folder, search, numbers, threads)
+    else:
+        with options.progress(f"{scenario}: flights", 5 * seeds, quiet=as_json) as done:
+            steps = harden(found, numbers, threads=threads, done=done)
+    write(out, document(found, steps[-1]), "Hardened; see airflock harden --help.")
+    if as_json:
+        tables.emit_json(
+            {"scenario": found.name, "seeds": seeds, "out": str(out), "steps": [s.as_dict() for s in steps]}
+        )
+        return
+    _print(found.name, steps, seeds)
+    tables.say(f"saved {out}")
+
+
+def _space(where: str, scenario: Any) -> Any:
+    """The space of the study in a folder, of the study that is shipped for a preset, or all the model's ranges."""
+    from airflock.evolve.folder import STUDY, read
+    from airflock.evolve.space import full_space
+    from airflock.evolve.space_table import read_space
+    from airflock.evolve.study import load_study, shipped
+
+    if where in shipped():
+        return load_study(where).space
+    if (Path(where) / STUDY).is_file():
+        space, faults = read_space(read(Path(where) / STUDY)["space"], scenario)
+        if space is None:
+            raise ScenarioError([f"{where}: {fault}" for fault in faults])
+        return space
+    return full_space(scenario)
+
+
+def _print(name: str, steps: list[Any], seeds: int) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
+    for column in ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)", "n_coll"):
+        table.add_column(column, justify="left" if column == "step" else "right")
+    for step in steps:
+        cost, gain = (f"{m:.3g} ({low:.3g} … {high:.3g})" for m, low, high in (step.cost, step.gain))
+        first = step is steps[0]
+        table.add_row(
+            step.name, f"{step.fitness:.4f}", "" if first else cost, f"{step.r_min:.3g}", "" if first else gain,
+            f"{step.n_coll:.3g}",
+        )  # fmt: skip
+    Console().print(table)

@@ -1,0 +1,209 @@
+"""Builder for a GPU: collects the stages that the passes write and turns each into a device function of one thread."""
+
+import ast
+import builtins
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from textwrap import indent
+
+from airflock.core.contract import Metric
+from airflock.engine.cuda.clusters import clusters
+from airflock.engine.cuda.lower import Context, lowered, parse, used
+from airflock.engine.cuda.primitives import head
+from airflock.engine.cuda.shape import Shape
+from airflock.engine.passes.build import JIT, Builder
+from airflock.engine.plan import Plan
+
+STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "appear_", "measure_")
+SCRATCH = 24  # totals that one stage reduces at once, at most
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage as a device function.
+
+    arguments : names that it takes from the kernel; registers among them
+    results   : registers and values that it returns
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    results: tuple[str, ...]
+
+    def call(self, **given: str) -> str:
+        """Statement that calls it; `given` renames what the kernel calls otherwise."""
+        call = f"{self.name}({', '.join(given.get(name, name) for name in self.arguments)})"
+        return f"{', '.join(self.results)} = {call}" if self.results else call
+
+
+class CudaBuilder(Builder):
+    """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
+
+    def __init__(self, plan: Plan, shape: Shape):
+        super().__init__(replace(plan, grid=False))
+        self.shape = shape
+        self.stages: dict[str, Stage] = {}
+        self.letters: set[str] = set()
+        self.bound: set[str] = set()
+        self.names: set[str] = set()  # of every row, also of those that share another's
+        self.receive: tuple[list[ast.stmt], list[ast.stmt]] | None = None
+        self.head = head(plan.model.name, plan.bits, shape)
+        self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)}
+
+    # -------------------------------------------------------------------------------- what the passes call
+
+    def bind(self, names: Iterable[str]) -> list[str]:
+        """Rows are registers, or bound by the stage."""
+        for name in names:
+            self.row(name)
+            self.bound.add(name)
+            self.names.add(name)
+        return []
+
+    def records(self, letters: str) -> list[str]:
+        """Records of numbers are read once, by the kernel."""
+        self.letters |= set(letters.split())
+        super().records(letters)  # declares the kinds
+        return []
+
+    def whole(self, *names: str) -> list[str]:
+        """Integers of this world are read once, by the kernel."""
+        return []
+
+    def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
+        """Loop over all agents, whatever the order of updates."""
+        return [f"for i in range({lanes}):", *(f"    {line}" for text in body for line in text.splitlines())]
+
+    def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
+        """One stage of a step."""
+        self.function(f"{name}({arguments})", lines, body, f"return {answer}")
+
+    def function(self, head: str, *bodies: Iterable[str] | str, parallel: bool = False) -> None:
+        """Add a device function: a stage lowered to one thread, any other function as it is."""
+        name = head.partition("(")[0]
+        lines: list[str] = []
+        for body in bodies:
+            lines += [body] if isinstance(body, str) else list(body)
+        if name == "receive":
+            self.receive = _split(parse(lines))
+        elif name.startswith(STAGES):
+            self._stage(name, lines)
+        else:
+            self.plain.add(name)
+            self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
+            return
+        if name != "receive":
+            self.letters, self.bound = set(), set()
+
+    def clusters(self, metric: Metric) -> list[str]:  # type: ignore[override]
+        """Clusters are found by all threads of a block together."""
+        return clusters(self, metric)
+
+    # ---------------------------------------------------------------------------------------------- lowering
+
+    def known(self) -> set[str]:
+        """Names of the driver module."""
+        constants = {t.id for s in parse(self.head) if isinstance(s, ast.Assign) for t in s.targets if hasattr(t, "id")}
+        here = set(self.source._names.values()) | self.plain | {stage.name for stage in self.stages.values()}
+        return constants | here | set(dir(builtins)) | {"math", "np", "cuda"}
+
+    def same(self, name: str) -> str:
+        """The name under which a row is kept: unperturbed perception shares the rows of the truth."""
+        number = self.row(name)
+        return next(known for known, other in self.rows.items() if other == number)
+
+    def columns(self) -> dict[str, tuple[str, int]]:
+        """Shared tables: `truth`, what agents are, and `said`, what the others hear; by row."""
+        axes, plan = self.plan.axes, self.plan
+        found = {a: ("truth", c) for c, a in enumerate(axes)}
+        if plan.noisy or plan.delayed:
+            found |= {f"h{a}": ("said", c) for c, a in enumerate(axes)}
+            found |= {f"hv{a}": ("said", len(axes) + c) for c, a in enumerate(axes)}
+        else:
+            found |= {f"h{a}": ("truth", c) for c, a in enumerate(axes)}
+            found |= {f"hv{a}": ("truth", len(axes) + c) for c, a in enumerate(axes)}
+        return found
+
+    def _stage(self, name: str, lines: list[str]) -> None:
+        rows = self.names | {"u0", "u1", "u2", "u3"}
+        if name in ("snapshot", "perceive"):
+            lines = [line.replace("ring[", "past[") for line in lines]
+        statements = parse(lines)
+        if name == "neighbours" and self.receive is not None:
+            statements = _with_radio(statements, self.receive)
+        turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
+        context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
+        context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
+        body = lowered(statements, context)
+        body = [_Renamed(self, name).visit(s) for s in body]
+        self._add(name, body, context.rows)
+
+    def _add(self, name: str, body: list[ast.stmt], rows: set[str]) -> None:
+        """The device function of lowered statements."""
+        last = body[-1] if body else None
+        results = []
+        if isinstance(last, ast.Return):
+            body.pop()
+            if last.value is not None and not isinstance(last.value, ast.Constant):
+                body += parse(f"answer = {ast.unparse(last.value)}")
+                results = ["answer"]
+        read, stored = used(body)
+        registers = {
+            r for r in read | stored if r.endswith("_i") and (r[:-2] in rows or re.match(r"(mem|kept)\d+_i", r))
+        }
+        values = sorted((s for s in stored if re.fullmatch(r"value\d+", s)), key=lambda s: int(s[5:]))
+        results = [*sorted(registers & stored), *values, *results]
+        free = (read - stored - self.known()) | registers
+        tables = [] if self.shape.registers else sorted(self.bound_rows(read))
+        lines = [f"{row} = work[{self.row(row)}]" for row in tables]
+        free = (free - set(tables)) | ({"work"} if tables else set())
+        order = tuple(sorted(free))
+        text = [*lines, *(line for s in body for line in ast.unparse(s).splitlines())]
+        if "scratch" in read:
+            text = ["cuda.syncthreads()", *text]
+        if results:
+            text += [f"return {', '.join(results)}"]
+        self.functions.append(f"{JIT}\ndef {name}({', '.join(order)}):\n" + indent("\n".join(text or ["pass"]), "    "))
+        self.stages[name] = Stage(name, order, tuple(results))
+
+    def bound_rows(self, read: set[str]) -> set[str]:
+        """Rows of the table that a stage takes by name."""
+        return {name for name in read if name in self.bound}
+
+
+class _Renamed(ast.NodeTransformer):
+    """Records under the kernel's names (p → row_p), rows that share another's under its name, radio calls gone."""
+
+    def __init__(self, build: CudaBuilder, name: str):
+        self.build = build
+        self.letters = set(build.letters)
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.letters:
+            node.id = f"row_{node.id}"
+        elif node.id.endswith("_i") and node.id[:-2] in self.build.names:
+            node.id = f"{self.build.same(node.id[:-2])}_i"
+        return node
+
+
+def _split(statements: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
+    """What `receive` does once per agent, and for each pair."""
+    loop = next(s for s in statements if isinstance(s, ast.For))
+    return [s for s in statements if not isinstance(s, (ast.For, ast.Return))], loop.body
+
+
+def _with_radio(statements: list[ast.stmt], radio: tuple[list[ast.stmt], list[ast.stmt]]) -> list[ast.stmt]:
+    """The loop nest of `neighbours` with the reception of each pair in it, instead of a call that fills rows."""
+    for outer in statements:
+        if isinstance(outer, ast.For):
+            kept: list[ast.stmt] = []
+            for s in outer.body:
+                if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call):
+                    kept += radio[0]
+                    continue
+                if isinstance(s, ast.For):
+                    s.body = [*radio[1], *s.body]
+                kept.append(s)
+            outer.body = kept
+    return statements

@@ -1,0 +1,64 @@
+"""Compiled: argument types of a kernel, and its PTX for any GPU without one at hand."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from airflock.engine.cuda.kernel import ARGUMENTS
+
+# dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words
+KINDS = dict(zip(ARGUMENTS, (
+    "2r", "2i", "3r", "3r", "3i", "3r", "3r", "2r", "2i", "3r", "3r", "4r", "4r", "3r", "3u", "3r", "3r", "1s", "3r",
+    "3r", "2r", "4r",
+), strict=True))  # fmt: skip
+
+
+def signature(bits: int, kinds: Any = None) -> tuple[Any, ...]:
+    """Numba types of a kernel's arguments."""
+    from numba import types
+
+    real = types.float32 if bits == 32 else types.float64
+    scalar: dict[str, Any] = {"r": real, "i": types.int64, "s": types.int32, "u": types.uint32}
+    return tuple(types.Array(scalar[kind[1]], int(kind[0]), "C") for kind in (kinds or KINDS).values())
+
+
+class _Absent:
+    """Stands for a GPU of some compute capability where there is none."""
+
+    def __init__(self, capability: tuple[int, int]):
+        self.compute_capability = capability
+
+
+@contextmanager
+def pretending(capability: tuple[int, int]) -> Iterator[None]:
+    """Device functions are compiled for this compute capability instead of the present GPU's."""
+    dispatcher: Any = import_module("numba.cuda.dispatcher")
+    kept = dispatcher.get_current_device
+    dispatcher.get_current_device = lambda: _Absent(capability)
+    try:
+        yield
+    finally:
+        dispatcher.get_current_device = kept
+
+
+def ptx(
+    driver: ModuleType, bits: int, capabilities: tuple[tuple[int, int], ...] = ((8, 0), (9, 0)), kernel: str = "fly"
+) -> dict[tuple[int, int], str]:
+    """PTX of a kernel for some compute capabilities; needs no GPU, but the compiler of numba-cuda."""
+    compiler: Any = import_module("numba.cuda.compiler")
+    dispatched = getattr(driver, kernel)
+    options = dispatched.targetoptions
+    with pretending(capabilities[0]):
+        library, _ = compiler._compile_pyfunc_with_fixup(
+            dispatched.py_func,
+            getattr(driver, "SIGNATURES", {}).get(kernel) or signature(bits),
+            device=False,
+            fastmath=options.get("fastmath"),
+            launch_bounds=options.get("launch_bounds"),
+            cc=capabilities[0],
+            lto=False,
+            abi="numba",
+        )
+        return {cc: "\n".join(library.get_asm_strs(cc=cc)) for cc in capabilities}

@@ -1,0 +1,288 @@
+"""Kernel: a whole flight of one flock per block, as the order in which the stages run."""
+
+import re
+
+from airflock.engine.cuda.build import SCRATCH, CudaBuilder
+from airflock.engine.cuda.shape import Shape
+from airflock.engine.cuda.start import agents, begin, own, tables
+from airflock.engine.passes import decide, measure, move, perceive, scene
+from airflock.engine.passes.build import branch, columns, loop
+from airflock.engine.plan import WHOLE, Plan
+
+ARGUMENTS = (
+    "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
+    "starts", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums",
+    "all_reached", "all_frames",
+)  # fmt: skip
+CUT = 0.01  # m, slack that covers the rounding of positions in single precision
+
+
+def flight(plan: Plan, shape: Shape) -> str:
+    """Text of the driver that flies one flock per block: kernel `fly`."""
+    build = CudaBuilder(plan, shape)
+    perceive.snapshot(build)
+    perceive.perceive(build)
+    perceive.receive(build)
+    decide.neighbours(build)
+    decide.boundaries(build)
+    decide.decide(build)
+    move.move(build)
+    if plan.goals:
+        scene.aim(build)
+    if plan.appearing:
+        scene.appear(build)
+    for clock in clocks(plan):
+        measure.measure(build, clock)
+    body = _time(build)  # first: it may still name rules
+    lines = [*_memory(build), *begin(build), *body, *_end(build)]
+    options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.threads}, cache=True")
+    text = [f"@cuda.jit({options})", f"def fly({', '.join(ARGUMENTS)}):", *(f"    {line}" for line in lines)]
+    parts = [build.head, *build.source.blocks, *build.functions, "\n".join(text)]
+    parts += [f"ROWS = {len(build.rows)}", f"COLUMNS = {len(columns(plan.metrics))}"]
+    return "\n\n".join(parts) + "\n"
+
+
+def clocks(plan: Plan) -> list[str]:
+    """Clocks that any metric of a plan runs on."""
+    return [clock for clock in measure.CLOCKS if any(metric.clock == clock for metric in plan.metrics)]
+
+
+# --------------------------------------------------------------------------------------------------------- memory
+
+
+def _memory(build: CudaBuilder) -> list[str]:
+    """Where everything of this flock and this thread lies."""
+    plan, shape = build.plan, build.shape
+    lines = ["flock = cuda.blockIdx.x; tid = integer(cuda.threadIdx.x)"]
+    lines += ["i = integer(tid // PER_AGENT); sub = integer(tid % PER_AGENT)"]
+    lines += ["row = rows[flock]; whole = wholes[flock]"]
+    lines += ["faces = all_faces[flock]; edges = all_edges[flock]; spans = all_spans[flock]"]
+    lines += ["goals = all_goals[flock]; reached = all_reached[flock]; past = pasts[flock]; store = stores[flock]"]
+    lines += ["later = all_later[flock]; shapes = all_shapes[flock % all_shapes.shape[0]]"]
+    wide = {"seed_low": "u32", "seed_high": "u32"}
+    names = {"ring": "slots"}
+    lines += [f"{names.get(w, w)} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
+    lines += ["n = agents", *_records(build), "late = real(delay) * row_c.dt"]
+    kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
+    if shape.registers:
+        for table, width in tables(build).items():
+            lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
+        lines += ["links_ = cuda.local.array(WORDS, np.uint32)"]
+        lines += ["seen = cuda.shared.array(WORDS, np.uint32)", "grown = cuda.shared.array(WORDS, np.uint32)"]
+    else:
+        lines += ["work = works[flock]; words = all_words[flock]; mem = all_mem[flock]; memory = all_memory[flock]"]
+    lines += [f"scratch = cuda.shared.array((2, WARPS, {SCRATCH}), {kind})"]
+    count = len(columns(plan.metrics))
+    lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
+    lines += [f"gust = cuda.local.array(3, {kind})", "gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
+    lines += [f"near = cuda.local.array({scene.NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
+    lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
+    lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
+    lines += [f"scene = ({', '.join(scene.PARTS)})"]
+    return [*lines, *_registers(build)]
+
+
+def _records(build: CudaBuilder) -> list[str]:
+    """Records of numbers, once per flight."""
+    lines, offset = [], 0
+    for letter, fields in build.plan.records.items():
+        kind = build.source.record(letter.upper() * 2, fields)
+        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
+        offset += len(fields)
+    return lines
+
+
+def _registers(build: CudaBuilder) -> list[str]:
+    """First values of all registers; the memories of model and metrics at their start values."""
+    lines = []
+    for name in sorted({r for stage in build.stages.values() for r in (*stage.arguments, *stage.results)}):
+        if re.fullmatch(r"u[0-3]_i", name):
+            lines += [f"{name} = u32(0)"]
+        elif name.endswith("_i"):
+            lines += [f"{name} = {_first_value(build, name)}"]
+    return lines if build.shape.registers else []
+
+
+def _first_value(build: CudaBuilder, name: str) -> str:
+    """First value of one register."""
+    kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
+    if not kept:
+        return "ZERO"
+    starts = [s for m in build.plan.metrics for s in getattr(m.Memory, "_field_defaults", {}).values()]
+    if kept[1] == "mem":
+        starts = list(getattr(build.plan.model.Memory, "_field_defaults", {}).values())
+    return f"real({starts[int(kept[2])]})"
+
+
+# ------------------------------------------------------------------------------------------------------------ time
+
+
+def _time(build: CudaBuilder) -> list[str]:
+    """The loop over time; counters instead of remainders, which a GPU divides for."""
+    plan = build.plan
+    heard = plan.noisy or plan.delayed
+    count = len(columns(plan.metrics))
+    starts = {"min": "FAR", "max": "-FAR"}
+    first = [starts.get(how, "ZERO") for _, how, _ in columns(plan.metrics)]
+    lines = branch(
+        "tid == 0", [f"totals[{c}, 0] = {s}; totals[{c}, 1] = ZERO" for c, s in enumerate(first)] or ["pass"]
+    )
+    lines += ["count_sample = integer(0); count_collision = integer(0); k = integer(0); slot_out = integer(0)"]
+    lines += ["to_decide = integer(0); to_sample = integer(0); to_collide = integer(0)"]
+    lines += ["moved = ZERO; gap = ZERO; calm = False; frame = integer(0); answer = ZERO"]
+    lines += [f"value{c} = ZERO" for c in range(count)]
+    if heard:
+        lines += ["to_hear = integer((decide_every - delay % decide_every) % decide_every)"]
+        lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
+    step = ["time = real(step) * row_c.dt"]
+    if heard:
+        put = ["slot = slot_in", build.stages["snapshot"].call(), "to_hear = decide_every"]
+        put += ["slot_in = integer(slot_in + 1) if slot_in + 1 < slots else integer(0)"]
+        step += [*branch("to_hear == 0", put), "to_hear = integer(to_hear - 1)"]
+    step += _world(build)
+    step += _watch(build)
+    due = ["look"] if "collision" in clocks(plan) else []
+    meets = not plan.sequential
+    step += ["meet = to_decide == 0" if meets else "meet = False", "take = to_sample == 0"]
+    shown = [*branch("meet", _perceived(build))] if meets else []
+    show = ["cuda.syncthreads()", *_shown(build), *shown, "cuda.syncthreads()"]
+    step += branch(" or ".join(["meet", "take", *due]), show)
+    if meets:
+        step += [*branch("meet", _choose(build)), "to_decide = integer(to_decide - 1)"]
+    step += branch("look", _looked(build)) if due else []
+    step += [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
+    step += branch("step < steps", _advance(build))
+    return [*lines, *loop("step in range(steps + 1)", step)]
+
+
+def _world(build: CudaBuilder) -> list[str]:
+    """The goal goes on its way, and what is due appears; both may look at every agent."""
+    plan = build.plan
+    lines = [build.stages["aim_"].call(elapsed="row_c.dt")] if plan.goals else []
+    lines += [build.stages["appear_"].call()] if plan.appearing else []
+    if plan.herd or plan.appearing:
+        return ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", *lines, "cuda.syncthreads()"]
+    return lines
+
+
+def _watch(build: CudaBuilder) -> list[str]:
+    """Whether to look for collisions: while nobody can have come near enough, a vote of all threads says no."""
+    if "collision" not in clocks(build.plan):
+        return []
+    watched = _within(build) is not None
+    vote = "cuda.syncthreads_or(integer(1) if moved >= gap else integer(0)) != 0" if watched else "True"
+    body = [f"look = {vote}", "to_collide = collide_every", "count_collision = integer(count_collision + 1)"]
+    if watched:
+        body += branch("not look and not calm", [*_forget(build), "calm = True"])
+    return ["look = False", *branch("to_collide == 0", body), "to_collide = integer(to_collide - 1)"]
+
+
+def _within(build: CudaBuilder) -> str | None:
+    """Distance (m) beyond which nothing collides, as text; None if a metric gives no such promise."""
+    metrics = [metric for metric in build.plan.metrics if metric.clock == "collision"]
+    if not all(metric.within is not None for metric in metrics):
+        return None
+    width = "ZERO"
+    for metric in metrics:
+        width = f"most({width}, {build.call(metric.within, 'within', {'q': 'row_q'})})"  # type: ignore[arg-type]
+    return width
+
+
+def _forget(build: CudaBuilder) -> list[str]:
+    """Memories of the collision metrics back at their start values."""
+    lines = []
+    for metric in build.plan.metrics:
+        if metric.clock != "collision":
+            continue
+        first = measure.memory_offset(build, metric)
+        for c, start in enumerate(getattr(metric.Memory, "_field_defaults", {}).values()):
+            own = f"kept{first + c}_i" if build.shape.registers else f"memory[{first + c}, i]"
+            lines += agents(build, [f"{own} = real({start})"])
+    return lines
+
+
+def _shown(build: CudaBuilder) -> list[str]:
+    """The own true state, where the others of the block see it."""
+    if not build.shape.registers:
+        return []
+    found = {column: row for row, (table, column) in build.columns().items() if table == "truth" and row in build.names}
+    lines = [f"truth[i, {c}] = {own(build, row)}" for c, row in sorted(found.items())]
+    return branch("i < n and sub == 0", lines)
+
+
+def _perceived(build: CudaBuilder) -> list[str]:
+    """Both errors advance; what the others hear goes into the shared table."""
+    lines = ["slot = slot_out", build.stages["perceive"].call()]
+    said = {row: c for row, (table, c) in build.columns().items() if table == "said"}
+    if said and build.shape.registers:
+        lines += branch("i < n and sub == 0", [f"said[i, {c}] = {row}_i" for row, c in said.items()])
+    return lines
+
+
+def _choose(build: CudaBuilder) -> list[str]:
+    """Meet neighbours and surfaces, decide."""
+    barrier = [] if build.shape.registers else ["cuda.syncthreads()"]
+    lines = []
+    for name in ("neighbours", "boundaries", "decide"):
+        if name in build.stages:
+            lines += [build.stages[name].call(k_="k"), *barrier]
+    lines += ["k = integer(k + 1); to_decide = decide_every"]
+    return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
+
+
+def _looked(build: CudaBuilder) -> list[str]:
+    lines = [build.stages["measure_collision"].call(), *_added(build, "collision")]
+    width = _within(build)
+    if width is None:
+        return lines
+    return [*lines, f"gap = answer - {width} - real({CUT})", "moved = ZERO; calm = False"]
+
+
+def _taken(build: CudaBuilder) -> list[str]:
+    """One sample: order parameters and, where they are kept, positions, velocities and commands."""
+    plan, axes = build.plan, build.plan.axes
+    lines = ["to_sample = sample_every", "count_sample = integer(count_sample + 1)"]
+    if "sample" in clocks(plan):
+        lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
+    if plan.record:
+        names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
+        body = [f"all_frames[flock, frame, {c}, i] = {own(build, name)}" for c, name in enumerate(names)]
+        lines += [*agents(build, body), "frame = integer(frame + 1)"]
+    return lines
+
+
+def _added(build: CudaBuilder, clock: str) -> list[str]:
+    """The values of one instant go into the sums over time; one thread keeps them."""
+    lines = []
+    for c, (_, how, when) in enumerate(columns(build.plan.metrics)):
+        if when == clock:
+            add = f"totals[{c}, 0], totals[{c}, 1] = add_exactly(totals[{c}, 0], totals[{c}, 1], value{c})"
+            kept = f"totals[{c}, 0] = {'least' if how == 'min' else 'most'}(totals[{c}, 0], value{c})"
+            lines += [add if how in ("mean", "sum") else kept]
+    return branch("tid == 0", lines) if lines else []
+
+
+def _advance(build: CudaBuilder) -> list[str]:
+    """One motion step; with a sequential update each agent in turn meets, decides and moves."""
+    further = "moved += real(2.0) * math.sqrt(answer) * row_c.dt"
+    if not build.plan.sequential:
+        return [build.stages["move"].call(), further]
+    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in build.stages else []
+    alone = [build.stages[name].call(k_="step") for name in ("boundaries", "decide", "move") if name in build.stages]
+    turn += [*branch("tid == 0", [*alone, "fastest_ = most(fastest_, answer)"]), "cuda.syncthreads()"]
+    return ["fastest_ = ZERO", *loop("i in range(n)", turn), "answer = fastest_", further]
+
+
+def _end(build: CudaBuilder) -> list[str]:
+    """What a flight leaves behind."""
+    axes = build.plan.axes
+    names = [*axes, *(f"v{a}" for a in axes)]
+    lines = agents(build, [f"states[flock, {c}, i] = {own(build, name)}" for c, name in enumerate(names)])
+    count = len(columns(build.plan.metrics))
+    last = [f"all_sums[flock, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
+    last += [
+        f"all_sums[flock, {count}, 0] = real(count_sample)",
+        f"all_sums[flock, {count + 1}, 0] = real(count_collision)",
+    ]
+    return [*lines, *branch("tid == 0", [*last, "statuses[flock] = 0"])]

@@ -1,0 +1,214 @@
+"""Launch: memory for many flocks, one kernel, and what it leaves behind. Nothing else."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.cpu import Flown, combined, goals_reached
+from airflock.engine.cuda.device import free_memory, multiprocessors, required, runtime
+from airflock.engine.cuda.kernel import ARGUMENTS, flight
+from airflock.engine.cuda.shape import Shape, shape_of
+from airflock.engine.passes.build import columns
+from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.store import load_driver
+from airflock.engine.tables import Tables
+from airflock.errors import DeviceError
+
+AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
+SHARE = 0.9  # of the free memory that may be used
+
+
+@lru_cache(maxsize=256)
+def flight_driver(plan: Plan, shape: Shape) -> ModuleType:
+    """Driver of a plan for one layout of flocks."""
+    return load_driver(flight(plan, shape), f"{plan.model.name}_cuda")
+
+
+def fly_many(
+    plan: Plan,
+    jobs: Sequence[Tables],
+    starts: Sequence[NDArray[Any]] | None = None,
+    done: Callable[[], None] | None = None,
+    shape: Shape | None = None,
+) -> list[Flown]:
+    """Fly many worlds of one plan, each from its tables; results in the order of the jobs.
+
+    starts : (component, agent) of each world where the plan asks for it
+    done   : called once per flight as results come in
+    shape  : layout of a flock instead of the one that suits population, flock size and GPU
+
+    Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
+    """
+    required(shape is not None and shape.simulated)
+    groups: dict[Any, list[int]] = {}
+    for number, tables in enumerate(jobs):
+        groups.setdefault(_alike(plan, tables), []).append(number)
+    flown_by: dict[int, Flown] = {}
+    for key, members in groups.items():
+        layout = shape or shape_of(key[0], len(members), multiprocessors(), sequential=plan.sequential)
+        driver = flight_driver(plan, layout)
+        size = _batch(plan, driver, layout, [jobs[m] for m in members])
+        for first in range(0, len(members), size):
+            batch = members[first : first + size]
+            given = None if starts is None else [starts[m] for m in batch]
+            flown = _fly(plan, driver, layout, [jobs[m] for m in batch], given)
+            for member, result in zip(batch, flown, strict=True):
+                flown_by[member] = result
+                if done:
+                    done()
+    return [flown_by[number] for number in range(len(jobs))]
+
+
+def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
+    """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
+    whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
+    frames = whole["steps"] // whole["sample_every"] if plan.record else 0
+    scene = hashlib.sha256(tables.shapes.tobytes() + tables.nodes.tobytes()).digest() if len(tables.nodes) else b""
+    return whole["agents"], frames, len(tables.goals), len(tables.later), scene
+
+
+def _sizes(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays that a launch works on, for one flock, by argument name."""
+    whole = [dict(zip(WHOLE, tables.whole.tolist(), strict=True)) for tables in jobs]
+    n, dims, lanes = max(w["agents"] for w in whole), plan.dimensions, shape.lanes
+    frames = max(w["steps"] // w["sample_every"] + 1 for w in whole)
+    table = not shape.registers
+    model = len(getattr(plan.model.Memory, "_fields", ()))
+    kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
+    heard = plan.noisy or plan.delayed
+    return {
+        "starts": (2 * dims, n) if plan.given_start else (1, 1),
+        "pasts": (max(w["ring"] for w in whole), 2 * dims, lanes) if heard else (1, 1, 1),
+        "stores": (lanes, 2 * dims + 1, lanes) if plan.links else (1, 2 * dims + 1, 1),
+        "works": (driver.ROWS, lanes) if table else (1, 1),
+        "all_words": (4, lanes) if table else (1, 1),
+        "all_mem": (max(model, 1), lanes) if table else (1, 1),
+        "all_memory": (max(kept, 1), lanes) if table else (1, 1),
+        "states": (2 * dims, n),
+        "all_sums": (driver.COLUMNS + 2, 2),
+        "all_reached": (max(len(jobs[0].goals), 1),),
+        "all_frames": (frames, 3 * dims, n) if plan.record else (1, 1, 1),
+    }
+
+
+def memory_needed(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
+    """Bytes in the GPU's memory that one flock of these flights needs."""
+    numbers = sum(int(np.prod(size)) for size in _sizes(plan, driver, shape, jobs).values())
+    tables = max(t.row.size + 2 * t.whole.size + t.faces.size + t.edges.size + 2 * t.spans.size for t in jobs)
+    return (numbers + tables + 64) * plan.bits // 8
+
+
+def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
+    """How many flocks one launch takes; raises DeviceError if not even one fits."""
+    if shape.simulated:
+        return len(jobs)
+    needed, free = memory_needed(plan, driver, shape, jobs), int(SHARE * free_memory())
+    if needed > free:
+        agents = int(jobs[0].whole[WHOLE.index("agents")])
+        raise DeviceError(
+            f"a flock of {agents} agents needs {needed / 1e9:.2g} GB of the GPU's memory and {free / 1e9:.2g} GB are "
+            f"free; about {_fitting(agents, needed, free)} agents fit, or choose device = cpu"
+        )
+    return max(1, min(AT_ONCE, free // needed, len(jobs)))
+
+
+def _fitting(agents: int, needed: int, free: int) -> int:
+    """Agents that fit, if memory grows with their square at worst."""
+    return max(1, int(agents * (free / needed) ** 0.5))
+
+
+def _fly(
+    plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
+) -> list[Flown]:
+    """One launch."""
+    own = arrays(plan, driver, shape, jobs, starts)
+    driver.fly[len(jobs), shape.threads](*(own[name] for name in ARGUMENTS))
+    return results(plan, jobs, own)
+
+
+def arrays(
+    plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables], starts: Sequence[NDArray[Any]] | None
+) -> dict[str, Any]:
+    """All arguments of a kernel, in the GPU's memory, by name."""
+    cuda, real = runtime(), jobs[0].row.dtype
+    sizes = _sizes(plan, driver, shape, jobs)
+    written = ("pasts", "works", "states", "all_sums", "all_frames")
+    own: dict[str, Any] = {name: cuda.device_array((len(jobs), *sizes[name]), real) for name in written}
+    own["all_words"] = cuda.device_array((len(jobs), *sizes["all_words"]), np.uint32)
+    own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
+    own["all_reached"] = cuda.to_device(np.full((len(jobs), *sizes["all_reached"]), -1.0, real))
+    own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
+    own["stores"] = cuda.to_device(_silent(len(jobs), sizes["stores"], real))
+    model = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
+    kept = [s for metric in plan.metrics for s in getattr(metric.Memory, "_field_defaults", {}).values()]
+    for name, begin in (("all_mem", model), ("all_memory", kept)):
+        own[name] = cuda.to_device(_memories(len(jobs), sizes[name], begin, real))
+    if not shape.registers:
+        own["works"] = cuda.to_device(np.zeros((len(jobs), *sizes["works"]), real))
+    given = {
+        "rows": np.stack([t.row for t in jobs]),
+        "wholes": np.stack([t.whole for t in jobs]),
+        "all_faces": _padded([t.faces for t in jobs]),
+        "all_edges": _padded([t.edges for t in jobs]),
+        "all_spans": _padded([t.spans for t in jobs]),
+        "all_goals": _padded([t.goals for t in jobs]),
+        # one scene for all flocks, or one of its own for each where some of it appears while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
+        "all_later": _padded([t.later for t in jobs]),
+        "nodes": jobs[0].nodes.reshape(-1, 6),
+        "links": jobs[0].links.reshape(-1, 3),
+    }
+    own |= {name: cuda.to_device(np.ascontiguousarray(array)) for name, array in given.items()}
+    return own
+
+
+def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flown]:
+    """Results of a launch, flight by flight."""
+    names = ("all_sums", "states", "statuses", *(("all_frames",) if plan.record else ()))
+    names += ("all_reached",) if plan.goals else ()
+    left = {name: own[name].copy_to_host() for name in names}
+    count = len(columns(plan.metrics))
+    found = []
+    for flock, tables in enumerate(jobs):
+        n = int(tables.whole[WHOLE.index("agents")])
+        exact = left["all_sums"][flock].astype(np.float64)
+        sums = exact[:, 0].copy()
+        sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
+        values = combined(plan, sums) | goals_reached(
+            plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
+        )
+        frames = left["all_frames"][flock][:, :, :n] if plan.record else None
+        found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
+    return found
+
+
+def _padded(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Tables of several flights in one array; short ones are filled with zeros that nobody reads."""
+    length = max(1, *(len(array) for array in arrays))
+    found = np.zeros((len(arrays), length, arrays[0].shape[1]), arrays[0].dtype)
+    for flock, array in enumerate(arrays):
+        found[flock, : len(array)] = array
+    return found
+
+
+def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
+    return np.stack([np.ascontiguousarray(start, real) for start in starts])
+
+
+def _silent(flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """Packets of every pair before any was received."""
+    found = np.zeros((flocks, *size), real)
+    found[:, :, -1] = -1e9
+    return found
+
+
+def _memories(flocks: int, size: tuple[int, ...], begin: list[float], real: Any) -> NDArray[Any]:
+    found = np.zeros((flocks, *size), real)
+    for c, value in enumerate(begin[: size[0]]):
+        found[:, c] = value
+    return found

@@ -1,0 +1,299 @@
+"""Lower: the text of a stage, written as loops over agents, as what one thread of a block does.
+
+The passes of `engine.passes` are the only text of a stage. Here its syntax tree is changed:
+
+* `for i in range(n)`: the thread's own agent where states lie in registers (row `x[i]` → register `x_i`), else every
+  so-manieth agent. Totals that the loop carries (`a += ...`, `a = least(a, ...)`) are reduced over the block before
+  they are next read.
+* `for j in range(m)` within it: shared by the threads of one agent, unrolled; `x[j]` → the shared table.
+* `mem[c, i]`, `memory[c, i]`, `values[c]`: registers.
+"""
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from airflock.engine.cuda.shape import UNROLL, Shape
+
+NEUTRAL = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
+TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
+PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
+
+
+@dataclass
+class Context:
+    """What lowering has to know.
+
+    shape    : layout of a flock
+    rows     : names that stand for rows of the work table
+    columns  : row → (shared table, column) for rows that other agents read
+    pair_how : how a total of the pair loop is reduced over the threads of one agent, by its name
+    renamed  : free names that the kernel calls otherwise
+    turn     : one agent i at a time, for all threads
+    carried  : totals stay with each thread instead of being reduced over the block
+    alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
+    """
+
+    shape: Shape
+    rows: set[str]
+    columns: dict[str, tuple[str, int]]
+    pair_how: dict[str, str] = field(default_factory=dict)
+    renamed: dict[str, str] = field(default_factory=dict)
+    turn: bool = False
+    carried: bool = False
+    alone: bool = False
+
+
+def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
+    """Statements of a text."""
+    return ast.parse(lines if isinstance(lines, str) else "\n".join(lines)).body
+
+
+def lowered(statements: list[ast.stmt], context: Context) -> list[ast.stmt]:
+    """Statements of a stage as one thread runs them."""
+    kept = [_Bound(context).visit(s) for s in statements]
+    return _Totals(context).run([s for s in kept if s is not None])
+
+
+class _Bound(ast.NodeTransformer):
+    """Drops statements that only take a row or a part of a tuple of arrays: the kernel holds them by name."""
+
+    def __init__(self, context: Context):
+        self.known = ("words", "scene") if context.shape.registers else ("scene",)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
+        source = node.value.value if isinstance(node.value, ast.Subscript) else None
+        return None if isinstance(source, ast.Name) and source.id in self.known else node
+
+
+class _Totals:
+    """Walks statements in order; totals over agents wait, and are reduced together when one of them is read."""
+
+    def __init__(self, context: Context):
+        self.context = context
+        self.waiting: dict[str, str] = {}
+        self.count = 0
+
+    def run(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Lowered statements; totals that nothing reads are reduced at the end."""
+        return [*self.walk(statements), *self.flush()]
+
+    def walk(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Lowered statements of one block."""
+        done: list[ast.stmt] = []
+        for statement in statements:
+            agents = _over_agents(statement)
+            if self.waiting and _names(statement, ast.Load) & set(self.waiting):
+                done += self.flush()
+            if agents is not None:
+                done += self.agents(agents)
+            elif isinstance(statement, (ast.For, ast.While, ast.If)):
+                if isinstance(statement, ast.If):
+                    statement.test = _Registers(self.context).visit(statement.test)
+                statement.body = [*self.walk(statement.body), *self.flush()]
+                statement.orelse = self.walk(statement.orelse) if statement.orelse else []
+                done.append(statement)
+            else:
+                done.append(_Registers(self.context).visit(statement))
+        return [ast.fix_missing_locations(s) for s in done]
+
+    def agents(self, loop: ast.For) -> list[ast.stmt]:
+        """A loop over agents."""
+        context, shape = self.context, self.context.shape
+        if context.alone and any(isinstance(s, ast.If) for s in loop.body):
+            return [_Everyone(context).visit(loop)] if shape.registers else [loop]
+        totals = carried_totals(loop.body)
+        paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in ast.walk(loop))
+        body = _Pairs(context).walk(loop.body)
+        body = [_Registers(context).visit(s) for s in body]
+        if not context.carried:
+            self.waiting |= totals
+        if context.turn:
+            return body
+        if shape.registers:
+            if not paired:
+                masked = parse(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
+                rest = masked if shape.per_agent > 1 and not context.carried else []
+                test = ast.Compare(ast.Name("i", ast.Load()), [ast.Lt()], [ast.Name("n", ast.Load())])
+                return [ast.If(test, body, []), *rest]
+            own = parse(f"{t} = {t} if (i < n) and (sub == 0) else {NEUTRAL[totals[t]]}" for t in totals)
+            return [*body, *own]
+        first, stride = ("tid // PER_AGENT", "THREADS // PER_AGENT") if paired else ("tid", "THREADS")
+        loop.iter = ast.parse(f"range({first}, n, {stride})", mode="eval").body
+        loop.body = body
+        if not paired:
+            return [loop]
+        # rows that a pair loop reads or writes belong to other threads before and after it
+        own = parse(f"{t} = {t} if sub == 0 else {NEUTRAL[totals[t]]}" for t in totals)
+        return [*parse("cuda.syncthreads()"), loop, *parse("cuda.syncthreads()"), *own]
+
+    def flush(self) -> list[ast.stmt]:
+        """Reduce all waiting totals over the block, so that every thread holds them."""
+        if not self.waiting:
+            return []
+        shape, names = self.context.shape, list(self.waiting)
+        lane, side = ("tid & 31", "tid >> 5") if not shape.simulated else ("0", "tid")
+        side_ = self.count % 2  # one half is read while the other is written
+        first = [f"{name} = warp_{self.waiting[name]}({name}, tid)" for name in names]
+        put = [f"scratch[{side_}, {side}, {c}] = {name}" for c, name in enumerate(names)]
+        get = [f"{name} = scratch[{side_}, 0, {c}]" for c, name in enumerate(names)]
+        turn = [TOTAL[self.waiting[n]].format(a=n, b=f"scratch[{side_}, part, {c}]") for c, n in enumerate(names)]
+        text = [*first, f"if {lane} == 0:", *(f"    {line}" for line in put), "cuda.syncthreads()", *get]
+        if shape.warps > 1:
+            text += ["for part in range(1, WARPS):", *(f"    {line}" for line in turn)]
+        self.waiting = {}
+        self.count += 1
+        return parse(text)
+
+
+class _Pairs:
+    """Loops over the other agents j, within the loop over agents."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def walk(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements with their pair loops shared and unrolled."""
+        done: list[ast.stmt] = []
+        for statement in statements:
+            if isinstance(statement, ast.For) and _target(statement) == "j":
+                done += self.pairs(statement)
+            else:
+                done.append(statement)
+        return done
+
+    def pairs(self, loop: ast.For) -> list[ast.stmt]:
+        """One pair loop: each thread of an agent takes every so-manieth partner, then all add up."""
+        context, shape = self.context, self.context.shape
+        totals = carried_totals(loop.body)
+        body = [_Others(context).visit(s) for s in loop.body]
+        after = parse(f"{t} = group_{how}({t}, tid)" for t, how in totals.items()) if shape.per_agent > 1 else []
+        if not shape.registers:
+            loop.iter = ast.parse("range(sub, n, PER_AGENT)", mode="eval").body
+            loop.body = body
+            return [loop, *after]
+        text = "\n".join(ast.unparse(ast.fix_missing_locations(s)) for s in body)
+        step = "j = np.uint32(j + np.uint32(PER_AGENT))"
+        turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
+        once = [f"    {line}" for line in [*text.splitlines(), step]]
+        return [*parse(["j = np.uint32(sub)", "while j < np.uint32(n):", *(once * turns)]), *after]
+
+
+class _Others(ast.NodeTransformer):
+    """Rows of another agent: columns of the shared tables."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Name) and node.slice.id == "j":
+            name = node.value.id
+            if name in self.context.columns and self.context.shape.registers:
+                table, column = self.context.columns[name]
+                pair = ast.Tuple([ast.Name("j", ast.Load()), ast.Constant(column)], ast.Load())
+                return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
+            if name not in self.context.rows or name in ("heard", "age") or name.startswith("eh"):
+                return ast.Name(f"{name}_j", node.ctx)  # known of this pair alone
+        return node
+
+
+class _Everyone(ast.NodeTransformer):
+    """A loop over all agents in the shared table, for a thread that looks at them one after another."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Name) and node.slice.id == "i":
+            table, column = self.context.columns[node.value.id]
+            pair = ast.Tuple([ast.Name("every", ast.Load()), ast.Constant(column)], ast.Load())
+            return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return ast.Name("every", node.ctx) if node.id == "i" else node
+
+
+class _Registers(ast.NodeTransformer):
+    """Rows of the own agent: registers."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        if not isinstance(node.value, ast.Name):
+            return node
+        name, place = node.value.id, node.slice
+        if name == "values" and isinstance(place, ast.Constant):
+            return ast.Name(f"value{place.value!s}", node.ctx)
+        if not self.context.shape.registers:
+            return node
+        if isinstance(place, ast.Name) and place.id == "i" and name in self.context.rows:
+            return ast.Name(f"{name}_i", node.ctx)
+        if name in PER_AGENT_TABLES and isinstance(place, ast.Tuple) and isinstance(place.elts[0], ast.Constant):
+            return ast.Name(f"{PER_AGENT_TABLES[name]}{place.elts[0].value!s}_i", node.ctx)
+        return node
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        # a row under another name: gx_ = g0 if step % 2 == 0 else g2
+        carried = self.context.shape.registers and self.context.carried
+        if carried and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+            value = node.value
+            parts = [value.body, value.orelse] if isinstance(value, ast.IfExp) else [value]
+            if all(isinstance(part, ast.Name) and part.id in self.context.rows for part in parts):
+                for part in (*parts, node.targets[0]):
+                    self.context.rows.add(part.id)  # type: ignore[attr-defined]
+                    part.id += "_i"  # type: ignore[attr-defined]
+                return node
+        self.generic_visit(node)
+        return node
+
+
+def carried_totals(body: list[ast.stmt]) -> dict[str, str]:
+    """Scalars that a loop carries from turn to turn, and how: sum, min or max."""
+    found: dict[str, str] = {}
+    stored: set[str] = set()
+    for statement in body:
+        if isinstance(statement, ast.AugAssign) and isinstance(statement.target, ast.Name):
+            if statement.target.id not in stored:
+                found[statement.target.id] = "sum"
+        elif isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            name, value = statement.targets[0].id, statement.value
+            call = value.func.id if isinstance(value, ast.Call) and isinstance(value.func, ast.Name) else ""
+            itself = call in ("least", "most") and isinstance(value.args[0], ast.Name) and value.args[0].id == name  # type: ignore[attr-defined]
+            if itself and name not in stored:
+                found[name] = "min" if call == "least" else "max"
+            elif not itself:
+                stored.add(name)
+    return found
+
+
+def _over_agents(statement: ast.stmt) -> ast.For | None:
+    """The statement, if it is a loop over all agents."""
+    return statement if isinstance(statement, ast.For) and _target(statement) == "i" else None
+
+
+def _target(loop: ast.For) -> str:
+    return loop.target.id if isinstance(loop.target, ast.Name) else ""
+
+
+def _names(node: ast.AST, context: type) -> set[str]:
+    return {item.id for item in ast.walk(node) if isinstance(item, ast.Name) and isinstance(item.ctx, context)}
+
+
+def used(statements: Iterable[ast.stmt]) -> tuple[set[str], set[str]]:
+    """Names that statements read, and names that they store."""
+    read: set[str] = set()
+    stored: set[str] = set()
+    for statement in statements:
+        read |= _names(statement, ast.Load)
+        stored |= _names(statement, ast.Store)
+        read |= {
+            item.target.id
+            for item in ast.walk(statement)
+            if isinstance(item, ast.AugAssign) and isinstance(item.target, ast.Name)
+        }
+    return read, stored

@@ -1,0 +1,55 @@
+"""Shape: how one flock lies on the threads of a block. Everything here is fixed when a kernel is generated."""
+
+from dataclasses import dataclass
+
+WARP = 32
+MOST_THREADS = 1024  # of one block, on every GPU so far
+MOST_REGISTERED = 1024  # agents whose state stays in registers; more are kept in a table in the GPU's memory
+UNROLL = 2  # pairs per turn of a pair loop: 4 cost registers and were slower (trial, H200)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Layout of one flock.
+
+    lanes     : agents that the shared tables hold, a multiple of 32
+    per_agent : threads that share the pair loop of one agent, a power of two up to 32
+    threads   : of the block
+    registers : each thread keeps the state of its agent in registers, else all states lie in a table
+    simulated : text for Numba's CUDA simulator, which knows neither shuffles nor alignment
+    """
+
+    lanes: int
+    per_agent: int
+    threads: int
+    registers: bool = True
+    simulated: bool = False
+
+    @property
+    def warps(self) -> int:
+        """Groups of threads that reduce by shuffles; in the simulator every thread is its own."""
+        return self.threads if self.simulated else self.threads // WARP
+
+    @property
+    def words(self) -> int:
+        """Words of 32 bits in a mask of agents."""
+        return self.lanes // WARP
+
+
+def shape_of(agents: int, flocks: int, processors: int = 132, *, sequential: bool = False) -> Shape:
+    """Layout for many flocks of this size on a GPU with this many multiprocessors.
+
+    Few flocks leave most of a GPU idle: then several threads share the pairs of one agent. When there are flocks enough
+    to fill it, one thread per agent wastes nothing (trial on an H200: the change pays below some 3 flocks of 100 agents
+    per multiprocessor).
+    """
+    lanes = -(-agents // WARP) * WARP
+    if sequential:  # one agent after another: a warp shares its pairs
+        return Shape(lanes, WARP, WARP, registers=False)
+    if agents > MOST_REGISTERED:
+        return Shape(lanes, 1, MOST_THREADS, registers=False)
+    per_agent = 1
+    busy = flocks * lanes / (processors * 3.0 * 128.0)  # 1.0: as full as pays
+    while per_agent < 4 and 2 * per_agent * lanes <= MOST_THREADS and busy * per_agent < 1.0:
+        per_agent *= 2
+    return Shape(lanes, per_agent, lanes * per_agent)

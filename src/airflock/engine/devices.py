@@ -1,0 +1,112 @@
+"""Devices: on what flights run. `auto` picks by the size of the work and by what there is, and says what it picked."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airflock.engine import cpu
+from airflock.engine.cpu import Flown
+from airflock.engine.plan import Plan
+from airflock.engine.tables import clock, tables
+from airflock.errors import DeviceError, ScenarioError
+from airflock.scenarios.scenario import Scenario
+
+DEVICES = ("auto", "cpu", "cuda", "python")
+PAIR = 1.5e-9  # s that one core takes for one pair of agents (2 cores of 2023, single precision)
+STEP = 4e-9  # s for one motion step of one agent
+WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A device, and why `auto` picked it; the reason is empty where it was named."""
+
+    device: str
+    why: str = ""
+
+    @property
+    def note(self) -> str:
+        """One line for a person, empty if there is nothing to say."""
+        return f"device auto: {self.device}, {self.why}" if self.why else ""
+
+
+def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> Choice:
+    """Device for these flights: ScenarioError for an unknown name, DeviceError where a named one cannot fly them.
+
+    scenarios : one per flight
+    plans     : the distinct plans among them
+    """
+    if device not in DEVICES:
+        raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
+    if device != "cuda" and device != "auto":
+        return Choice(device)
+    from airflock.engine.cuda.device import required, trouble
+
+    if device == "cuda":
+        required()
+        for plan in plans:
+            _refuse(no_cuda(plan), device)
+        return Choice(device)
+    missing = trouble() or next((fault for fault in map(no_cuda, plans) if fault), None)
+    if missing is not None:
+        return Choice("cpu", missing)
+    seconds = sum(work(scenario) for scenario in scenarios) / cpu.cores()
+    if seconds < WORTH:
+        return Choice("cpu", f"about {seconds:.2g} s of work on {cpu.cores()} cores")
+    return Choice("cuda", f"about {seconds:.2g} s of work on {cpu.cores()} cores would be left to the CPU")
+
+
+def _refuse(fault: str | None, device: str) -> None:
+    if fault is not None:
+        raise DeviceError(f"device = {device}: {fault}")
+
+
+def no_cuda(plan: Plan) -> str | None:
+    """Why a GPU cannot fly a plan; None if it can."""
+    if getattr(plan.model, "flock", None) is not None:
+        return f"{plan.model.name} solves for the whole flock at once, which only cpu does"
+    if plan.own:
+        return "goals.kind = 'own' is flown by the cpu only"
+    return None
+
+
+def work(scenario: Scenario) -> float:
+    """Rough time (s) of one flight on one core."""
+    times, n = clock(scenario), float(scenario.agents)
+    looks = times["steps"] / times["decide_every"] + times["steps"] / times["sample_every"]
+    pairs = min(n, 60.0) if n >= 1000 and scenario.model.reach is not None else n
+    return looks * n * pairs * PAIR + times["steps"] * n * STEP
+
+
+def fly_one(
+    scenario: Scenario, plan: Plan, seed: int, device: str, start: Any = None
+) -> Flown:  # plan: with or without recorded frames
+    """Fly one world on a named device other than the CPU."""
+    if device == "python":
+        from airflock.engine.plain import fly_plainly
+
+        return fly_plainly(scenario, seed, start)
+    return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
+
+
+def fly_on_gpu(
+    scenarios: Sequence[Scenario],
+    plans: Sequence[Plan],
+    seeds: Sequence[int],
+    starts: Sequence[Any] | None = None,
+    done: Callable[[], None] | None = None,
+) -> list[Flown]:
+    """Fly worlds on the GPU, flight i with plans[i] and seeds[i]; those of one plan together in one launch."""
+    from airflock.engine.cuda.launch import fly_many
+
+    groups: dict[Plan, list[int]] = {}
+    for number, plan in enumerate(plans):
+        groups.setdefault(replace(plan, grid=False), []).append(number)
+    results: dict[int, Flown] = {}
+    for plan, members in groups.items():
+        jobs = [tables(scenarios[m], plan, seeds[m]) for m in members]
+        given = None if starts is None else [np.asarray(starts[m]) for m in members]
+        results |= zip(members, fly_many(plan, jobs, given, done), strict=True)
+    return [results[number] for number in range(len(plans))]

@@ -1,0 +1,121 @@
+"""Flock: rules that see all agents at once, a model's `flock` and a metric's `survey`, and the scratch they work in."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.core.contract import Metric
+from airflock.core.vocabulary import asks
+from airflock.engine.passes.build import Builder
+from airflock.engine.plan import Plan
+
+
+class Owner(NamedTuple):
+    """Who has a rule of the whole flock: the model or a metric, its rule, Shared and workspace, its parameters."""
+
+    name: str
+    kind: str
+    rule: Callable[..., None]
+    Shared: Any
+    workspace: Callable[..., Any]
+    letter: str
+
+
+def owners(plan: Plan) -> list[Owner]:
+    """All rules of the whole flock in a plan, in the order of their scratch."""
+    model = plan.model
+    first = []
+    if model.flock is not None and model.workspace is not None:
+        first = [Owner("model", "flock", model.flock, model.Shared, model.workspace, "p")]
+    return first + surveys(plan)
+
+
+def surveys(plan: Plan) -> list[Owner]:
+    """Those of them that measure."""
+    return [
+        Owner(metric.name, "survey", metric.survey, metric.Shared, metric.workspace, "q")
+        for metric in plan.metrics
+        if metric.survey is not None and metric.workspace is not None
+    ]
+
+
+def flock(build: Builder) -> None:
+    """Function flock: the model's rule, once per decision, on the true states."""
+    if build.plan.model.flock is None:
+        return
+    owner = owners(build.plan)[0]
+    build.function("flock(n, row, work, scratch)", build.records("p wing"), _call(build, owner), "return 0")
+
+
+def survey(build: Builder, metric: Metric) -> list[str]:
+    """Lines that run a metric's rule; `scratch`, `q` and `wing` are at hand."""
+    found = [owner for owner in surveys(build.plan) if owner.name == metric.name]
+    return _call(build, found[0]) if found else []
+
+
+def _call(build: Builder, owner: Owner) -> list[str]:
+    plan, axes = build.plan, build.plan.axes
+    number = [each.name for each in owners(plan)].index(owner.name)
+    work = build.source.name(_record(owner, plan))
+    fields = _record(owner, plan)._fields
+    given = {"work": f"scratch_{owner.name}", "shared": f"shared_{owner.name}"}
+    flown = [*axes, *(f"v{a}" for a in axes)]
+    used = asks(owner.rule, owner.kind, owner.name)
+    lines = build.bind([name for name in flown if name in used])
+    for name in ("x", "y", "z", "vx", "vy", "vz"):
+        if name not in flown and name in used:
+            lines += [f"{name} = work[{build.row('level_')}]"]
+    parts = [f"scratch[{number}][{c}]" for c in range(len(fields))]
+    lines += [f"scratch_{owner.name} = {work}({', '.join(parts)})"]
+    columns = [f"work[{build.row(f'shared_{owner.name}_{name}')}]" for name in owner.Shared._fields]
+    lines += [f"shared_{owner.name} = {build.source.name(owner.Shared)}({', '.join(columns)})"]
+    build.source.solver(owner.rule)
+    return [*lines, build.call(owner.rule, owner.kind, given, owner.name)]
+
+
+def columns_of(build: Builder, record: Any, name: str) -> list[str]:
+    """Lines that bind the columns of Shared."""
+    return build.bind([f"shared_{name}_{field}" for field in record._fields])
+
+
+def shared(build: Builder, record: Any, name: str, bound: bool = False) -> list[str]:
+    """Lines that make the Shared of agent i, `shared`."""
+    values = [
+        f"shared_{name}_{field}[i]" if bound else f"work[{build.row(f'shared_{name}_{field}')}, i]"
+        for field in record._fields
+    ]
+    return [f"shared = {build.source.name(record)}({', '.join(values)})"]
+
+
+def _record(owner: Owner, plan: Plan) -> Any:
+    """NamedTuple class of the scratch: what `workspace` returns, whatever its shapes."""
+    return type(owner.workspace(1, *_parameters(plan, owner, None)))
+
+
+def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> tuple[Any, Any]:
+    """Parameters of an owner and of the wing as plain records, from a row of numbers."""
+    found = []
+    for letter in (owner.letter, "wing"):
+        start = 0
+        for other, names in plan.records.items():
+            if other == letter:
+                numbers = {name: 0.0 if row is None else float(row[start + c]) for c, name in enumerate(names)}
+                found.append(SimpleNamespace(**{**numbers, **plan.constants.get(letter, {})}))
+            start += len(names)
+    return found[0], found[1]
+
+
+def scratch(plan: Plan, row: NDArray[Any], agents: int) -> tuple[tuple[tuple[NDArray[Any], ...], ...], ...]:
+    """Scratch arrays of all rules of the whole flock, as one last argument or none."""
+    found = owners(plan)
+    if not found:
+        return ()
+    # pages of zeros cost nothing until they are written: what is meant for rare cases may be large
+    made = tuple(
+        tuple(np.zeros(shape, row.dtype) for shape in owner.workspace(agents, *_parameters(plan, owner, row)))
+        for owner in found
+    )
+    return (made,)

@@ -1,0 +1,51 @@
+"""What lets LLVM use vectors on a CPU, as driver text: extremes, choices without a branch, the width of a vector.
+
+`least` and `most` stand for min and max of two numbers: LLVM vectorises a reduction by its own minimum instruction, but
+not one by the comparison that Numba makes of min (2.4 times on the nearest-neighbour loop). `choose` is a conditional
+expression without a branch: of two branches on one test LLVM makes two ways through a loop, and the extremes at their
+ends are then no reductions any more (9 times on the same loop). `wide_vectors` asks for 512-bit vectors in the function
+that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones.
+"""
+
+from functools import cache
+
+TEXT = """
+def _extreme(instruction, comparison):
+    @intrinsic
+    def extreme(typing_context, a, b):
+        def emit(context, builder, signature, arguments):
+            kind = arguments[0].type
+            if isinstance(a, types.Float):
+                shape = ir.FunctionType(kind, [kind, kind])
+                return builder.call(builder.module.declare_intrinsic(instruction, [kind], shape), arguments)
+            return builder.select(builder.icmp_signed(comparison, *arguments), *arguments)
+        return a(a, a), emit
+    return extreme
+
+least = _extreme("llvm.minnum", "<")
+most = _extreme("llvm.maxnum", ">")
+
+@intrinsic
+def choose(typing_context, test, a, b):
+    def emit(context, builder, signature, arguments):
+        return builder.select(*arguments)
+    return a(types.boolean, a, a), emit
+
+@intrinsic
+def wide_vectors(typing_context):
+    def emit(context, builder, signature, arguments):
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')  # llvmlite knows names without values only
+        return context.get_dummy_value()
+    return types.void(), emit
+"""
+
+
+@cache
+def bits() -> int:
+    """Width of the vectors of drivers on this processor: 512 from Ice Lake and Zen 4 on, which keep their clock."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    if features.get("avx512vbmi2", False):
+        return 512
+    return 256 if features.get("avx2", False) else 128

@@ -1,0 +1,207 @@
+"""After the search: who is best when luck is taken out, and which parameters work.
+
+The best of 15,000 noisy evaluations is the luckiest as much as the best. The final mean of each run and the top
+candidates (of a race, `airflock.evolve.race`) fly again on the same fresh seeds, the winner once more on other fresh
+seeds for an unbiased score; working ranges are those of Table S1: where candidates of the search reached at least the
+winner's mean.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from airflock import atomic
+from airflock.errors import StudyError
+from airflock.evolve import tables
+from airflock.evolve.executors import Executor
+from airflock.evolve.folder import plain, write
+from airflock.evolve.nondominated import front
+from airflock.evolve.race import race
+from airflock.evolve.search import evaluate
+from airflock.evolve.space import with_parameters
+from airflock.evolve.store import Batch, Store
+from airflock.evolve.study import Study
+from airflock.scenarios.scenario import Scenario
+
+FINAL, SCORE = Batch("final", 0, 0), Batch("score", 0, 0)
+RESULT, BEST = "result.toml", "best.toml"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a study found.
+
+    parameters : of the winner, by key; scenario : with these parameters
+    fitness, sd, low, high, seeds : of the winner on fresh seeds, with Student's 95 % interval of the mean
+    largest    : best candidate of the search, luck included
+    origin     : "mean" or "top": what the winner was
+    ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
+    finalists  : one row each: origin, parameters, fitness on fresh seeds
+    failed     : candidates of the search that failed
+    """
+
+    folder: Path
+    scenario: Scenario
+    parameters: dict[str, float]
+    fitness: float
+    sd: float
+    low: float
+    high: float
+    seeds: int
+    largest: float
+    origin: str
+    ranges: dict[str, tuple[float, float]]
+    above: int
+    candidates: int
+    failed: int
+    finalists: pd.DataFrame
+
+    def document(self) -> dict[str, Any]:
+        """The result as plain values, for result.toml and --json."""
+        return {
+            "scenario": self.scenario.name,
+            "fitness": {
+                "mean": self.fitness,
+                "sd": self.sd,
+                "low": self.low,
+                "high": self.high,
+                "seeds": self.seeds,
+                "largest_in_search": self.largest,
+            },
+            "origin": self.origin,
+            "parameters": self.parameters,
+            "working_ranges": {
+                "candidates": self.candidates,
+                "failed": self.failed,
+                "above_mean": self.above,
+                "range": {key: list(span) for key, span in self.ranges.items()},
+            },
+        }
+
+
+def conclude(
+    study: Study,
+    store: Store,
+    executor: Executor,
+    centres: Sequence[NDArray[np.float64]],
+    folder: Path,
+    note: Callable[[bool], None] | None = None,
+) -> Result:
+    """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder."""
+    first = study.objectives[0]
+    names = [objective.name for objective in study.objectives]
+    table = tables.candidates(store, names)
+    sound = tables.best_first(table, first.name, first.maximise)
+    if not len(sound):
+        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
+        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
+    points, origins = finalists(study, store, executor, sound, centres, note)
+    n = study.whole("final_seeds")
+    fresh = [study.seed(1, j) for j in range(n)]
+    rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
+    i = _winner(study, rows)
+    winner = study.space.parameters(points[i])
+    others = [[study.seed(2, j) for j in range(n)]]
+    evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
+    flown = store.flown(SCORE)
+    values = [first.of_flight(scores) for scores in flown.values() if scores is not None]
+    mean, sd, low, high = interval(values)
+    good = sound[sound[first.name] >= mean] if first.maximise else sound[sound[first.name] <= mean]
+    shown = pd.DataFrame(
+        [
+            {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
+            for origin, point, row in zip(origins, points, rows, strict=True)
+        ]
+    )
+    result = Result(
+        folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
+        float(sound[first.name].iloc[0]), origins[i],
+        {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
+        len(good), len(table), len(table) - len(sound), shown,
+    )  # fmt: skip
+    write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
+    write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
+    tables.export(store, folder)
+    return result
+
+
+def finalists(
+    study: Study,
+    store: Store,
+    executor: Executor,
+    sound: pd.DataFrame,
+    centres: Sequence[NDArray[np.float64]],
+    note: Callable[[bool], None] | None = None,
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Points (candidate, axis) that fly again: the mean of each run, then the top of the search or its front."""
+    names, top = [objective.name for objective in study.objectives], study.whole("top")
+    signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
+    known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
+    losses = known[names].to_numpy() * signs
+    if len(names) > 1:
+        best = front(losses)
+        best = best[np.argsort(losses[best, 0], kind="stable")]
+        chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
+    elif study.whole("pool") > top > 0:
+        chosen = race(study, store, executor, _points(store, known), losses[:, 0], note)
+    else:
+        chosen = np.arange(min(top, len(known)))
+    if not len(chosen) and not centres:
+        raise StudyError("search.top = 0 leaves nobody to fly again; give at least 1")
+    return np.array([*centres, *_points(store, known.iloc[chosen])]), ["mean"] * len(centres) + ["top"] * len(chosen)
+
+
+def _points(store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
+    """Points (candidate, axis) of candidates of the search, as they were asked for."""
+    pairs = {(int(run), int(g)) for run, g in zip(table["run"], table["generation"], strict=True)}
+    batches = {pair: store.asked(Batch("search", *pair)) for pair in pairs}
+    places = zip(table["run"], table["generation"], table["candidate"], strict=True)
+    return np.array([batches[run, generation][candidate] for run, generation, candidate in places])
+
+
+def _winner(study: Study, rows: Sequence[Sequence[float | None]]) -> int:
+    """Index of the best finalist; of several objectives, the one nearest to the best of each."""
+    signs = np.array([1.0 if objective.maximise else -1.0 for objective in study.objectives])
+    table = np.array([[np.nan if v is None else v for v in row] for row in rows], float) * signs
+    sound = np.isfinite(table).all(axis=1)
+    if not sound.any():
+        raise StudyError("every finalist failed on fresh seeds; the store says why in the column reason")
+    if table.shape[1] == 1:
+        return int(np.argmax(np.where(sound, table[:, 0], -np.inf)))
+    best, worst = table[sound].max(axis=0), table[sound].min(axis=0)
+    away = ((best - table) / np.where(best > worst, best - worst, 1.0)) ** 2
+    return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
+
+
+def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
+    """Mean, SD, and Student's 95 % interval of the mean."""
+    x = np.array(values, float)
+    mean, sd = float(x.mean()), float(x.std(ddof=1)) if len(x) > 1 else 0.0
+    half = float(stats.t.ppf(0.975, len(x) - 1)) * sd / len(x) ** 0.5 if len(x) > 1 else 0.0
+    return mean, sd, mean - half, mean + half
+
+
+def scenario_document(study: Study, parameters: dict[str, float], result: Result, folder: Path) -> dict[str, Any]:
+    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along."""
+    document = plain(study.scenario.document)
+    document.pop("published", None)
+    law = Path(study.scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        atomic.write(folder / law.name, law.read_bytes())
+        document["model"]["kind"] = law.name
+    source = f"evolved: {study.search.algorithm}, {result.candidates} evaluations, seed {study.whole('seed')}"
+    units = {axis.key: axis.unit for axis in study.space.axes}
+    for key, value in parameters.items():
+        section, _, name = key.rpartition(".")
+        entry: dict[str, Any] = {"value": value, "source": source}
+        if key in units:
+            entry = {"value": value, "unit": units[key], "source": source}
+        (document.setdefault(section, {}) if section else document)[name] = entry
+    document["title"] = f"evolved from {study.scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
+    return dict(document)

@@ -1,0 +1,117 @@
+"""The folder of a study: made or opened again, its study.toml compared before anything is written."""
+
+import os
+import platform
+import tomllib
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from airflock import atomic
+from airflock.errors import StudyError
+from airflock.evolve.study import Study, same_or_refuse
+
+STUDY = "study.toml"
+PACKAGES = ("airflock", "numpy", "numba", "cma", "pymoo")
+
+
+def open_folder(folder: Path, study: Study, *, resume: bool) -> None:
+    """Make a study's folder, or check that it holds this very study.
+
+    Raises StudyError where the folder holds another study, or this one and `resume` was not asked for.
+    """
+    found = folder / STUDY
+    if found.is_file():
+        same_or_refuse(folder, read(found), plain(study.document()))
+        if not resume:
+            raise StudyError(f"{folder}: already holds this study; continue it with --resume, or give another --out")
+        return
+    if resume:
+        raise StudyError(f"{folder}: holds no study to resume ({STUDY} is missing)")
+    # hidden files: what a process that was killed had begun to write
+    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
+        raise StudyError(f"{folder}: is not empty and holds no {STUDY}; give a new folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write(found, study.document(), "A study of Airflock. Written once, when it began.")
+    except OSError as fault:
+        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+
+
+def sweep(folder: Path) -> None:
+    """Remove what a process that was killed had begun to write; only for the one who holds the writer's lock."""
+    for path in folder.glob(".*.*.*"):
+        if path.suffix in (".toml", ".csv", ".parquet", ".png"):
+            path.unlink(missing_ok=True)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A TOML file as a dict."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise StudyError(f"{path}: {fault}") from fault
+
+
+def write(path: Path, document: Mapping[str, Any], comment: str = "") -> None:
+    """Write a nested dict as TOML, complete or not at all."""
+    import tomlkit
+
+    made = tomlkit.document()
+    if comment:
+        made.add(tomlkit.comment(comment))
+        made.add(tomlkit.nl())
+    _fill(made, plain(document))
+    atomic.write(path, tomlkit.dumps(made))
+
+
+def _fill(table: Any, values: Mapping[str, Any]) -> None:
+    """Add values to a table: keys first, small tables of numbers in one line, then sections."""
+    import tomlkit
+
+    def leaf(value: Any) -> bool:
+        return isinstance(value, dict) and bool({"value", "low", "fixed", "tied", "mean"} & set(value))
+
+    for key, value in values.items():
+        if leaf(value):
+            line = tomlkit.inline_table()
+            line.update(value)
+            table.add(key, line)
+        elif not isinstance(value, dict) and not (isinstance(value, list) and value and isinstance(value[0], dict)):
+            table.add(key, value)
+    for key, value in values.items():
+        if isinstance(value, dict) and not leaf(value):
+            section = tomlkit.table()
+            _fill(section, value)
+            table.add(key, section)
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            table.add(key, value)
+
+
+def plain(value: Any) -> Any:
+    """Values as TOML knows them: lists instead of tuples, no None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items() if entry is not None}
+    return [plain(entry) for entry in value] if isinstance(value, (list, tuple)) else value
+
+
+def versions() -> dict[str, str]:
+    """Versions that the last bits of a study depend on, and the processor."""
+    found = {"python": platform.python_version(), "cpu": cpu_model()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def cpu_model() -> str:
+    """Name of this machine's processor, for instance to tell that two machines may round differently."""
+    if os.path.exists("/proc/cpuinfo"):
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

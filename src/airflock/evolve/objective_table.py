@@ -1,0 +1,66 @@
+"""The table [objective] of a study file: what is better, and the user's own fitness functions."""
+
+import hashlib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from importlib import util
+from pathlib import Path
+from typing import Any
+
+from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
+from airflock.scenarios.scenario import Scenario
+
+KEYS = ("maximise", "minimise", "over_seeds", "quantile", "own", "source", "note")
+USUAL = {"zapotecatl": "quality", "groups": "quality"}  # by metrics.kind; others have an order parameter fitness
+
+
+def read_objectives(
+    table: Any, scenario: Scenario, folder: Path | None = None
+) -> tuple[tuple[Objective, ...], list[str]]:
+    """Objectives from a table, by default the scenario's usual fitness; and all faults in it."""
+    if not isinstance(table, Mapping):
+        return (), [f"objective = {table!r} is no table; write objective.maximise = {table!r}"]
+    faults = []
+    for key in table:
+        if key not in KEYS:
+            near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
+            hint = f"did you mean objective.{near[0]}?" if near else f"known: {', '.join(KEYS)}"
+            faults.append(f"objective.{key} is no key; {hint}")
+    over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
+    if over not in OVER_SEEDS:
+        faults.append(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
+    if not isinstance(quantile, (int, float)) or isinstance(quantile, bool) or not 0.0 <= quantile <= 1.0:
+        faults.append(f"objective.quantile = {quantile!r} lies outside [0, 1]")
+        quantile = 0.1
+    own, text, more = _own(table.get("own"), folder)
+    faults += more
+    found = []
+    for key in ("maximise", "minimise"):
+        named = table.get(key, [])
+        names = [named] if isinstance(named, str) else named
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            faults.append(f"objective.{key} = {named!r} is no name and no list of names")
+            continue
+        how = (key == "maximise", str(over), float(quantile))
+        found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]
+    if not found:
+        name = USUAL.get(scenario.metrics.kind, "fitness")
+        found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
+    return tuple(found), faults
+
+
+def _own(name: Any, folder: Path | None) -> tuple[dict[str, Own], str, list[str]]:
+    """Functions of a user's own file by name, a hash of its text, and faults."""
+    if name is None:
+        return {}, "", []
+    path = Path(str(name)) if folder is None else folder / str(name)
+    spec = util.spec_from_file_location(path.stem, path) if path.suffix == ".py" and path.is_file() else None
+    if spec is None or spec.loader is None:
+        return {}, "", [f"objective.own = {name!r}: no such Python file"]
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as fault:  # the user's own file may fail in any way
+        return {}, "", [f"objective.own: {path}: {type(fault).__name__}: {fault}"]
+    own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
+    return own, hashlib.sha256(path.read_bytes()).hexdigest()[:12], []

@@ -1,0 +1,36 @@
+"""Optimisers by name, behind one interface: ask for points of the unit cube, tell their losses."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.evolve.cmaes import CMAES
+
+ALGORITHMS = ("cmaes", "ga", "nsga2", "nsga3")
+SEVERAL = ("nsga2", "nsga3")  # for several objectives
+
+
+class Optimiser(Protocol):
+    """State of a search. The same seed and the same losses give the same points, bit by bit."""
+
+    def ask(self) -> NDArray[np.float64]:
+        """Next generation (candidate, axis)."""
+
+    def tell(self, points: NDArray[np.float64], losses: NDArray[np.float64]) -> None:
+        """Losses (candidate, objective) of those points; less is better."""
+
+    def centre(self) -> NDArray[np.float64] | None:
+        """Mean of the search's distribution (axis,), if it has one."""
+
+
+def optimiser(algorithm: str, dimension: int, objectives: int, population: int, seed: int) -> Optimiser:
+    """A fresh optimiser."""
+    if algorithm == "cmaes":
+        return CMAES(dimension, population, seed)
+    from airflock.evolve.genetic import GeneticSearch
+    from airflock.evolve.nondominated import Nondominated
+
+    if algorithm == "ga":
+        return GeneticSearch(dimension, population, seed)
+    return Nondominated(algorithm, dimension, objectives, population, seed)

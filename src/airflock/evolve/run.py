@@ -1,0 +1,163 @@
+"""The public door: a study from beginning to end in one folder, begun or continued."""
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from airflock import atomic
+from airflock.errors import StudyError
+from airflock.evolve.after import Result, conclude
+from airflock.evolve.executors import Executor, Score
+from airflock.evolve.executors.here import Here
+from airflock.evolve.fitness import Objective, Own
+from airflock.evolve.folder import open_folder, sweep, versions
+from airflock.evolve.pictures import draw
+from airflock.evolve.search import Watch, search
+from airflock.evolve.sensitivity import METHODS
+from airflock.evolve.sensitivity import sensitivity as sensitivities
+from airflock.evolve.space import with_parameters
+from airflock.evolve.store import Store
+from airflock.evolve.study import Study, load_study, make_study
+from airflock.scenarios.scenario import Scenario
+
+
+class Interrupted(StudyError):
+    """Ctrl-C: everything that had landed is stored."""
+
+
+def evolve(
+    what: str | os.PathLike[str] | Scenario | Study,
+    out: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    space: Mapping[str, Any] | None = None,
+    objective: Mapping[str, Any] | None = None,
+    fitness: Own | None = None,
+    scheduler: str | None = None,
+    threads: int | None = None,
+    device: str = "cpu",
+    timeout: float | None = None,
+    sensitivity: str = "",
+    watch: Watch | None = None,
+    **search_keys: Any,
+) -> Result:
+    """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
+
+    what      : a preset, a scenario or study file, a Scenario, or a Study
+    out       : the study's folder; `resume` continues the study in it to the identical end
+    settings  : keys of the scenario to change, such as {"duration": 300.0}
+    space     : sections of parameters that vary, as in a study file: {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
+    objective : {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters
+    fitness   : instead of it, a function of your own: order parameters of one flight → number, more is better
+    scheduler : address of a dask scheduler; by default flights fly in this process, `threads` at a time
+    device    : "cpu"
+    timeout   : s that a flight may take on a dask worker
+    sensitivity : "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv
+    watch     : called with a Progress after each flight
+    search_keys : keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
+
+    Returns the Result; the same stands in the folder as result.toml, best.toml, tables and pictures.
+    Raises ScenarioError, StudyError, and Interrupted at Ctrl-C.
+    """
+    study = study_of(what, settings, space, objective, fitness, search_keys)
+    folder = Path(out)
+    if sensitivity and sensitivity not in METHODS:
+        raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
+    if device != "cpu":
+        raise StudyError(f"device = {device!r}: studies fly on the cpu in this version")
+    open_folder(folder, study, resume=resume)
+    executor = executor_for(study, scheduler, threads, timeout)
+    return run(study, folder, executor, watch, sensitivity=sensitivity)
+
+
+def study_of(
+    what: str | os.PathLike[str] | Scenario | Study,
+    settings: Mapping[str, Any] | None = None,
+    space: Mapping[str, Any] | None = None,
+    objective: Mapping[str, Any] | None = None,
+    fitness: Own | None = None,
+    search_keys: Mapping[str, Any] | None = None,
+) -> Study:
+    """The study that `evolve` is asked for."""
+    if isinstance(what, Study):
+        return what
+    tables = {key: value for key, value in (("space", space), ("objective", objective)) if value is not None}
+    if isinstance(what, Scenario):
+        study = make_study(tables, what.name, search=search_keys, scenario=what)
+    else:
+        study = load_study(what, settings=settings, search=search_keys, tables=tables)
+    if fitness is not None:
+        code = getattr(fitness, "__code__", None)
+        text = _text_of(code) if code is not None else ""
+        name = getattr(fitness, "__name__", "fitness")
+        study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
+    return study
+
+
+def _text_of(code: Any) -> str:
+    """Hash of what a function does, the same in every process."""
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
+
+
+def score_of(study: Study) -> Score:
+    """Parameters and a seed → order parameters, for the study's scenario."""
+    from airflock.engine.simulate import score_flight
+
+    precision = int(study.search.precision)
+
+    def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
+        return score_flight(with_parameters(study.scenario, parameters), seed, precision=precision)
+
+    return score
+
+
+def executor_for(
+    study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
+) -> Executor:
+    """Who flies: this process, or the workers of a dask scheduler."""
+    if scheduler is not None:
+        from airflock.evolve.executors.cluster import Cluster
+
+        return Cluster(study, scheduler, timeout=timeout)
+    from airflock.engine import cpu
+    from airflock.engine.simulate import compile_for, takes_all_cores
+
+    # compiled once, before threads ask for it; a second processor has nothing to do until then
+    compile_for(study.scenario, precision=int(study.search.precision))
+    alone = takes_all_cores(study.scenario)
+    return Here(score_of(study), 1 if alone else threads or cpu.cores())
+
+
+def run(
+    study: Study,
+    folder: Path,
+    executor: Executor,
+    watch: Watch | None = None,
+    note: Callable[[bool], None] | None = None,
+    *,
+    sensitivity: str = "",
+) -> Result:
+    """Search and conclude in a folder that `open_folder` has accepted; closes the executor."""
+    try:
+        with Store(folder) as store:
+            store.begin(versions())
+            sweep(folder)
+            try:
+                centres = search(study, store, executor, watch)
+                result = conclude(study, store, executor, centres, folder, note)
+                if sensitivity:
+                    shares = sensitivities(study, store, executor, method=sensitivity, note=note)
+                    atomic.write(folder / "sensitivity.csv", shares.to_csv(index=False))
+            except KeyboardInterrupt as stop:
+                raise Interrupted(
+                    f"interrupted: {store.count()} flights of the search are stored in {folder}; continue with --resume"
+                ) from stop
+            draw(study, store, result, folder)
+            return result
+    finally:
+        executor.close()

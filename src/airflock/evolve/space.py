@@ -1,0 +1,188 @@
+"""Search space: which parameters vary, between which bounds, and how a point of the unit cube becomes parameters.
+
+An optimiser only sees points in [0, 1]^n. Bounds come from the parameters' declarations; a study file narrows them, or
+sets, ties and orders parameters. Bounds wider than declared are refused: no scenario could hold such a value.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import SECTIONS
+
+DECADES = 3.0  # a declared range at least this many decades wide is searched on a logarithmic scale
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One parameter that varies.
+
+    key       : for instance model.p_rep
+    unit      : of low and high, both included
+    scale     : "linear" or "log": even steps of a point are even differences or even ratios of the value
+    integer   : only whole numbers
+    above     : key of a parameter that this one never lies below
+    """
+
+    key: str
+    unit: str
+    low: float
+    high: float
+    scale: str = "linear"
+    integer: bool = False
+    above: str = ""
+
+    def value(self, x: float, floor: float = -math.inf) -> float:
+        """Value at coordinate x in [0, 1], not below `floor`."""
+        low, high = min(max(self.low, floor), self.high), self.high
+        x = min(max(x, 0.0), 1.0)
+        if self.integer:
+            low = float(math.ceil(low))
+            return min(low + math.floor(x * (math.floor(high) - low + 1.0)), float(math.floor(high)))
+        if self.scale == "log":
+            return min(max(float(low * (high / low) ** x), low), high)
+        return low + x * (high - low)
+
+    def coordinate(self, value: float, floor: float = -math.inf) -> float:
+        """Coordinate of a value, clipped to [0, 1]."""
+        low, high = min(max(self.low, floor), self.high), self.high
+        if self.integer:
+            low = float(math.ceil(low))
+            x = (value - low + 0.5) / (math.floor(high) - low + 1.0)
+        elif high <= low:
+            x = 0.5
+        elif self.scale == "log":
+            x = math.log(max(value, low) / low) / math.log(high / low)
+        else:
+            x = (value - low) / (high - low)
+        return min(max(x, 0.0), 1.0)
+
+
+@dataclass(frozen=True)
+class Tie:
+    """A parameter that follows another: factor times its value plus offset."""
+
+    of: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Space:
+    """Varied, fixed and tied parameters of a study."""
+
+    axes: tuple[Axis, ...]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    tied: Mapping[str, Tie] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the varied parameters."""
+        return tuple(axis.key for axis in self.axes)
+
+    def parameters(self, point: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
+        """All varied, fixed and tied parameters at a point (axis,) of the unit cube."""
+        found = dict(self.fixed)
+        for i in _order(self.axes):
+            axis = self.axes[i]
+            floor = found[axis.above] if axis.above else -math.inf
+            found[axis.key] = axis.value(float(point[i]), floor)
+        varied = {key: found[key] for key in self.keys} | dict(self.fixed)
+        return varied | {key: tie.factor * found[tie.of] + tie.offset for key, tie in self.tied.items()}
+
+    def point(self, parameters: Mapping[str, float]) -> NDArray[np.float64]:
+        """Point (axis,) of given parameters, clipped to the unit cube."""
+        return np.array(
+            [a.coordinate(parameters[a.key], parameters[a.above] if a.above else -math.inf) for a in self.axes]
+        )
+
+    def document(self) -> dict[str, Any]:
+        """The space as plain values, section by section, as a study file writes it."""
+        found: dict[str, Any] = {}
+        for axis in self.axes:
+            entry: dict[str, Any] = {"low": axis.low, "high": axis.high, "unit": axis.unit, "scale": axis.scale}
+            entry |= {"integer": True} if axis.integer else {}
+            entry |= {"above": axis.above} if axis.above else {}
+            _nest(found, axis.key, entry)
+        for key, value in self.fixed.items():
+            _nest(found, key, {"fixed": value})
+        for key, tie in self.tied.items():
+            _nest(found, key, {"tied": tie.of, "factor": tie.factor, "offset": tie.offset})
+        return found
+
+
+def _nest(table: dict[str, Any], key: str, entry: Mapping[str, Any]) -> None:
+    section, _, name = key.rpartition(".")
+    (table.setdefault(section, {}) if section else table)[name] = dict(entry)
+
+
+def _order(axes: Sequence[Axis]) -> list[int]:
+    """Indices of axes, each after the one that it lies above."""
+    index = {axis.key: i for i, axis in enumerate(axes)}
+    done: list[int] = []
+
+    def visit(i: int) -> None:
+        if i not in done:
+            if axes[i].above in index:
+                visit(index[axes[i].above])
+            done.append(i)
+
+    for i in range(len(axes)):
+        visit(i)
+    return done
+
+
+def records(scenario: Scenario) -> dict[str, Any]:
+    """Section → record of parameters of a scenario; the empty section holds the keys at the top."""
+    found = {section: getattr(scenario, section) for section in SECTIONS}
+    return {"model": scenario.parameters, **found, "": scenario.flight}
+
+
+def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:
+    """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges."""
+    changed: dict[str, dict[str, float]] = {}
+    for key, value in parameters.items():
+        section, _, name = key.rpartition(".")
+        changed.setdefault(section, {})[name] = value
+    places = {"model": "parameters", "": "flight"}
+    found = records(scenario)
+    return replace(scenario, **{places.get(s, s): replace(found[s], **values) for s, values in changed.items()})
+
+
+def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
+    """Key → declaration and present value of every number of a scenario."""
+    return {
+        f"{section}.{name}".lstrip("."): (how, getattr(record, name))
+        for section, record in records(scenario).items()
+        for name, how, _ in declarations(record)
+        if isinstance(how, Quantity)
+    }
+
+
+def full_space(scenario: Scenario) -> Space:
+    """All numbers of the model between their declared bounds, but for those that set the speed that is asked for."""
+    axes = []
+    for key, (how, value) in declared(scenario).items():
+        if key.startswith("model.") and value is not None and not _sets_speed(scenario, key, how, value):
+            axes.append(Axis(key, how.unit, how.low, how.high, usual_scale(how.low, how.high)))
+    return Space(tuple(axes))
+
+
+def _sets_speed(scenario: Scenario, key: str, how: Quantity, value: float) -> bool:
+    """Whether a number changes the model's preferred speed: then it is the task, and no means to fulfil it."""
+    speed = scenario.model.preferred_speed
+    if speed is None:
+        return False
+    other = 0.5 * (value + (how.high if value < how.high else how.low))
+    return float(speed(with_parameters(scenario, {key: other}).parameters)) != float(speed(scenario.parameters))
+
+
+def usual_scale(low: float, high: float) -> str:
+    """Logarithmic where a range is positive and DECADES wide, else linear."""
+    return "log" if low > 0.0 and high >= low * 10.0**DECADES else "linear"

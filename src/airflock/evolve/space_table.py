@@ -1,0 +1,142 @@
+"""The table [space] of a study file: reading it, and everything that can be wrong with it, all faults at once."""
+
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from airflock.core.parameters import Quantity
+from airflock.evolve.space import Axis, Space, Tie, declared, usual_scale
+from airflock.scenarios.scenario import Scenario
+
+ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
+
+
+def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]:
+    """Space from the table [space] of a study file, or None; and all faults in it. Only what is listed varies."""
+    known = declared(scenario)
+    entries, faults = _entries(table)
+    axes: list[Axis] = []
+    fixed: dict[str, float] = {}
+    tied: dict[str, Tie] = {}
+    for key, entry in entries.items():
+        if key not in known:
+            near = get_close_matches(key, known, n=1, cutoff=0.5)
+            hint = f"; did you mean space.{near[0]}?" if near else ""
+            faults.append(f"space.{key} is no number of {scenario.name}{hint}")
+            continue
+        more = _entry_faults(key, entry, known[key][0], known)
+        faults += more
+        if more:
+            continue
+        if "fixed" in entry:
+            fixed[key] = float(entry["fixed"])
+        elif "tied" in entry:
+            tied[key] = Tie(str(entry["tied"]), float(entry.get("factor", 1.0)), float(entry.get("offset", 0.0)))
+        else:
+            axes.append(_axis(key, entry, known[key][0]))
+    for axis in axes:  # a number that another one must stay above takes part even if it does not vary
+        other = axis.above
+        if other in known and other not in {a.key for a in axes} | set(fixed) and known[other][1] is not None:
+            fixed[other] = float(known[other][1] or 0.0)
+    space = Space(tuple(axes), fixed, tied)
+    faults += _faults_between(space, known, bool(faults))
+    return (None if faults else space), faults
+
+
+def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> Axis:
+    low, high = float(entry.get("low", how.low)), float(entry.get("high", how.high))
+    scale = str(entry.get("scale", usual_scale(low, high)))
+    return Axis(key, how.unit, low, high, scale, bool(entry.get("integer", False)), str(entry.get("above", "")))
+
+
+def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
+    """Key → entry, from sections or dotted keys."""
+    found: dict[str, Mapping[str, Any]] = {}
+    faults = []
+    if not isinstance(table, Mapping):
+        return {}, [f"space = {table!r} is no table of keys"]
+    for section, entries in table.items():
+        if not isinstance(entries, Mapping):
+            faults.append(f"space.{section} = {entries!r} is no table; write {{ low = ..., high = ... }}")
+        elif "." in section or (entries and set(entries) <= set(ENTRY)):
+            found[section] = entries
+        else:
+            for name, entry in entries.items():
+                if isinstance(entry, Mapping):
+                    found[f"{section}.{name}"] = entry
+                else:
+                    faults.append(f"space.{section}.{name} = {entry!r} is no table; write {{ low = ..., high = ... }}")
+    return found, faults
+
+
+def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
+    """What is wrong with one entry by itself."""
+    faults = []
+    span = f"[{how.low:g}, {how.high:g}] {how.unit}"
+    for name, value in entry.items():
+        numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if name not in ENTRY:
+            near = get_close_matches(name, ENTRY, n=1, cutoff=0.5)
+            faults.append(f"space.{key}.{name} is no key; {f'did you mean {near[0]}?' if near else ', '.join(ENTRY)}")
+        elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
+            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {span}")
+        elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
+            faults.append(f"space.{key}.{name} = {value:g} {how.unit} lies outside the declared {span}")
+        elif name == "unit" and value != how.unit:
+            faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
+        elif name == "scale" and value not in ("linear", "log"):
+            faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
+        elif name == "integer" and not isinstance(value, bool):
+            faults.append(f"space.{key}.integer = {value!r} is none of true, false")
+        elif name in ("above", "tied") and value not in known:
+            near = get_close_matches(str(value), known, n=1, cutoff=0.5)
+            faults.append(f"space.{key}.{name} = {value!r} is no number{f'; did you mean {near[0]}?' if near else ''}")
+    if faults or "fixed" in entry or "tied" in entry:
+        return faults
+    return _range_faults(_axis(key, entry, how))
+
+
+def _range_faults(axis: Axis) -> list[str]:
+    where = f"space.{axis.key}"
+    if not axis.low < axis.high:
+        word = "empty" if axis.low == axis.high else "inverted"
+        return [f"{where}: the range [{axis.low:g}, {axis.high:g}] {axis.unit} is {word}; low must lie below high"]
+    if axis.scale == "log" and axis.low <= 0.0:
+        return [f"{where}: low = {axis.low:g} {axis.unit} must be above 0 on a logarithmic scale"]
+    if axis.integer and math.floor(axis.high) < math.ceil(axis.low):
+        return [f"{where}: the range [{axis.low:g}, {axis.high:g}] {axis.unit} holds no whole number"]
+    return []
+
+
+def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | None]], told: bool) -> list[str]:
+    """Ties and orders that cannot hold."""
+    faults = []
+    axes = {axis.key: axis for axis in space.axes}
+    for axis in space.axes:
+        chain = [axis.key]
+        while axes.get(chain[-1]) and axes[chain[-1]].above:
+            chain.append(axes[chain[-1]].above)
+            if chain[-1] in chain[:-1]:
+                faults.append(f"space.{axis.key}: above runs in a circle: {' > '.join(chain)}")
+                break
+        if axis.above and axis.above not in axes and axis.above not in space.fixed:
+            faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
+        lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
+        if axis.above and lower > axis.high:
+            faults.append(f"space.{axis.key}.high = {axis.high:g} {axis.unit} lies below {axis.above} = {lower:g}")
+    for key, tie in space.tied.items():
+        if tie.of not in axes and tie.of not in space.fixed:
+            faults.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
+            continue
+        ends = (axes[tie.of].low, axes[tie.of].high) if tie.of in axes else (space.fixed[tie.of],)
+        how = known[key][0]
+        for end in ends:
+            value = tie.factor * end + tie.offset
+            if not how.low <= value <= how.high:
+                faults.append(
+                    f"space.{key} = {value:g} {how.unit} at {tie.of} = {end:g} lies outside [{how.low:g}, {how.high:g}]"
+                )
+    if not space.axes and not told:
+        faults.append("space: nothing varies; give at least one key low and high")
+    return faults

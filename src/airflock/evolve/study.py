@@ -1,0 +1,256 @@
+"""Study: an optimisation as data: a scenario, a space, what is better, and how to search; from a file or by name."""
+
+import hashlib
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from airflock import __version__
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import choice, quantity
+from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.fitness import Objective
+from airflock.evolve.objective_table import read_objectives
+from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
+from airflock.evolve.space import Space, full_space
+from airflock.evolve.space_table import read_space
+from airflock.scenarios import schema
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+
+S6 = "Vásárhelyi et al. 2018, Table S6"
+KEYS = ("title", "scenario", "set", "space", "objective", "search")
+LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
+SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search(Record):
+    """How a study searches: the table [search]."""
+
+    algorithm: str = choice(
+        "cmaes",
+        ALGORITHMS,
+        source=S6,
+        meaning="CMA-ES; a binary genetic algorithm; NSGA-II or NSGA-III (Pareto fronts)",
+    )
+    population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates of a generation")
+    generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations of a run")
+    seeds: float = quantity(
+        1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights of a candidate"
+    )
+    random_numbers: str = choice(
+        "fresh",
+        ("fresh", "generation", "study"),
+        source="our choice",
+        meaning="flights' seeds: new for each candidate, common to a generation, or common to the whole study",
+    )
+    restarts: float = quantity(
+        0, "1", low=0, high=1000, source="our choice", meaning="independent further runs after the first"
+    )
+    growth: float = quantity(
+        1.0,
+        "1",
+        low=1.0,
+        high=16.0,
+        source="our choice; Auger & Hansen 2005 take 2",
+        meaning="factor by which each restart enlarges the population",
+    )
+    seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
+    precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
+    top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
+    pool: float = quantity(
+        200, "1", low=0, high=1e6, source="our choice", meaning="candidates that race for the top; 0: the luckiest win"
+    )
+    final_seeds: float = quantity(
+        100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"
+    )
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that decides the result of an optimisation."""
+
+    scenario: Scenario
+    space: Space
+    objectives: tuple[Objective, ...]
+    search: Search
+    title: str = ""
+
+    def whole(self, name: str) -> int:
+        """A whole number of the search."""
+        return int(getattr(self.search, name))
+
+    def population(self, run: int) -> int:
+        """Candidates of a generation in a run: restarts may enlarge it."""
+        return round(self.search.population * self.search.growth**run)
+
+    def seed(self, part: int, number: int) -> int:
+        """Seed of a flight: `part` 0 searches, others are further parts; unlike any seed 0, 1, 2, ... given by hand."""
+        return ((self.whole("seed") + 1) << SEED_BITS) + (part << (SEED_BITS - 4)) + number
+
+    def document(self) -> dict[str, Any]:
+        """The study as plain values: what study.toml holds, and what a resumed study is compared with."""
+        q = self.search
+        return {
+            "layout": LAYOUT,
+            "airflock": __version__,
+            "rules": fingerprint(self.scenario, int(q.precision)),
+            "title": self.title,
+            "name": self.scenario.name,
+            "search": {
+                name: int(value) if isinstance(value, float) and value.is_integer() else value
+                for name, value in ((n, getattr(q, n)) for n in q.__dataclass_fields__)
+            },
+            "objective": [
+                {
+                    "name": o.name,
+                    "maximise": o.maximise,
+                    "over_seeds": o.over_seeds,
+                    "quantile": o.quantile,
+                    **({"own": o.text} if o.own else {}),
+                }
+                for o in self.objectives
+            ],
+            "space": self.space.document(),
+            "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
+        }
+
+
+def fingerprint(scenario: Scenario, precision: int) -> str:
+    """Hash of everything that is compiled for a scenario: equal physics gives equal fingerprints."""
+    from airflock.engine.simulate import driver_text
+
+    return hashlib.sha256(driver_text(scenario, precision=precision).encode()).hexdigest()[:12]
+
+
+def shipped() -> dict[str, Path]:
+    """Name → file of every study shipped with the package; a study for a preset bears the preset's name."""
+    root = Path(str(resources.files("airflock"))) / "studies"
+    return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
+
+
+def load_study(
+    name: str | os.PathLike[str],
+    *,
+    settings: Mapping[str, Any] | None = None,
+    search: Mapping[str, Any] | None = None,
+    tables: Mapping[str, Any] | None = None,
+) -> Study:
+    """Study from a file, from a shipped study's name, or of a scenario as it is, over all its model's ranges.
+
+    settings : keys of the scenario to change, such as "duration"
+    search   : keys of the table [search] to change, such as "population"
+    tables   : tables "space" or "objective" that replace the file's
+    Raises ScenarioError with one line per fault.
+    """
+    known = shipped()
+    text = str(name)
+    path = known.get(text) or Path(text)
+    document: Mapping[str, Any] = {}
+    if path.suffix == ".toml" and path.is_file():
+        try:
+            document = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
+            raise ScenarioError([f"{path}: {fault}"]) from fault
+    if not {"space", "scenario", "objective", "search"} & set(document):
+        return make_study({"scenario": text, **(tables or {})}, text, settings=settings, search=search)
+    where = text if text in known else str(path)
+    document = {**document, **(tables or {})}
+    return make_study(document, where, settings=settings, search=search, folder=path.parent)
+
+
+def make_study(
+    document: Mapping[str, Any],
+    where: str = "study",
+    *,
+    settings: Mapping[str, Any] | None = None,
+    search: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
+    scenario: Scenario | None = None,
+) -> Study:
+    """Study from a nested dict; `scenario` stands in for its key of that name."""
+    faults = []
+    for key in document:
+        if key not in KEYS:
+            near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
+            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
+    if scenario is None:
+        scenario = _scenario(document, where, settings or {}, folder)
+    space: Space | None
+    if "space" in document:
+        space, more = read_space(document["space"], scenario)
+        faults += more
+    else:
+        space = full_space(scenario)
+    objectives, more = read_objectives(document.get("objective", {}), scenario, folder)
+    faults += more
+    found, more = schema.check("search", {**document.get("search", {}), **(search or {})}, Search)
+    faults += more
+    if found is not None:
+        faults += _search_faults(found, len(objectives))
+    if faults or space is None or found is None:
+        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    return Study(scenario, space, objectives, found, str(document.get("title", "")))
+
+
+def _scenario(document: Mapping[str, Any], where: str, settings: Mapping[str, Any], folder: Path | None) -> Scenario:
+    named, keys = document.get("scenario"), document.get("set", {})
+    if not isinstance(named, str) or not isinstance(keys, Mapping):
+        wrong = f"scenario = {named!r} is missing or no name" if not isinstance(named, str) else "set is no table"
+        raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
+    beside = folder / named if folder is not None else None
+    return load(beside if beside is not None and beside.is_file() else named, {**keys, **settings})
+
+
+def _search_faults(search: Search, objectives: int) -> list[str]:
+    faults = [
+        f"search.{name} = {value:g} is not a whole number"
+        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds")
+        if (value := getattr(search, name)) != int(value)
+    ]
+    if search.algorithm in SEVERAL and objectives < 2:
+        faults.append(
+            f"search.algorithm = '{search.algorithm}' is for several objectives, but there is one; "
+            "give objective.maximise a list"
+        )
+    if search.algorithm not in SEVERAL and objectives > 1:
+        faults.append(
+            f"search.algorithm = '{search.algorithm}' takes one objective, but there are {objectives}; "
+            f"give one, or search.algorithm = 'nsga2'"
+        )
+    flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
+    if flights * search.seeds >= 2 ** (SEED_BITS - 4):
+        faults.append(f"search: {flights * search.seeds:g} flights are more than a study can number")
+    return faults
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:
+    """What differs between two documents, one line each."""
+    found = []
+    for key in [*old, *(key for key in new if key not in old)]:
+        where = f"{at}{key}"
+        before, after = old.get(key), new.get(key)
+        if isinstance(before, Mapping) and isinstance(after, Mapping):
+            found += differences(before, after, f"{where}.")
+        elif before != after:
+            found.append(f"{where} = {_shown(before)} there, {_shown(after)} now")
+    return found
+
+
+def _shown(value: Any) -> str:
+    return "missing" if value is None else str(value) if len(str(value)) < 60 else f"{str(value)[:57]}..."
+
+
+def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+    """Raise StudyError, naming what differs, if a folder holds another study than the one that is asked for."""
+    found = differences(old, new)
+    if not found:
+        return
+    shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
+    raise StudyError(f"{folder}: holds another study: {'; '.join(shown)}; give another --out")

@@ -1,0 +1,77 @@
+"""A study as tidy tables: one row a flight, or one row a candidate; and their export to CSV and parquet."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from airflock import atomic
+from airflock.errors import StudyError
+from airflock.evolve.store import Store
+
+KEY = ["stage", "run", "generation", "candidate"]
+
+
+def candidates(store: Store, objectives: Sequence[str], stage: str = "search") -> pd.DataFrame:
+    """One row a candidate: its parameters by key, then its fitness, one column for each objective; nan: failed."""
+    rows = store.rows(
+        "SELECT run, generation, candidate, parameters, fitness FROM candidate WHERE stage=? AND fitness IS NOT NULL "
+        "ORDER BY run, generation, candidate",
+        (stage,),
+    )
+    found = []
+    for run, generation, candidate, parameters, fitness in rows:
+        told = [math.nan if value is None else value for value in json.loads(fitness)]
+        place = {"run": run, "generation": generation, "candidate": candidate}
+        found.append({**place, **json.loads(parameters), **dict(zip(objectives, told, strict=True))})
+    return pd.DataFrame(found)
+
+
+def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
+    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions."""
+    rows = store.rows(
+        "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
+        "f.duration, f.worker, s.versions FROM flight f JOIN candidate c USING (stage, run, generation, candidate) "
+        "LEFT JOIN session s USING (session) WHERE ? IS NULL OR f.stage=? "
+        "ORDER BY f.stage, f.run, f.generation, f.candidate, f.repeat",
+        (stage, stage),
+    )
+    found = []
+    for *key, parameters, scores, reason, duration, worker, versions in rows:
+        values = {name: v for name, v in json.loads(scores or "{}").items() if not isinstance(v, list)}
+        place = dict(zip([*KEY, "repeat", "seed"], key, strict=True))
+        about = {"reason": reason, "duration": duration, "worker": worker, "versions": versions}
+        found.append({**place, **json.loads(parameters), **values, **about})
+    return pd.DataFrame(found)
+
+
+def export(store: Store, folder: Path) -> list[Path]:
+    """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed."""
+    table = flights(store)
+    written = [folder / "evaluations.csv"]
+    try:
+        atomic.write(written[0], table.to_csv(index=False))
+        if _has_parquet():
+            written.append(folder / "evaluations.parquet")
+            with atomic.atomic(written[1]) as temporary:
+                table.to_parquet(temporary, index=False)
+    except OSError as fault:
+        raise StudyError(f"{folder}: tables cannot be written: {fault.strerror or fault}") from fault
+    return written
+
+
+def _has_parquet() -> bool:
+    try:
+        import pyarrow  # noqa: F401
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
+def best_first(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
+    """Candidates without the failed ones, the best first; of equals the earlier."""
+    sound = table[table[objective].notna()]
+    return sound.sort_values(objective, ascending=not maximise, kind="stable")

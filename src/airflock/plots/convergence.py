@@ -1,0 +1,28 @@
+"""Convergence of a study: best so far and mean of each generation against its evaluations."""
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from airflock.plots import style
+
+
+def convergence(table: pd.DataFrame, objective: str, *, maximise: bool = True, what: str = "") -> Figure:
+    """Fitness over generations.
+
+    table     : one row a candidate: run, generation, and the column `objective` (nan: failed)
+    objective : what is drawn; what : title
+    """
+    figure = style.Picture(5.6, 3.4)
+    axes = figure.subplots()
+    for i, (run, rows) in enumerate(table.groupby("run")):
+        groups = rows.groupby("generation")[objective]
+        color = style.LINES[i % len(style.LINES)]
+        best = groups.max().cummax() if maximise else groups.min().cummin()
+        low, high = groups.quantile(0.1), groups.quantile(0.9)
+        axes.fill_between(low.index, low, high, color=color, alpha=0.15, linewidth=0.0)
+        axes.plot(groups.mean(), color=color, linewidth=1.6, label=f"run {run}: mean, 10 to 90 %")
+        axes.plot(best, color=color, linewidth=1.0, linestyle="--", label=f"run {run}: best so far")
+    style.dress(axes, "generation", objective)
+    style.legend(axes)
+    style.heading(axes, what or "Convergence", f"{len(table)} candidates")
+    return figure

@@ -1,0 +1,70 @@
+"""Pairwise slices: the best fitness that any candidate reached in each cell of two parameters."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from airflock.plots import style
+
+CELLS = 14
+
+
+def slices(
+    table: pd.DataFrame,
+    bounds: Mapping[str, tuple[float, float]],
+    objective: str,
+    best: Mapping[str, float] | None = None,
+    *,
+    maximise: bool = True,
+    what: str = "",
+) -> Figure:
+    """A triangle of maps, one for each pair of parameters.
+
+    table  : one row a candidate: a column for each key of `bounds`, and `objective`
+    bounds : key of a parameter → range that is drawn
+    best   : the chosen parameters, a cross in each map
+    """
+    keys = list(bounds)
+    n = max(len(keys) - 1, 1)
+    figure = style.Picture(1.2 * n + 1.6, 1.2 * n + 1.0)
+    grid = figure.subplots(n, n, squeeze=False)
+    values = table[objective].to_numpy(float)
+    sound = np.isfinite(values)
+    low, high = (float(values[sound].min()), float(values[sound].max())) if sound.any() else (0.0, 1.0)
+    mesh = None
+    for row in range(n):
+        for column in range(n):
+            axes = grid[row, column]
+            if column > row or len(keys) < 2:
+                axes.set_visible(False)
+                continue
+            x, y = keys[column], keys[row + 1]
+            cells = _best_in_cells(table.loc[sound, [x, y]].to_numpy(), values[sound], bounds[x], bounds[y], maximise)
+            edges = [np.linspace(*bounds[key], CELLS + 1) for key in (x, y)]
+            mesh = axes.pcolormesh(*edges, cells, cmap="viridis", vmin=low, vmax=high, rasterized=True)
+            axes.set_facecolor(style.PALE)  # nobody was there
+            if best is not None:
+                axes.plot(best[x], best[y], "x", color=style.RED, markersize=4.0)
+            labels = (x.rpartition(".")[2] if row == n - 1 else "", y.rpartition(".")[2] if column == 0 else "")
+            style.dress(axes, *labels, grid=False)
+            axes.tick_params(labelbottom=row == n - 1, labelleft=column == 0, labelsize=style.SMALL - 2.0)
+    if mesh is not None:
+        style.colour_bar(figure, mesh, grid.ravel().tolist(), f"best {objective} in a cell")
+    style.overall(figure, what or "Pairwise slices", "grey: nobody was there; cross: chosen")
+    return figure
+
+
+def _best_in_cells(
+    points: np.ndarray, values: np.ndarray, x: tuple[float, float], y: tuple[float, float], maximise: bool
+) -> np.ma.MaskedArray:
+    """Best value (row, column) in each cell of two ranges, masked where there is none."""
+    sign = 1.0 if maximise else -1.0
+    index = [
+        np.clip(((points[:, i] - low) / (high - low) * CELLS).astype(int), 0, CELLS - 1)
+        for i, (low, high) in enumerate((x, y))
+    ]
+    cells = np.full((CELLS, CELLS), -np.inf)
+    np.maximum.at(cells, (index[1], index[0]), sign * values)
+    return np.ma.masked_invalid(np.where(np.isfinite(cells), sign * cells, np.nan))

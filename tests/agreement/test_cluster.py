@@ -1,0 +1,142 @@
+"""Flights on workers of dask: the same study, bit by bit, also when workers are killed at random."""
+
+import os
+import random
+import signal
+import threading
+import warnings
+
+import pytest
+
+import toys
+from airflock.errors import StudyError
+from airflock.evolve.executors import Flight
+from airflock.evolve.executors.cluster import Cluster, Task
+from airflock.evolve.executors.here import Here
+from airflock.evolve.folder import open_folder
+from airflock.evolve.run import run
+from airflock.evolve.store import Store
+
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.filterwarnings("ignore")
+TABLES = (
+    "SELECT * FROM candidate",
+    "SELECT stage, run, generation, candidate, repeat, seed, scores, reason FROM flight",
+)
+
+
+def local(workers=2):
+    return distributed.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=60)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with local() as found:
+        yield found
+
+
+@pytest.fixture
+def doomed():
+    """A cluster of one's own, because kills may leave it with fewer workers."""
+    with local() as found:
+        yield found
+
+
+def contents(folder):
+    with Store(folder, write=False) as store:
+        return [store.rows(sql) for sql in TABLES]
+
+
+def toy_task(pause=0.0):
+    best, space = dict(toys.BEST), toys.SPACE
+
+    def task(parameters, seed):  # a closure, because workers cannot import the tests
+        import random as chance
+        import time as clock
+
+        clock.sleep(pause)
+        away = sum(((parameters[k] - v) / space["model"][k[6:]]["high"]) ** 2 for k, v in best.items())
+        if parameters["model.p_rep"] < 0.03:
+            return None, "nobody can fly so", 0.0, "worker"
+        return {"fitness": 1.0 - away + 0.01 * chance.Random(seed).gauss(0.0, 1.0)}, "", 0.0, "worker"
+
+    return task
+
+
+def here(parameters, seed):
+    return {"fitness": toys.bowl(parameters, seed)["fitness"]}
+
+
+def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
+    study = toys.study(population=10, generations=10, seeds=2)
+    open_folder(tmp_path / "here", study, resume=False)
+    wanted = run(study, tmp_path / "here", Here(here, 2))
+    over, kills = threading.Event(), []
+
+    def killer():
+        chance = random.Random(seed)
+        while not over.wait(chance.uniform(0.2, 0.6)):
+            worker = chance.choice(list(doomed.workers.values()))
+            # one at a time: a worker that dies before it has started is given up by its nanny
+            if worker.pid and len(doomed.scheduler_info["workers"]) == 2:
+                os.kill(worker.pid, signal.SIGKILL)
+                kills.append(worker.pid)
+
+    thread = threading.Thread(target=killer)
+    open_folder(tmp_path / "there", study, resume=False)
+    executor = Cluster(study, doomed.scheduler_address, task=toy_task(0.03))
+    thread.start()
+    try:
+        found = run(study, tmp_path / "there", executor)
+    finally:
+        over.set()
+        thread.join()
+    assert len(kills) >= 3
+    assert contents(tmp_path / "there") == contents(tmp_path / "here")
+    assert found.document() == wanted.document()
+
+
+def test_flights_that_never_end_are_recorded_as_failed(doomed):
+    def task(parameters, seed):
+        import time as clock
+
+        clock.sleep(9.0 if parameters["model.r0_rep"] > 50.0 else 0.0)
+        return {"fitness": 1.0}, "", 0.0, "worker"
+
+    executor = Cluster(toys.study(), doomed.scheduler_address, timeout=2.0, task=task)
+    flights = [Flight(i, 0, {"model.r0_rep": r}, i) for i, r in enumerate((20.0, 60.0, 30.0))]
+    landed = {x.flight.candidate: x for x in executor.fly(flights)}
+    executor.close()
+    assert landed[1].values is None and landed[1].reason == "took longer than 2 s, 3 times"
+    assert landed[0].values == landed[2].values == {"fitness": 1.0}
+
+
+def test_schedulers_without_workers_are_one_line():
+    with local(0) as empty, pytest.raises(StudyError, match="has no workers"):
+        Cluster(toys.study(), empty.scheduler_address, answer=0.3)
+
+
+def test_schedulers_that_do_not_answer_are_one_line():
+    with pytest.raises(StudyError, match="--scheduler tcp://127.0.0.1:9: does not answer"):
+        Cluster(toys.study(), "tcp://127.0.0.1:9", answer=0.3)
+
+
+def test_workers_with_different_processors_are_named(cluster, monkeypatch):
+    executor = Cluster(toys.study(), cluster.scheduler_address)
+    monkeypatch.setattr(executor.client, "run", lambda _: {"a": "Epyc", "b": "Xeon"})
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        executor._warn_of_mixed_processors()
+    executor.close()
+    assert "workers have different processors (Epyc; Xeon)" in str(told[0].message)
+
+
+def test_a_task_flies_the_same_flight_as_this_process():
+    from airflock.engine.simulate import score_flight
+    from airflock.evolve.space import with_parameters
+    from airflock.evolve.study import load_study
+
+    study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
+    parameters = study.space.parameters([0.5] * 11)
+    values, reason, _, _ = Task.of(study)(parameters, 5)
+    assert not reason and values == score_flight(with_parameters(study.scenario, parameters), 5)

@@ -1,0 +1,56 @@
+"""The kernels of a GPU, run by Numba's CUDA simulator, fly as plain Python does; random integers are the same bits."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+
+HERE = Path(__file__).resolve().parents[1] / "cuda"
+CASES = (
+    "paper", "split", "storm", "polygon", "silo", "links", "table", "couzin", "vicsek", "groups", "together", "city",
+    "herd",
+)  # fmt: skip
+
+
+def simulated(script, *arguments):
+    """Output of a script in a process that simulates CUDA."""
+    environment = os.environ | {"NUMBA_ENABLE_CUDASIM": "1"}
+    done = subprocess.run(
+        [sys.executable, str(HERE / script), *map(str, arguments)], capture_output=True, text=True, env=environment
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def flights(request):
+    return simulated("simulated.py", request.config.getoption("--seed"), *CASES)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_simulated_kernel_flies_as_plain_python(flights, name, seed):
+    found = flights[name]
+    assert found["moved"] > 0.01  # something happens
+    assert found["frames"] < 1e-9
+    assert found["values"] < 1e-9
+
+
+def test_cases_cover_collisions_split_flocks_and_lone_agents(flights):
+    assert max(found["known"].get("n_coll", 0.0) for found in flights.values()) >= 1.0
+    assert flights["split"]["known"]["n_min"] < 3.0
+    assert flights["groups"]["known"]["n_groups"] > 0.0
+    assert flights["groups"]["known"]["share_alone"] > 0.0
+    assert flights["city"]["known"]["avoiding"] > 0.0
+
+
+def test_random_integers_of_a_kernel_are_those_of_plain_python(seed):
+    found = simulated("random_words.py", seed)
+    assert found["counters"] == 200
+    assert found["wrong_words"] == 0
+    assert found["wrong_uniforms"] == 0
+    assert found["normals"] < 1e-12

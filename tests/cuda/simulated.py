@@ -1,0 +1,106 @@
+"""Flies small flocks in Numba's CUDA simulator beside plain Python, and prints the differences as JSON.
+
+Run in a process of its own, with NUMBA_ENABLE_CUDASIM=1: python simulated.py CASE...
+"""
+
+import json
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from airflock.engine import cpu  # noqa: E402
+from airflock.engine.cuda.launch import fly_many  # noqa: E402
+from airflock.engine.cuda.shape import Shape  # noqa: E402
+from airflock.engine.plain import fly_plainly  # noqa: E402
+from airflock.engine.simulate import plan_of  # noqa: E402
+from airflock.engine.tables import tables  # noqa: E402
+from airflock.scenarios.files import load  # noqa: E402
+from flocks import IDEAL, ISLANDS, PENTAGON, scenario  # noqa: E402
+
+COMMON = {"duration": 1.2, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}
+COMMON |= {"start.separation": 4.0, "agents": 5}
+# model or preset, keys, threads per agent, states in registers
+CASES = {
+    "paper": ("vasarhelyi_2018", {"world.walls": "nearest_per_axis", "metrics.r_coll": 9.0}, 1, True),
+    "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
+    "storm": ("viragh_2014", {
+        "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
+        "metrics.r_coll": 9.0, "metrics.collision_period": 0.15,
+    }, 1, True),
+    "links": ("vasarhelyi_2018", {
+        "world.dimensions": "3", "radio.kind": "links", "radio.delay": 0.2, "radio.near": 5.0, "radio.far": 30.0,
+        "model.limit": "cap",
+    }, 2, True),
+    "polygon": ("vasarhelyi_2018", {
+        "world.arena": "polygon", "world.corners": PENTAGON, "sensors.noise": 0.0, "radio.delay": 0.31,
+        "sensors.period": 0.25, "metrics.period": 0.5, "agents": 4,
+    }, 1, True),
+    "silo": ("viragh_2014", IDEAL | {"world.dimensions": "3", "world.arena": "circle"}, 1, True),
+    "table": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4}, 1, False),
+    "couzin": ("couzin_2002/swarm", {"agents": 5, "duration": 1.0}, 1, True),
+    "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 8.0, "world.side": 3.0}, 1, True),
+    "groups": ("zapotecatl_2016/best", {
+        "agents": 4, "dt": 0.02, "duration": 0.08, "metrics.kind": "groups", "metrics.r_cluster": 0.3,
+        "start.speed": 0.1,
+    }, 2, False),
+    "together": ("zapotecatl_2016/best", {
+        "agents": 5, "dt": 0.02, "duration": 0.16, "update": "synchronous", "metrics.kind": "groups",
+        "metrics.r_cluster": 0.3, "start.speed": 0.1,
+    }, 1, True),
+    "herd": ("kidger/city", {
+        "agents": 3, "duration": 0.4, "scene.blocks": 2, "goals.kind": "points", "goals.points": [[5.0, 5.0, 9.0]],
+        "goals.role": "herd", "scene.later": 0.5, "scene.later_until": 0.3,
+    }, 1, True),
+    "city": ("kidger/city", {"agents": 3, "duration": 0.4, "scene.blocks": 3, "goals.count": 2}, 1, True),
+}  # fmt: skip
+
+
+def build(name):
+    """Scenario and layout of a case."""
+    kind, keys, per_agent, registers = CASES[name]
+    if "/" in kind:
+        found = load(kind, keys)
+    else:
+        found = scenario(kind, **{key.replace(".", "__"): value for key, value in (COMMON | keys).items()})
+    sequential = found.flight.update == "sequential"
+    lanes = -(-found.agents // 32) * 32
+    threads = per_agent if sequential else (found.agents * per_agent if registers else 3)
+    return found, Shape(lanes, per_agent, threads, registers=registers, simulated=True)
+
+
+def differ(name, seed):
+    """Largest differences of a case: frames (m, m/s), order parameters, and how far anything moved."""
+    found, shape = build(name)
+    plan = replace(plan_of(found, precision=64, record=True), grid=False)
+    one, two = fly_many(plan, [tables(found, plan, s) for s in (seed, seed + 1)], shape=shape)
+    if plan.scene or plan.goals:  # plain Python has neither
+        trusted = [cpu.fly(plan, tables(found, plan, s)) for s in (seed, seed + 1)]
+    else:
+        trusted = [fly_plainly(found, s) for s in (seed, seed + 1)]
+    frames, values = 0.0, {}
+    for simulated, known in zip((one, two), trusted, strict=True):
+        assert simulated.status == known.status == 0
+        frames = max(frames, float(np.abs(simulated.frames - known.frames).max()))
+        frames = max(frames, float(np.abs(simulated.state - known.state).max()))
+        for key, value in known.values.items():
+            other = simulated.values[key]
+            if isinstance(value, list):
+                assert np.array_equal(value, other, equal_nan=True), (key, value, other)
+                continue
+            if value != value:
+                assert other != other, (key, value, other)
+                continue
+            values[key] = max(values.get(key, 0.0), abs(other - value) / max(1.0, abs(value)))
+    moved = float(np.abs(np.diff(trusted[0].frames, axis=0)).max())
+    return {"frames": frames, "values": max(values.values()), "moved": moved, "known": trusted[0].values}
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore", RuntimeWarning)  # the simulator's 32-bit words overflow on purpose
+    seed, *names = sys.argv[1:]
+    json.dump({name: differ(name, int(seed)) for name in names}, sys.stdout)

@@ -1,0 +1,100 @@
+"""Devices are picked by the size of the work, and what is missing is said in one line."""
+
+import subprocess
+import sys
+
+import pytest
+
+from airflock.engine import devices
+from airflock.engine.cuda import device as gpu
+from airflock.engine.cuda.shape import MOST_THREADS, shape_of
+from airflock.engine.simulate import picked, plan_of, score_flights
+from airflock.errors import DeviceError, ScenarioError
+from flocks import scenario
+
+SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
+
+
+@pytest.fixture
+def present(monkeypatch):
+    monkeypatch.setattr(gpu, "trouble", lambda: None)
+
+
+@pytest.fixture
+def absent(monkeypatch):
+    monkeypatch.setattr(gpu, "trouble", lambda: "no driver")
+
+
+def test_unknown_devices_are_refused():
+    with pytest.raises(ScenarioError, match="'gpu' is none of auto, cpu, cuda, python"):
+        picked([SMALL], "gpu")
+
+
+def test_a_missing_gpu_is_an_error_where_it_is_named_and_a_note_where_not(absent):
+    with pytest.raises(DeviceError, match="device = cuda: no driver; choose device = cpu or auto"):
+        score_flights([SMALL], [0], device="cuda")
+    said = []
+    assert picked([SMALL], "auto", say=said.append) == "cpu"
+    assert said == ["device auto: cpu, no driver"]
+
+
+def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present):
+    said = []
+    assert picked([SMALL], "auto", say=said.append) == "cpu"
+    many = scenario(agents=100, duration=600.0)
+    assert picked([many] * 1000, "auto", say=said.append) == "cuda"
+    assert "s of work" in said[0]
+    assert said[1].startswith("device auto: cuda")
+
+
+def test_work_grows_with_flights_agents_and_time():
+    base = devices.work(scenario(agents=100, duration=100.0))
+    assert devices.work(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
+    assert devices.work(scenario(agents=200, duration=100.0)) > 2.5 * base
+
+
+def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):
+    monkeypatch.setattr(gpu, "trouble", lambda: pytest.fail("asked"))
+    assert picked([SMALL], "cpu") == "cpu"
+
+
+def test_plain_python_scores_like_the_compiled_flight(seed):
+    plain = score_flights([SMALL], [seed], device="python")[0]
+    compiled = score_flights([SMALL], [seed], precision=64)[0]
+    assert {k: v for k, v in plain.items()} == pytest.approx(compiled, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("agents", [1, 2, 31, 32, 33, 100, 128, 129, 500, 1000, 1024, 1025, 5000])
+@pytest.mark.parametrize("flocks", [1, 10, 100, 1000, 15_000])
+def test_every_flock_fits_on_the_threads_of_its_block(agents, flocks):
+    shape = shape_of(agents, flocks)
+    assert shape.lanes >= agents
+    assert shape.lanes % 32 == 0
+    assert shape.threads <= MOST_THREADS
+    assert shape.threads % 32 == 0
+    if shape.registers:
+        assert shape.threads == shape.lanes * shape.per_agent
+    assert shape_of(agents, 15_000).per_agent <= shape.per_agent  # full GPUs share nothing
+
+
+def test_all_stages_of_a_kernel_are_the_passes_of_the_cpu():
+    """No rule is written twice: every rule of a CPU driver stands in the kernel with the same text."""
+    from airflock.engine.cuda.kernel import flight as kernel
+    from airflock.engine.passes.driver import flight as driver
+
+    plan = plan_of(scenario(agents=5))
+    ours = driver(plan).split("\n\n")
+    rules = [block for block in ours if block.startswith("@njit(**JIT)\ndef ") and "_" in block.split("(")[1]]
+    rules = [block for block in rules if block.split("def ")[1].split("_")[0] in ("vasarhelyi", "maths", "motion")]
+    assert len(rules) > 5
+    text = kernel(plan, shape_of(5, 1000))
+    assert all(block in text for block in rules)
+
+
+def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
+    code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
+    code += "from airflock.engine.cuda import device\ndevice.trouble = lambda: 'no driver'\n"
+    code += "from airflock.cli import main\nmain()\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.strip() == "airflock: device = cuda: no driver; choose device = cpu or auto"

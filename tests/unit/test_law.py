@@ -1,0 +1,137 @@
+"""The law of rules and the contract: what is refused, with the file, the line and the reason."""
+
+import math
+from importlib import import_module
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import pytest
+
+from airflock.body.registry import BODIES
+from airflock.core import maths
+from airflock.core.contract import model
+from airflock.core.vocabulary import VOCABULARY, asks
+from airflock.engine import law
+from airflock.errors import RuleError
+from airflock.metrics.registry import SETS
+from airflock.scenarios.files import MODELS
+
+RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
+
+
+def lawful(dx, r):
+    return dx / max(r, 1.0) ** 2
+
+
+def integer(dx):
+    return 2 * dx
+
+
+def comprehension(dx):
+    return sum([dx for _ in range(3)])
+
+
+def raises(r):
+    if r < 0.0:
+        raise ValueError(r)
+    return r
+
+
+def foreign(dx):
+    return maths.norm(dx, 0.0, 0.0)
+
+
+def shadowed(dx, r):
+    least = dx
+    return min(least, r)
+
+
+def test_a_lawful_rule_passes():
+    assert law.faults(lawful) == []
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        (integer, "integer 2 in float arithmetic; write 2.0"),
+        (comprehension, "ListComp is not allowed"),
+        (raises, "Raise is not allowed"),
+        (foreign, "maths.norm: only math may be used"),
+        (shadowed, "least is what the engine calls here"),
+    ],
+)
+def test_a_fault_names_file_line_and_reason(rule, said):
+    (line, *_) = law.faults(rule)
+    file, number, text = line.split(":", 2)
+    assert file == __file__ and said in text
+    with open(file, encoding="utf-8") as source:
+        written = source.read().splitlines()
+    start = rule.__code__.co_firstlineno
+    assert start <= int(number) <= start + 3 and written[start - 1].startswith(f"def {rule.__name__}")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_shipped_model_is_lawful(name):
+    module = import_module(f"airflock.models.{name}")
+    for kind in RULES:
+        if hasattr(module, kind):
+            assert law.faults(getattr(module, kind)) == []
+
+
+def test_every_shipped_body_and_order_parameter_is_lawful():
+    for body in BODIES.values():
+        assert law.faults(body.move) == []
+    for metric in {metric for found in SETS.values() for metric in found}:
+        for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within"):
+            if getattr(metric, kind) is not None:
+                assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)
+
+
+def test_an_unknown_name_is_refused_with_the_nearest_known_one():
+    def neighbour(dx, distnce, p):
+        return dx
+
+    with pytest.raises(RuleError, match="asks for 'distnce'") as caught:
+        asks(neighbour, "neighbour", "mine")
+    assert all(name in str(caught.value) for name in VOCABULARY["neighbour"])
+
+
+class Parameters:
+    pass
+
+
+class Sums(NamedTuple):
+    x: float
+
+
+def decide(own, p):
+    return own.vx, own.vy, own.vz
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({}, "lacks Parameters"),
+        ({"Parameters": Parameters, "COMMAND": "velocity"}, "lacks decide"),
+        ({"Parameters": Parameters, "COMMAND": "thrust", "decide": decide}, "'thrust' is none of velocity"),
+        (
+            {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": lambda dx: dx},
+            "neighbour but no NamedTuple Sums",
+        ),
+        (
+            {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "Sums": Sums, "REDUCE": {"y": "min"}},
+            "REDUCE['y']",
+        ),
+    ],
+)
+def test_a_model_with_a_part_missing_is_refused(parts, said):
+    with pytest.raises(RuleError) as caught:
+        model(SimpleNamespace(**parts), "mine")
+    assert said in str(caught.value) and "mine" in str(caught.value)
+
+
+def test_rules_of_a_model_are_plain_python():
+    module = import_module("airflock.models.vasarhelyi_2018")
+    p = module.Parameters()
+    sums = module.neighbour(**{name: 1.0 for name in asks(module.neighbour, "neighbour") if name != "p"}, p=p)
+    assert all(isinstance(value, float) and math.isfinite(value) for value in sums)

@@ -1,0 +1,62 @@
+"""Parameters: declared once, with unit, range, meaning and source; numbers out of range never get in."""
+
+from dataclasses import dataclass
+from importlib import import_module
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airflock.body.registry import BODIES
+from airflock.core.parameters import Choice, Parameters, Quantity, choice, choices, declarations, quantity, row
+from airflock.errors import ParameterError
+from airflock.scenarios.files import MODELS
+from airflock.scenarios.sections import SECTIONS
+
+RECORDS = {
+    **{f"model {name}": import_module(f"airflock.models.{name}").Parameters for name in MODELS},
+    **SECTIONS,
+    **{f"body {name}": body.Parameters for name, body in BODIES.items()},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Example(Parameters):
+    """A record with one of each."""
+
+    gain: float = quantity(0.5, "1/s", low=0.0, high=2.0, meaning="a gain", source="here")
+    range: float | None = quantity(None, "m", low=1.0, high=9.0, meaning="a distance")
+    form: str = choice("program", ("program", "printed"), meaning="a reading")
+
+
+@pytest.mark.parametrize("name", sorted(RECORDS))
+def test_every_parameter_of_the_package_says_what_it_means_and_its_default_lies_in_its_range(name):
+    for key, declared, default in declarations(RECORDS[name]):
+        assert declared.meaning, key
+        if isinstance(declared, Quantity):
+            assert declared.unit and declared.low < declared.high, key
+            assert declared.optional if default is None else declared.low <= default <= declared.high, key
+        if isinstance(declared, Choice):
+            assert default in declared.options and len(set(declared.options)) == len(declared.options), key
+
+
+def test_all_faults_come_together_with_unit_and_range():
+    with pytest.raises(ParameterError) as caught:
+        Example(gain=3.0, range=0.5, form="guess")
+    assert str(caught.value).splitlines() == [
+        "Example.gain = 3 1/s lies outside [0, 2] 1/s",
+        "Example.range = 0.5 m lies outside [1, 9] m",
+        "Example.form = 'guess' is none of program, printed",
+    ]
+
+
+@given(st.one_of(st.floats(), st.integers(), st.text(max_size=3), st.booleans(), st.none()))
+def test_only_numbers_in_range_get_in(value):
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if number and 0.0 <= value <= 2.0:
+        made = Example(gain=value)
+        assert made.gain == value and isinstance(made.gain, float)
+        assert row(made) == [float(value), 0.0] and choices(made) == {"form": "program"}
+    else:
+        with pytest.raises(ParameterError, match=r"Example\.gain"):
+            Example(gain=value)

@@ -1,0 +1,54 @@
+"""Kernels compile for GPUs that are not there: PTX of every shipped model, single precision without double."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from airflock.engine.simulate import plan_of
+from airflock.scenarios.files import load, presets
+
+pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+
+CAPABILITIES = ((8, 0), (9, 0))
+# One preset per publication: the others differ in numbers or in which perturbations are on. Threads of one of them.
+KERNELS = {
+    "vasarhelyi_2018/4ms": {"per_agent": 4, "threads": 512},
+    "viragh_2014/4ms": {},
+    "couzin_2002/torus": {},
+    "vicsek_1995/ordered": {},
+    "zapotecatl_2016/best": {},
+    "kidger/city": {},
+}
+
+
+def driver_of(name, bits=32, **layout):
+    from airflock.engine.cuda.launch import flight_driver
+    from airflock.engine.cuda.shape import shape_of
+
+    found = load(name)
+    plan = replace(plan_of(found, precision=bits), grid=False)
+    shape = shape_of(found.agents, 1000, sequential=plan.sequential)
+    return flight_driver(plan, replace(shape, **layout)), plan
+
+
+def doubles(text):
+    return re.findall(r"\S+\.f64\S*", text)
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_ptx_of_every_model(name):
+    from airflock.engine.cuda.compiled import ptx
+
+    driver, plan = driver_of(name, **KERNELS[name])
+    for (major, minor), text in ptx(driver, plan.bits, CAPABILITIES).items():
+        assert f".target sm_{major}{minor}" in text
+        assert ".entry" in text
+        assert doubles(text) == []  # one double literal would cost a GPU half its speed
+        assert "call.uni" not in text  # everything is inlined
+        if name.startswith("vasarhelyi"):
+            assert "ld.shared.v4.f32" in text  # a neighbour as heard is one load of four numbers
+
+
+def test_every_shipped_model_has_a_kernel_here():
+    assert {load(name).model.name for name in presets()} == {load(name).model.name for name in KERNELS}

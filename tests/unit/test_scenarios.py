@@ -1,0 +1,147 @@
+"""Scenario files: every fault in one line, all at once, whatever is in the file."""
+
+import copy
+import tomllib
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from airflock.errors import AirflockError, ScenarioError
+from airflock.scenarios.files import load, make, presets
+
+DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}
+SQUARE = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]
+numbers = st.one_of(
+    st.floats(), st.integers(-(10**12), 10**12), st.sampled_from([0, -1, 1e308, -0.0, float("nan"), float("inf")])
+)
+points = st.lists(st.lists(st.floats(-500.0, 500.0), min_size=0, max_size=3), max_size=6)
+values = st.one_of(
+    numbers,
+    st.booleans(),
+    st.none(),
+    st.text(max_size=8),
+    points,
+    st.lists(points, max_size=3),
+    st.dictionaries(st.sampled_from(["value", "unit", "source", "kind", ""]), st.one_of(numbers, st.text(max_size=3))),
+)
+
+
+def places(document):
+    """Paths to everything in a document: (section,), (section, key)."""
+    found = [(key,) for key in document]
+    return found + [(key, inner) for key, table in document.items() if isinstance(table, dict) for inner in table]
+
+
+@st.composite
+def mutated(draw):
+    """A preset's document after one to four blows: values replaced, keys misspelt, removed, doubled or moved."""
+    document = copy.deepcopy(DOCUMENTS[draw(st.sampled_from(sorted(DOCUMENTS)))])
+    for _ in range(draw(st.integers(1, 4))):
+        path = draw(st.sampled_from(places(document)))
+        table = document if len(path) == 1 else document[path[0]]
+        how = draw(st.sampled_from(["value", "value", "value", "misspell", "remove", "add", "move"]))
+        if how == "value":
+            table[path[-1]] = draw(values)
+        elif how == "misspell":
+            at = draw(st.integers(0, len(path[-1])))
+            table[path[-1][:at] + draw(st.characters(codec="ascii")) + path[-1][at:]] = table.pop(path[-1])
+        elif how == "remove":
+            del table[path[-1]]
+        elif how == "add":
+            table[draw(st.text(max_size=6))] = draw(values)
+        else:
+            document[draw(st.sampled_from(["model", "world", "body", "sensors", "metrics", "agents"]))] = table[
+                path[-1]
+            ]
+        if not document:
+            break
+    return document
+
+
+@given(mutated())
+@settings(max_examples=3000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_a_mutated_scenario_loads_or_is_refused_in_lines_that_name_it(document):
+    try:
+        found = make(document, "mutant.toml")
+    except AirflockError as fault:
+        lines = str(fault).splitlines()
+        assert lines and all(line.startswith("mutant.toml: ") for line in lines)
+        assert len(lines) == len(set(lines))
+    else:
+        assert found.agents >= 1 and found.separation() >= 0.0
+
+
+@given(st.sampled_from(sorted(DOCUMENTS)), st.integers(0, 10**6), st.binary(min_size=0, max_size=4))
+@settings(max_examples=300, deadline=None)
+def test_a_damaged_file_is_refused_or_loads(tmp_path_factory, name, at, junk):
+    text = presets()[name].read_bytes()
+    file = tmp_path_factory.getbasetemp() / "damaged.toml"
+    file.write_bytes(text[: at % len(text)] + junk + text[at % len(text) + len(junk) :])
+    try:
+        load(file)
+    except AirflockError as fault:
+        assert str(fault).startswith(str(file))
+
+
+def faults_of(settings, base="vasarhelyi_2018/4ms"):
+    with pytest.raises(ScenarioError) as caught:
+        load(base, settings)
+    return str(caught.value).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("model.p_rop", 0.1, "did you mean model.p_rep?"),
+        ("model.p_rep", "fast", "model.p_rep = 'fast' is not a number; give [0, 10] 1/s"),
+        ("model.v_flock", -3.0, "model.v_flock = -3 m/s lies outside ["),
+        ("radio.delay", {"value": 1.0, "unit": "ms"}, "radio.delay = 1.0 ms: the unit is s"),
+        ("world.arena", "sqare", "did you mean square?"),
+        ("agents", 2.5, "agents = 2.5 is not a whole number"),
+        ("agents", 100000, "do not fit at start.separation"),
+        ("world.obstacles", [[[0, 0], [10, 0], [5, 2], [5, 10]]], "world.obstacles[0] is not convex"),
+        ("world.obstacles", [[[0, 0], [10, 10], [10, 0], [0, 10]]], "world.obstacles[0] crosses itself"),
+        ("world.obstacles", [[[500, 0], [510, 0], [505, 8]]], "world.obstacles[0] reaches outside the arena"),
+        ("sensors.period", 0.001, "sensors.period = 0.001 s is shorter than dt = 0.01 s"),
+        ("wrld", {}, "wrld is no key; did you mean world?"),
+    ],
+)
+def test_a_fault_names_key_value_unit_and_range(key, value, said):
+    (line,) = faults_of({key: value})
+    assert line.startswith("vasarhelyi_2018/4ms: ") and said in line
+
+
+def test_all_faults_are_reported_together():
+    lines = faults_of({"model.p_rep": -1.0, "radio.range": "far", "world.sid": 3.0, "body.tau": -2.0, "dt": 0.0})
+    assert len(lines) == 5
+    for key in ("model.p_rep", "radio.range", "world.sid", "body.tau", "dt"):
+        assert sum(key in line for line in lines) == 1
+
+
+def test_a_polygon_arena_must_be_convex():
+    star = [[0, 50], [10, 10], [50, 0], [10, -10], [0, -50], [-10, -10], [-50, 0], [-10, 10]]
+    (line,) = faults_of({"world.arena": "polygon", "world.corners": star, "world.walls": "every_edge"})
+    assert "world.corners is not convex" in line
+
+
+def test_what_cannot_flock_flies_with_a_warning():
+    base = load("vasarhelyi_2018/4ms")
+    assert not base.notes
+    p = base.parameters
+    short = load(
+        "vasarhelyi_2018/4ms", {"model.r0_frict": 0.0, "model.r0_rep": 10.0 * p.r0_rep, "start.separation": 5.0}
+    )
+    assert short.notes
+    late = load("vasarhelyi_2018/4ms", {"radio.delay": 0.27, "sensors.period": 0.2})
+    assert any("radio.delay" in note for note in late.notes)
+
+
+@pytest.mark.parametrize("name", sorted(DOCUMENTS))
+def test_presets_are_sound_and_every_number_has_a_source(name):
+    found = load(name)
+    assert found.agents >= 1
+    for section, table in DOCUMENTS[name].items():
+        for key, value in table.items() if isinstance(table, dict) else [(section, table)]:
+            if isinstance(value, dict) and section != "published":
+                assert value.get("source"), f"{name}: {section}.{key} has no source"

@@ -1,0 +1,277 @@
+"""Studies: their folders, their bad input, their results, all with flights that cost nothing."""
+
+import json
+import sqlite3
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import airflock
+import toys
+from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.executors.here import Here
+from airflock.evolve.folder import open_folder
+from airflock.evolve.run import Interrupted, run
+from airflock.evolve.store import FILE, Batch, Store
+from airflock.evolve.study import differences, load_study, shipped
+from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
+
+
+def finished(folder, study=None, score=toys.bowl, **options):
+    study = study or toys.study()
+    open_folder(folder, study, resume=False)
+    return run(study, folder, Here(score, 2), **options)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studies") / "bowl"
+    return finished(folder, toys.study(population=16, generations=25, restarts=1))
+
+
+def test_best_is_near_the_optimum_and_its_score_is_of_fresh_seeds(done):
+    assert done.fitness == pytest.approx(1.0, abs=0.02) and done.low <= done.fitness <= done.high
+    assert done.parameters["model.p_rep"] == pytest.approx(0.2, abs=0.05)
+    with Store(done.folder, write=False) as store:
+        seeds = {stage: {s for (s,) in store.rows("SELECT seed FROM flight WHERE stage=?", (stage,))} for stage in
+                 ("search", "final", "score")}  # fmt: skip
+    assert len(seeds["search"]) == 16 * 25 * 2 and len(seeds["final"]) == len(seeds["score"]) == 4
+    assert not seeds["search"] & seeds["final"] and not seeds["score"] & (seeds["search"] | seeds["final"])
+    assert min(seeds["search"]) > 2**39
+
+
+def test_folder_holds_a_scenario_that_flies_tables_and_pictures(done):
+    best = airflock.load(done.folder / "best.toml")
+    assert best.parameters.p_rep == done.parameters["model.p_rep"] and best.published == {}
+    table = pd.read_csv(done.folder / "evaluations.csv")
+    assert len(table) == 16 * 25 * 2 + (2 + 3 + 1) * 4
+    assert pd.read_parquet(done.folder / "evaluations.parquet").shape == table.shape
+    assert {"model.p_rep", "seed", "fitness", "phi_vel", "reason", "duration", "versions"} <= set(table)
+    assert all((done.folder / f"{name}.png").is_file() for name in ("convergence", "scatter", "slices"))
+
+
+def test_working_ranges_span_the_candidates_that_reach_the_mean(done):
+    with Store(done.folder, write=False) as store:
+        rows = store.rows("SELECT parameters, fitness FROM candidate WHERE stage='search'")
+    good = [json.loads(p)["model.p_rep"] for p, f in rows if (json.loads(f)[0] or 0.0) >= done.fitness]
+    assert done.above == len(good) and done.ranges["model.p_rep"] == (min(good), max(good))
+    found = tomllib.loads((done.folder / "result.toml").read_text())
+    assert found["working_ranges"]["above_mean"] == len(good)
+
+
+def test_failed_candidates_are_recorded_with_their_reason_and_never_best(done):
+    table = pd.read_csv(done.folder / "evaluations.csv")
+    failed = table[table["model.p_rep"] < 0.03]
+    assert done.failed and (failed["reason"] == "nobody can fly so").all() and failed["fitness"].isna().all()
+    assert done.parameters["model.p_rep"] > 0.03
+
+
+def test_nobody_flies_is_one_line(tmp_path):
+    def never(parameters, seed):
+        raise ZeroDivisionError("no air")
+
+    with pytest.raises(StudyError, match="every candidate failed; the first one: no air"):
+        finished(tmp_path / "a", score=never)
+
+
+def test_pareto_studies_keep_a_front(tmp_path):
+    study = toys.study({"objective": {"maximise": ["fitness", "phi_vel"]}}, algorithm="nsga2", population=12)
+    result = finished(tmp_path / "a", study)
+    assert (tmp_path / "a" / "pareto.png").is_file() and 1 <= len(result.finalists) <= 3
+
+
+def test_genetic_algorithm_and_common_random_numbers(tmp_path):
+    study = toys.study(algorithm="ga", seeds=2, random_numbers="study")
+    finished(tmp_path / "a", study)
+    with Store(tmp_path / "a", write=False) as store:
+        assert store.rows("SELECT count(DISTINCT seed) FROM flight WHERE stage='search'") == [(2,)]
+
+
+def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
+    study = toys.study(population=16, generations=25, restarts=1)
+
+    def stop(progress):
+        if progress.fresh == 100:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match=r"1\d\d flights of the search are stored in .*continue with --resume"):
+        finished(tmp_path / "a", study, watch=stop)
+    open_folder(tmp_path / "a", study, resume=True)
+    fresh = []
+    again = run(study, tmp_path / "a", Here(toys.bowl, 2), lambda p: fresh.append(p.fresh))
+    assert max(fresh) <= 16 * 25 * 2 - 100
+    assert again.document() == done.document()
+
+
+def test_overlapping_writers_are_refused_and_readers_are_not(tmp_path):
+    with Store(tmp_path) as first:
+        first.begin({})
+        with pytest.raises(StudyError, match=r"another process \(process \d+ on .*\) is writing this study"):
+            Store(tmp_path)
+        Store(tmp_path, write=False).close()
+    Store(tmp_path).close()
+
+
+def test_flights_are_on_disk_as_soon_as_they_land_and_count_once(tmp_path):
+    from airflock.evolve.executors import Flight, Landed
+
+    batch = Batch("search", 0, 0)
+    with Store(tmp_path) as store:
+        store.ask(batch, [[0.5]], [{"model.p_rep": 0.1}])
+        store.land(batch, Landed(Flight(0, 0, {}, 7), {"fitness": 0.1 + 0.2, "lost": float("nan")}))
+        with sqlite3.connect(tmp_path / FILE) as other:
+            assert other.execute("SELECT seed FROM flight").fetchall() == [(7,)]
+        store.land(batch, Landed(Flight(0, 0, {}, 7), {"fitness": 9.0}))
+        found = store.flown(batch)[0, 0]
+        assert found["fitness"] == 0.1 + 0.2 and found["lost"] != found["lost"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"search": {"population": 20}}, "search.population = 8 there, 20 now"),
+        ({"scenario": {"dt": 0.02}}, "scenario.dt"),
+        ({"airflock": "9.9"}, "airflock = "),
+        ({"space": {"model": {"p_rep": {"low": 0.1}}}}, "space.model.p_rep.low = 0.01 there, 0.1 now"),
+    ],
+)
+def test_folders_of_other_studies_are_refused_with_what_differs(change, words):
+    def merged(old, new):
+        return {k: merged(old[k], v) if isinstance(v, dict) else v for k, v in new.items()} | {
+            k: v for k, v in old.items() if k not in new
+        }
+
+    document = toys.study().document()
+    found = differences(document, merged(document, change))
+    assert len(found) == 1 and words in found[0]
+
+
+def test_folders_are_never_written_over(tmp_path):
+    study = toys.study()
+    open_folder(tmp_path / "a", study, resume=False)
+    before = (tmp_path / "a" / "study.toml").read_bytes()
+    with pytest.raises(StudyError, match="already holds this study; continue it with --resume"):
+        open_folder(tmp_path / "a", study, resume=False)
+    with pytest.raises(StudyError, match="holds another study: search.seed = 0 there, 3 now; give another --out"):
+        open_folder(tmp_path / "a", toys.study(seed=3), resume=True)
+    assert (tmp_path / "a" / "study.toml").read_bytes() == before
+    with pytest.raises(StudyError, match="no study to resume"):
+        open_folder(tmp_path / "b", study, resume=True)
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "thesis.txt").write_text("years of work")
+    with pytest.raises(StudyError, match="is not empty"):
+        open_folder(tmp_path / "c", study, resume=False)
+
+
+def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
+    (tmp_path / FILE).write_text("years of work, and no database at all" * 100)
+    with pytest.raises(StudyError, match="file is not a database"):
+        Store(tmp_path)
+    assert "years of work" in (tmp_path / FILE).read_text()
+    other = tmp_path / "full"
+    other.mkdir()
+    with Store(other) as store:
+        store.connection.execute("PRAGMA max_page_count = 20")  # the smallest full disk
+        with pytest.raises(StudyError, match="database or disk is full; what was stored before is kept"):
+            store.ask(Batch("search", 0, 0), [[0.5] * 4000] * 50, [{}] * 50)
+        assert store.asked(Batch("search", 0, 0)) == []
+
+
+@pytest.mark.parametrize(
+    ("tables", "search", "words"),
+    [
+        ({"objective": {"maximize": "fitness"}}, {}, "objective.maximize is no key; did you mean objective.maximise?"),
+        ({"objective": {"over_seeds": "median"}}, {}, "'median' is none of mean, worst, quantile"),
+        ({"objective": {"quantile": 2.0}}, {}, "objective.quantile = 2.0 lies outside [0, 1]"),
+        ({"objective": {"own": "mine.py"}}, {}, "objective.own = 'mine.py': no such Python file"),
+        ({}, {"population": 1}, "search.population = 1 1 lies outside [2, 1e+06] 1"),
+        ({}, {"population": 10.5}, "search.population = 10.5 is not a whole number"),
+        ({}, {"algorithm": "cma"}, "search.algorithm = 'cma' is none of cmaes, ga"),
+        ({}, {"algorithm": "nsga2"}, "is for several objectives, but there is one"),
+        ({"objective": {"maximise": ["a", "b"]}}, {}, "takes one objective, but there are 2"),
+        ({"searhc": {}}, {}, "searhc is no key; did you mean search?"),
+    ],
+)
+def test_each_fault_of_a_study_is_one_line(tables, search, words):
+    with pytest.raises(ScenarioError) as fault:
+        toys.study(tables, **search)
+    assert words in str(fault.value) and len(fault.value.faults) == 1
+
+
+def test_unknown_order_parameters_name_the_known_ones(tmp_path):
+    with pytest.raises(
+        StudyError, match="objective beauty is no order parameter of this scenario; known: fitness, phi"
+    ):
+        finished(tmp_path / "a", toys.study({"objective": {"maximise": "beauty"}}))
+
+
+def test_own_fitness_is_read_from_beside_the_study(tmp_path):
+    (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel']\n")
+    (tmp_path / "study.toml").write_text(
+        'scenario = "vasarhelyi_2018/4ms"\n[objective]\nmaximise = "hurry"\nown = "mine.py"\n'
+        "[space.model]\np_rep = { low = 0.1, high = 0.2 }\n"
+    )
+    study = load_study(tmp_path / "study.toml")
+    before = study.document()
+    (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel'] + 0.0\n")
+    found = differences(before, load_study(tmp_path / "study.toml").document())
+    assert len(found) == 1 and found[0].startswith("objective")
+    assert study.objectives[0].of_candidate([{"phi_vel": 3.0}]) == 6.0 and study.space.keys == ("model.p_rep",)
+
+
+def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
+    law = Path(airflock.__file__).parent / "models" / "viragh_2014.py"
+    (tmp_path / "mine.py").write_text(law.read_text())
+    (tmp_path / "mine.toml").write_text('duration = 1.0\nagents = 3\n[model]\nkind = "mine.py"\n')
+    study = load_study(tmp_path / "mine.toml", search={"population": 4, "generations": 1, "top": 1, "final_seeds": 2})
+    finished(tmp_path / "a", study, lambda parameters, seed: {"fitness": sum(parameters.values())})
+    again = airflock.load(tmp_path / "a" / "best.toml")
+    assert again.model.name == "mine" and (tmp_path / "a" / "mine.py").is_file()
+
+
+def test_shipped_studies_hold_the_published_optima_and_table_s6():
+    names = [f"vasarhelyi_2018/{speed}ms" for speed in SPEEDS]
+    assert set(names) <= set(shipped())
+    for name, speed in zip(names, SPEEDS, strict=True):
+        study = load_study(name)
+        published = optimum(speed).parameters
+        assert len(study.space.axes) == 11 and study.scenario.parameters.v_flock == speed
+        for axis in study.space.axes:
+            assert axis.low <= getattr(published, axis.key[6:]) <= axis.high, (name, axis.key)
+        assert (study.whole("population"), study.whole("generations"), study.search.algorithm) == (100, 150, "cmaes")
+
+
+def test_command_tells_bad_input_in_lines_with_status_2(tmp_path):
+    def airflock_evolve(*arguments):
+        command = [sys.executable, "-m", "airflock", "evolve", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+    asked = airflock_evolve("vasarhelyi_2018/4m", "--out", tmp_path / "a")
+    assert asked.returncode == 2 and "did you mean vasarhelyi_2018/4ms?" in asked.stderr
+    asked = airflock_evolve("vasarhelyi_2018/4ms", "--out", tmp_path / "a", "--scheduler", "tcp://127.0.0.1:9")
+    assert asked.returncode == 2 and asked.stderr.count("\n") == 1
+    assert "--scheduler tcp://127.0.0.1:9: does not answer" in asked.stderr
+    assert not (tmp_path / "a" / FILE).exists()
+
+
+def test_kills_at_random_moments_change_nothing(tmp_path, seed, request):
+    kills = 200 if request.config.getoption("--papers") else 8
+    script = Path(__file__).parents[1] / "kills.py"
+    command = [sys.executable, script, tmp_path, "--kills", str(kills), "--seed", str(seed)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=1800)
+    assert ended.returncode == 0, ended.stderr
+    assert "all ends identical" in ended.stdout
+
+
+def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path):
+    """Real flights, from the call to a scenario that flies: faster is better, and the faster speed is found."""
+    space = {"model": {"v_flock": {"low": 1.0, "high": 5.0}}}
+    scenario = airflock.load("vasarhelyi_2018/4ms", {"duration": 3.0, "agents": 10})
+    search = {"population": 6, "generations": 4, "top": 2, "pool": 0, "final_seeds": 2}
+    result = airflock.evolve(scenario, tmp_path / "a", space=space, fitness=lambda score: score["phi_vel"], **search)
+    assert result.parameters["model.v_flock"] > 4.0
+    assert airflock.load(tmp_path / "a" / "best.toml").parameters.v_flock == result.parameters["model.v_flock"]

@@ -1,0 +1,42 @@
+"""Claims about Table S1 follow from the numbers behind them."""
+
+import numpy as np
+import pandas as pd
+
+from airflock.papers.vasarhelyi_2018 import table_s1
+from airflock.papers.vasarhelyi_2018.published import optimum
+
+
+def flights(fitness):
+    return pd.DataFrame({"fitness": fitness, "r_min_mean": np.full(len(fitness), 13.5)})
+
+
+def parameters(v):
+    p = optimum(v).parameters
+    return {f"model.{name}": getattr(p, name) for name in table_s1.COLUMNS}
+
+
+def test_pairs_decide_and_not_the_luck_of_seeds():
+    luck = np.random.default_rng(1).normal(0.0, 0.1, 400)
+    better = table_s1.against_published(6, flights(0.81 + luck), flights(0.80 + luck))
+    assert better.verdict == "reproduced" and abs(better.low - 0.01) < 1e-9
+    worse = table_s1.against_published(6, flights(0.78 + luck), flights(0.80 + luck))
+    assert worse.verdict == "not reproduced" and "-0.020" in worse.reason
+
+
+def test_printed_optima_show_both_surprises_and_lie_in_ranges_around_them():
+    for v in (4, 6, 8, 16, 32):
+        p = parameters(v)
+        distances = flights(np.full(10, 0.8)).assign(r_min_mean=optimum(v).published["r_min_mean"][0])
+        assert table_s1.soft_repulsion(v, p, distances).verdict == "reproduced"
+        assert table_s1.long_alignment(v, p).verdict == "reproduced"
+        around = {key: (0.9 * value, 1.1 * value) for key, value in p.items()}
+        assert table_s1.working_range(v, around).ours == 11.0
+        few = {key: span for key, span in around.items() if key < "model.p_s"}
+        assert table_s1.working_range(v, few).verdict == "not reproduced"
+
+
+def test_hard_cores_and_short_alignment_are_told_apart():
+    p = parameters(6) | {"model.r0_rep": 14.0, "model.r0_frict": 20.0}
+    assert table_s1.soft_repulsion(6, p, flights(np.full(10, 0.8))).verdict == "not reproduced"
+    assert table_s1.long_alignment(6, p).verdict == "not reproduced"
