@@ -154,6 +154,7 @@ def test_boids_stay_out_of_city_forest_and_mesh(tmp_path):
         assert all(row["n_avoid"] >= 5.0 and row["goals_reached"] >= 2.0 for row in rows)
 
 
+@pytest.mark.papers  # a plan of its own takes 20 s to compile; tests/agreement flies it in plain Python too
 def test_buildings_that_appear_meet_nobody():
     rows = flights("city", 2, duration=20, scene__later=0.6, scene__later_until=15.0)
     assert mean(rows, "n_env_coll") == 0.0 and mean(rows, "n_avoid") >= 5.0

@@ -225,7 +225,7 @@ class _Leg:
             goals=replace(self.scenario.goals, points=aims),
             scene=replace(self.scenario.scene, boxes=boxes),
         )
-        flown = fly(part, self.seed, precision=64, record=True, start=flock.state)
+        flown = fly(part, self.seed, precision=64, record=True, start=flock.state, device="cpu")
         assert flown.frames is not None
         self.collisions += int(flown.values["n_coll"])
         self.hulls += int(flown.values["n_env_coll"])

@@ -65,6 +65,8 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
     """Why a GPU cannot fly a plan with this many agents; None if it can."""
     if getattr(plan.model, "flock", None) is not None:
         return f"{plan.model.name} solves for the whole flock at once, which only cpu does"
+    if plan.own:
+        return "goals.kind = 'own' is flown by the cpu only"
     if agents <= MOST_TOGETHER:
         return None
     from airflock.engine.cuda.crowd import refused

@@ -75,6 +75,7 @@ class Plan:
     wing_choices: tuple[tuple[str, str], ...] = ()
     herd: bool = False
     own: bool = False
+    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2

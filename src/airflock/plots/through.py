@@ -77,32 +77,51 @@ def ground_plans(axes: Any, rows: NDArray[np.float64]) -> None:
         solid.set_array(height)
         axes.add_collection(solid)
     walls, faces = rows[rows[:, 6] == SEGMENT], rows[rows[:, 6] == TRIANGLE]
-    lines = [*walls[:, 7:11].reshape(-1, 2, 2), *faces[:, [7, 8, 10, 11, 13, 14, 7, 8]].reshape(-1, 4, 2)]
+    lines = [outline_from_above(row) for row in (*walls, *faces)]
     if lines:
         axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.8, zorder=1))
 
 
 def _solid(axes: Any, rows: NDArray[np.float64]) -> None:
-    """Edges of boxes and triangles, rims and four uprights of cylinders."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    lines: list[Any] = []
-    turn = np.linspace(0.0, 2.0 * np.pi, 13)
+    lines = outlines_in_space(rows)
+    if lines:
+        axes.add_collection(Line3DCollection(lines, colors=style.GREY, linewidths=0.35, alpha=0.6))
+
+
+def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Edges of boxes and triangles, rims and four uprights of cylinders: lines (point, 3), m."""
+    lines: list[NDArray[np.float64]] = []
     for r in rows[:MOST]:
         if r[6] == TRIANGLE:
             lines.append(r[[7, 8, 9, 10, 11, 12, 13, 14, 15, 7, 8, 9]].reshape(4, 3))
             continue
-        low, high = max(r[2], -100.0), min(r[5], 100.0)
-        if r[6] == CYLINDER:
-            ring = np.column_stack([r[7] + r[9] * np.cos(turn), r[8] + r[9] * np.sin(turn)])
-        elif r[6] == SEGMENT:
-            ring = r[7:11].reshape(2, 2)
-        else:
-            ring = np.array([[r[0], r[1]], [r[3], r[1]], [r[3], r[4]], [r[0], r[4]], [r[0], r[1]]])
+        low, high, ring = max(r[2], -100.0), min(r[5], 100.0), outline_from_above(r)
         lines += [np.column_stack([ring, np.full(len(ring), z)]) for z in (low, high)]
         lines += [np.array([[*p, low], [*p, high]]) for p in ring[:: 3 if r[6] == CYLINDER else 1]]
-    if lines:
-        axes.add_collection(Line3DCollection(lines, colors=style.GREY, linewidths=0.35, alpha=0.6))
+    return lines
+
+
+def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ground plan of a shape as a line (point, 2), m."""
+    if row[6] == CYLINDER:
+        turn = np.linspace(0.0, 2.0 * np.pi, 13)
+        return np.column_stack([row[7] + row[9] * np.cos(turn), row[8] + row[9] * np.sin(turn)])
+    if row[6] == SEGMENT:
+        return np.asarray(row[7:11].reshape(2, 2))
+    if row[6] == TRIANGLE:
+        return np.asarray(row[[7, 8, 10, 11, 13, 14, 7, 8]].reshape(4, 2))
+    return np.array([[row[0], row[1]], [row[3], row[1]], [row[3], row[4]], [row[0], row[4]], [row[0], row[1]]])
+
+
+def scenery(recording: xr.Dataset, shown: Paths) -> list[NDArray[np.float64]]:
+    """Outlines of what stands around the paths, as lines (point, axis) in m; none for a flight log."""
+    scenario = flown_with(recording)
+    if scenario is None or scenario.scene.kind == "none":
+        return []
+    rows = nearby(scenario, shown)
+    return outlines_in_space(rows) if shown.position.shape[1] == 3 else [outline_from_above(r) for r in rows]
 
 
 def _paths(axes: Any, shown: Paths, scale: Normalize, space: bool) -> None:

@@ -32,6 +32,7 @@ from airflock.plots.scene import (
     window,
     world_of,
 )  # fmt: skip
+from airflock.plots.through import scenery
 
 Array = NDArray[Any]
 ENDINGS = (".mp4", ".gif")
@@ -142,6 +143,8 @@ class Stage:
                 axes.fill(x, y, facecolor=color, alpha=0.25, edgecolor=color, linewidth=1.2)
             else:
                 axes.plot(x, y, color=color, linewidth=1.4)
+        around = [np.column_stack(self.view(line)) for line in scenery(recording, first)]
+        axes.add_collection(LineCollection(around, colors=style.GREY, linewidths=0.6, alpha=0.6), autolim=False)
         words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
         large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
         small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}

@@ -9,7 +9,7 @@ from airflock.papers.kidger.tuning import DURATION, PLACES, RADII, SCALES
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
 
-CURVES = ("flocked", "polarisation", "n_clusters", "r_min_mean", "n_coll")
+CURVES = ("flocked", "polarisation", "n_clusters", "r_min_mean", "n_coll", "n_env_coll")
 FLIGHT = {"duration": 30.0}
 
 
@@ -31,7 +31,7 @@ def draw(folder: Path, tuning: pd.DataFrame) -> None:
 
 
 def curves(path: Path, tuning: pd.DataFrame, place: str) -> None:
-    """Five order parameters over every radius and scale, with 95 % intervals."""
+    """Six order parameters over every radius and scale, with 95 % intervals."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -40,7 +40,7 @@ def curves(path: Path, tuning: pd.DataFrame, place: str) -> None:
     from airflock.papers import statistics
 
     names = (*RADII, *SCALES)
-    figure, grid = pyplot.subplots(len(CURVES), len(names), figsize=(22, 10), layout="constrained", sharey="row")
+    figure, grid = pyplot.subplots(len(CURVES), len(names), figsize=(22, 12), layout="constrained", sharey="row")
     for column, name in enumerate(names):
         values = sorted(set(tuning.loc[(place, name)].index.get_level_values(0)))
         for row, measure in enumerate(CURVES):
@@ -51,6 +51,8 @@ def curves(path: Path, tuning: pd.DataFrame, place: str) -> None:
             axes.errorbar(range(len(values)), middle, ends, marker="o", markersize=3, linewidth=1.0, capsize=2)
             axes.set_xticks(range(len(values)), [f"{v:g}" for v in values], fontsize=7)
             axes.grid(alpha=0.3)
+            if measure == "r_min_mean":
+                axes.set_yscale("log")
             if column == 0:
                 axes.set_ylabel(measure)
             if row == len(CURVES) - 1:

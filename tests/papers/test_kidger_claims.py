@@ -1,0 +1,82 @@
+"""Kidger's thesis: the committed claims, and (--papers) what must hold flown again in full."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.engine.simulate import score_flights
+from airflock.errors import AirflockError
+from airflock.papers import kidger as paper
+from airflock.papers.claims import read_claims
+
+FOLDER = Path(__file__).parents[2] / "papers" / "kidger"
+SEEDS = range(20)
+
+
+@pytest.fixture(scope="module")
+def committed():
+    header, claims = read_claims(FOLDER / "claims.toml")
+    return header, {claim.id: claim for claim in claims}
+
+
+def test_committed_claims_hold_what_must_hold(committed):
+    header, claims = committed
+    assert header["command"] == "airflock paper kidger"
+    for scene in ("city", "forest"):
+        assert claims[f"schemes.{scene}.5"].ours == 0.0 and claims[f"schemes.{scene}.5"].runs == 20
+        assert claims[f"schemes.{scene}.2"].low > 0.0
+        assert claims[f"schemes.{scene}.goals"].ours >= 0.9
+    for name in ("corners.swept", "corners.fast", "display.placed", "display.collisions", "cost.real_time"):
+        assert claims[name].verdict == "reproduced", name
+    for column in ("flocked", "n_coll", "goals_reached"):
+        assert claims[f"presets.poor.{column}"].verdict == "reproduced"
+
+
+def test_every_committed_claim_about_a_statement_has_at_least_20_seeds(committed):
+    for claim in committed[1].values():
+        assert claim.runs >= 20 or claim.verdict == "finding" or claim.id.startswith("cost."), claim.id
+
+
+def test_the_report_shows_every_claim_and_figure(committed):
+    text = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert all(f"| {name} |" in text for name in committed[1])
+    for name in ("city", "forest", "space", "rays", "flocked", "tuning_open_air", "tuning_city"):
+        assert (FOLDER / "figures" / f"{name}.png").is_file() and f"figures/{name}.png" in text
+
+
+def test_an_unknown_part_is_refused_with_the_known_ones():
+    with pytest.raises(AirflockError, match=r"only = 'scheme' is no part; known: schemes, corners"):
+        paper.run(only="scheme", progress=lambda *_: None)
+
+
+def columns(name, **keys):
+    found = airflock.load(name, {key.replace("__", "."): value for key, value in keys.items()})
+    rows = score_flights([found] * len(SEEDS), list(SEEDS))
+    return {key: np.array([row[key] for row in rows]) for key in ("n_env_coll", "n_avoid", "goals_reached", "goals")}
+
+
+@pytest.mark.papers
+@pytest.mark.parametrize("scene", ["city", "forest"])
+def test_scheme_5_stays_out_of_obstacles_where_scheme_2_does_not(scene):
+    capped = columns(f"kidger/{scene}")
+    assert capped["n_env_coll"].sum() == 0.0
+    assert capped["goals_reached"].sum() >= 0.9 * capped["goals"].sum()
+    assert capped["n_avoid"].min() >= 5.0
+    assert columns(f"kidger/{scene}", model__scheme="2")["n_env_coll"].min() > 0.0
+
+
+@pytest.mark.papers
+@pytest.mark.parametrize("part", ["corners", "presets", "shepherd", "cost", "display"])
+def test_parts_hold_when_flown_again(part):
+    for claim in paper.run(only=part, progress=lambda *_: None):
+        assert claim.verdict != "not reproduced", claim
+
+
+@pytest.mark.papers
+def test_a_flock_of_vasarhelyi_stays_out_of_the_city():
+    found = airflock.load("vasarhelyi_2018/city")
+    rows = score_flights([found] * 5, list(range(5)))
+    assert sum(row["n_env_coll"] for row in rows) == 0.0
+    assert np.mean([row["phi_vel"] for row in rows]) > 1.5
