@@ -29,7 +29,7 @@ def flight(plan: Plan, shape: Shape) -> str:
     move.move(build)
     if plan.goals:
         scene.aim(build)
-    if plan.scene:
+    if plan.appearing:
         scene.appear(build)
     for clock in clocks(plan):
         measure.measure(build, clock)
@@ -160,8 +160,8 @@ def _world(build: CudaBuilder) -> list[str]:
     """The goal goes on its way, and what is due appears; both may look at every agent."""
     plan = build.plan
     lines = [build.stages["aim_"].call(elapsed="row_c.dt")] if plan.goals else []
-    lines += [build.stages["appear_"].call()] if plan.scene else []
-    if plan.herd or plan.scene:
+    lines += [build.stages["appear_"].call()] if plan.appearing else []
+    if plan.herd or plan.appearing:
         return ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", *lines, "cuda.syncthreads()"]
     return lines
 

@@ -157,8 +157,8 @@ def arrays(
         "all_edges": _padded([t.edges for t in jobs]),
         "all_spans": _padded([t.spans for t in jobs]),
         "all_goals": _padded([t.goals for t in jobs]),
-        # a scene of its own for each flock where something stands: some of it may appear while flying
-        "all_shapes": _padded([t.shapes for t in (jobs if plan.scene else jobs[:1])]),
+        # one scene for all flocks, or one of its own for each where some of it appears while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
         "all_later": _padded([t.later for t in jobs]),
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
