@@ -18,6 +18,10 @@ class Kind(StrEnum):
     SERIES = "series"
     RULES = "rules"
     TRANSFER = "transfer"
+    SCENE = "scene"
+    SPACE = "space"
+    RAYS = "rays"
+    FLOCKED = "flocked"
 
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending decides the format.")]
@@ -39,6 +43,8 @@ def plot(
 ) -> None:
     """Draw trajectories coloured by speed, a long-exposure picture, order parameters over time, or a model's rules.
 
+    In a city, forest or mesh: paths through the scene from above or in space, rays of one agent, share flocked.
+
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
     options.writable(out)
@@ -58,6 +64,18 @@ def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | 
 
         return rules(_scenario(what, changed))
     recording = _recording(what, seed, changed)
+    if kind in (Kind.SCENE, Kind.SPACE):
+        from airflock.plots.through import through
+
+        return through(recording, start=begin, stop=end, space=kind is Kind.SPACE)
+    if kind is Kind.RAYS:
+        from airflock.plots.rays import rays
+
+        return rays(recording, start=begin)
+    if kind is Kind.FLOCKED:
+        from airflock.plots.flocked import flocked
+
+        return flocked(recording, start=begin, stop=end)
     if kind is Kind.SERIES:
         from airflock.plots.series import series
 

@@ -1,15 +1,19 @@
 """A show: drones fly from shape to shape; a master assigns points, again when drones fail or are pushed away."""
 
+import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.display.assignment import assign, better
 from airflock.engine.simulate import fly
 from airflock.errors import AirflockError
+from airflock.recordings.flights import plain
+from airflock.recordings.layout import dataset
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -60,11 +64,29 @@ class Formed:
 
 @dataclass
 class Show:
-    """What was flown: each shape's figures, frames (time, 6, drone; nan once failed) and the time between them, s."""
+    """What was flown: each shape's figures; frames (time, 6, drone; nan once failed), the time between them, s, and the
+    last frame of each shape; the scenario and the seed.
+    """
 
     formed: list[Formed]
     frames: Frames
     period: float
+    ends: list[int]
+    scenario: Scenario
+    seed: int
+
+
+def recording_of(show: Show) -> xr.Dataset:
+    """A show as a recording; drones that failed are missing from then on."""
+    dims = show.frames.shape[1] // 2
+    frames = np.concatenate([show.frames, np.full_like(show.frames[:, :dims], np.nan)], axis=1)
+    about = {
+        "airflock_scenario": json.dumps(plain(show.scenario.document)),
+        "airflock_name": "display",
+        "airflock_seed": show.seed,
+        "random_start": 0,
+    }
+    return dataset(frames, dims, show.period, about, show.scenario.model.command)
 
 
 def scenario_of(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
@@ -111,12 +133,15 @@ def fly_show(
     doomed = rng.permutation(drones)[: round(failing * drones)]
     legs = np.array_split(doomed, len(shapes))
     kinds = {int(who): FAILURES[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
-    formed, frames = [], []
+    formed: list[Formed] = []
+    frames: list[Frames] = []
+    ends: list[int] = []
     for number, points in enumerate(shapes):
         leg = _Leg(scenario, flock, points, drones, seed * 1000 + number * 100)
         formed.append(leg.fly([(int(who), kinds[int(who)], float(rng.uniform())) for who in legs[number]]))
         frames += leg.frames
-    return Show(formed, np.concatenate(frames), scenario.metrics.period)
+        ends.append(sum(map(len, frames)) - 1)
+    return Show(formed, np.concatenate(frames), scenario.metrics.period, ends, scenario, seed)
 
 
 class _Leg:

@@ -16,6 +16,8 @@ from airflock.errors import FlightError, ScenarioError
 from airflock.metrics import fitness_dimock
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
+from airflock.scenarios.geometry import half_sizes
+from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
 
 
@@ -29,7 +31,7 @@ def plan_of(
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid : neighbours by cells or all pairs; by default what is faster
+    grid : neighbours by cells or all pairs; by default what is faster, and all pairs in a box too small for cells
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -40,7 +42,7 @@ def plan_of(
         scenario.parameters,
         SETS[scenario.metrics.kind] if metrics is None else metrics,
         scenario.world,
-        grid=_pays(scenario) if grid is None else grid,
+        grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
@@ -48,7 +50,6 @@ def plan_of(
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
-        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,
@@ -97,6 +98,9 @@ def fly(
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
+        inside = start_inside(scenario, start) if plan.scene else ""
+        if inside:
+            raise FlightError(f"{scenario.name}: {inside}")
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
@@ -249,4 +253,13 @@ def _pays(scenario: Scenario) -> bool:
         and perfect
         and scenario.radio.kind == "constant"
         and scenario.flight.update == "synchronous"
+        and _has_room(scenario)
     )
+
+
+def _has_room(scenario: Scenario) -> bool:
+    """Whether a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
+    if scenario.world.edges != "periodic" or scenario.model.reach is None:
+        return True
+    halves = half_sizes(scenario.world)[: scenario.dimensions]
+    return min(halves) >= float(scenario.model.reach(scenario.parameters))

@@ -28,6 +28,10 @@ def series(
     start, stop : window of time, s; by default the whole flight
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     """
+    if scenario_of(recording, settings).metrics.kind == "kidger":
+        from airflock.plots.flocked import flocked
+
+        return flocked(recording, start=start, stop=stop, settings=settings)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0
     course = _window(over_time(recording, settings), start, stop)
     figure = style.Picture(7.0, 4.2)

@@ -11,7 +11,7 @@ from typing import Any
 
 from airflock.core.contract import Model, model
 from airflock.errors import AirflockError, RuleError, ScenarioError
-from airflock.scenarios import checks, geometry, schema, wings
+from airflock.scenarios import checks, geometry, places, schema, wings
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
@@ -77,8 +77,19 @@ def make(
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     published = _published(merged.get("published", {}))
+    parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(name=where, model=found, published=published, document=merged, **parts)
-    return replace(scenario, notes=tuple(_notes(scenario)))
+    faults = places.place_faults(scenario)
+    if faults:
+        raise ScenarioError([f"{where}: {fault}" for fault in faults])
+    return replace(scenario, notes=(*_notes(scenario), *places.place_notes(scenario)))
+
+
+def _beside(scene: Any, folder: Path | None) -> Any:
+    """A scene whose mesh file is looked for beside the scenario file, if it is not where the name says."""
+    if scene.kind != "mesh" or folder is None or Path(scene.file).is_file() or not (folder / scene.file).is_file():
+        return scene
+    return replace(scene, file=str(folder / scene.file))
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:

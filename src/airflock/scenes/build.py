@@ -18,6 +18,7 @@ __all__ = ["Scene", "clearance", "scene_of", "waypoints"]
 Polygons = tuple[tuple[tuple[float, ...], ...], ...]
 MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
 DEPTH = 1000.0  # m; thickness of the ground: nothing starts below it
+MANY = 50_000  # shapes; of more no lists are made, which would take longer than they save
 ATTEMPTS = 100_000  # draws of a free point
 
 
@@ -59,7 +60,8 @@ def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
 def clearance(found: Scene, position: Any) -> float:
     """Distance (m) from a position to what stands in a scene; negative inside a solid, 1e30 if nothing stands there."""
     x, y, z = (float(c) for c in position)
-    return float(bvh.nearest(x, y, z, 1e6, *found.lists).distance)
+    rows = found.lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
+    return float(bvh.nearest(x, y, z, 1e6, *rows).distance)
 
 
 @lru_cache(maxsize=32)

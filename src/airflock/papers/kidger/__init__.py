@@ -1,7 +1,7 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: shown there by videos, here by numbers.
 
 Parts: schemes (five ways to recombine, in a city and a forest), corners (thin walls), tuning (every radius and scale),
-presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame).
+presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), display (the wish).
 """
 
 from typing import Any
@@ -9,12 +9,13 @@ from typing import Any
 from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
 from airflock.papers.flights import Flights, Progress, progress_bar
-from airflock.papers.kidger import corners, cost, presets, schemes, shepherd, tuning
+from airflock.papers.kidger import corners, cost, display, presets, schemes, shepherd, tuning
 
 TITLE = "Kidger, An Investigation into Drone Swarms & Swarm Intelligence"
-PARTS = ("schemes", "corners", "tuning", "presets", "shepherd", "cost")
+PARTS = ("schemes", "corners", "tuning", "presets", "shepherd", "cost", "display")
 MODULES: dict[str, Any] = {
     "schemes": schemes, "corners": corners, "tuning": tuning, "presets": presets, "shepherd": shepherd, "cost": cost,
+    "display": display,
 }  # fmt: skip
 
 

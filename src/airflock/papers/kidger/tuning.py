@@ -46,7 +46,9 @@ STATEMENTS = (
     ("r_cohes", 10.0, 40.0, "n_clusters", 1, "a smaller cohesion radius splits it more"),
     ("r_cohes", 10.0, 40.0, "time_to_flock", 1, "a smaller cohesion radius flocks it later"),
     ("s_sep", 0.0625, 0.25, "n_coll", 1, "a low separation scale collides more"),
+    ("s_sep", 0.0625, 0.25, "phi_coll", 1, "a low separation scale is longer in contact"),
     ("s_goal", 4.0, 0.25, "n_coll", 1, "a very high goal scale collides more"),
+    ("s_goal", 4.0, 0.25, "phi_coll", 1, "a very high goal scale is longer in contact"),
     ("s_goal", 4.0, 0.25, "flocked", -1, "a very high goal scale flocks less"),
 )
 
@@ -63,7 +65,7 @@ def fly(flights: Flights) -> pd.DataFrame:
     judged_by = {(name, value) for name, a, b, *_ in STATEMENTS for value in (a, b)}
     many, few = flights.count(SEEDS, 4), flights.count(CURVE, 4)
     seeds = {key: many if key[1:] in judged_by else few for key in scenarios}
-    return flights.score("Tuning curves", scenarios, seeds)
+    return flights.score("Tuning curves", scenarios, seeds).sort_index()
 
 
 def claims(table: pd.DataFrame) -> list[Claim]:
@@ -78,6 +80,9 @@ def _claim(
     gap = statistics.difference(a, b)
     more = gap.low > 0.0 if sign > 0 else gap.high < 0.0
     means = f"{column} {a.mean():.3g} at {name} = {value:g}, {b.mean():.3g} at {other:g}"
+    if column == "n_coll":  # it counts how often two meet, not how long they stay
+        stay = [_values(table, place, name, v, "phi_coll").mean() for v in (value, other)]
+        means += f"; share of pairs in contact {stay[0]:.2g} against {stay[1]:.2g}"
     return Claim(
         id=f"tuning.{name}.{column}.{place.replace(' ', '_')}",
         statement=f"{words} ({place}): difference of {column}",

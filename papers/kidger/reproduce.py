@@ -1,0 +1,9 @@
+"""Recompute Kidger and rewrite claims.toml, README.md and figures in this folder."""
+
+from pathlib import Path
+
+from airflock.papers.claims import print_claims
+from airflock.papers.kidger.report import reproduce
+
+if __name__ == "__main__":
+    print_claims(reproduce(Path(__file__).parent))

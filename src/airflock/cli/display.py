@@ -1,0 +1,79 @@
+"""Verb display: a show of many drones, from shape to shape."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.errors import AirflockError
+
+
+def display(
+    shapes: Annotated[
+        list[str],
+        typer.Argument(metavar="SHAPE...", help="Images, meshes (stl, obj, glb) or texts, one after another."),
+    ],
+    drones: Annotated[int, typer.Option(min=2, max=2000, help="Number of drones.")] = 200,
+    failing: Annotated[float, typer.Option(help="Share of the drones that fail on the way, 0 to 0.9.")] = 0.0,
+    failure: Annotated[
+        str, typer.Option(help="What a drone that fails does: fall, hover or both (in turns).")
+    ] = "both",
+    points: Annotated[int | None, typer.Option(min=2, help="Points of a shape.", show_default="one per drone")] = None,
+    spacing: Annotated[float, typer.Option(min=2.5, max=100.0, help="Least distance of two points, m.")] = 3.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of failures and noise.")] = 0,
+    changes: options.Set = None,
+    as_json: options.Json = False,
+    save: options.SaveFile = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw every shape as it stood.")] = None,
+) -> None:
+    """Fly a drone display: points assigned to drones, again when some fail; print how well each shape stood.
+
+    Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
+    """
+    from airflock.display import fly_show, points_of
+
+    options.writable(save, plot)
+    if not 0.0 <= failing <= 0.9:
+        raise AirflockError(f"--failing = {failing:g} lies outside [0, 0.9]")
+    count = drones if points is None else points
+    if drones > count:
+        raise AirflockError(
+            f"--drones = {drones} are more than --points = {count}; give each drone a point, or fly fewer"
+        )
+    found = [points_of(shape, count, spacing, seed=number) for number, shape in enumerate(shapes)]
+    show = fly_show(found, drones, failing, failure, seed, options.settings(changes))
+    rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
+    if save is not None:
+        from airflock.display.show import recording_of
+        from airflock.recordings.files import save as save_recording
+
+        tables.say(f"saved {save_recording(recording_of(show), save)}")
+    if plot is not None:
+        from airflock.plots.display import stood
+        from airflock.plots.save import save_figure
+
+        save_figure(stood(show, shapes), plot)
+        tables.say(f"saved {plot}")
+    if as_json:
+        tables.emit_json({"drones": drones, "failing": failing, "failure": failure, "seed": seed, "shapes": rows})
+        return
+    _print(rows)
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    names = {
+        "shape": "shape", "time": "formed after (s)", "error": "error (m)", "worst": "worst (m)",
+        "drones": "drones", "collisions": "collisions", "hulls": "with hovering", "struck": "struck",
+        "reassigned": "reassigned",
+    }  # fmt: skip
+    for title in names.values():
+        table.add_column(title, justify="left" if title == "shape" else "right")
+    for row in rows:
+        table.add_row(*(row[key] if key == "shape" else tables.number(float(row[key])) for key in names))
+    Console().print(table)

@@ -1,0 +1,49 @@
+"""Share flocked over time, with sub-swarms, order and avoidance (Kidger, section 5.1)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from airflock.errors import RecordingError
+from airflock.plots import style
+from airflock.plots.scene import details_of, name_of, window
+from airflock.recordings.scores import measure
+
+
+def flocked(
+    recording: xr.Dataset,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Figure:
+    """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
+
+    start, stop : window of time, s; settings : keys that replace those the recording was flown with
+    """
+    values, course = measure(recording, settings)
+    if "flocked" not in course:
+        raise RecordingError("recording: the share flocked is measured by metrics.kind = 'kidger'; --set it")
+    begin, end = window(course.index.to_numpy(), start, stop)
+    course = course.loc[begin - 1e-9 : end + 1e-9]
+    figure = style.Picture(7.0, 4.2)
+    figure.set_layout_engine("constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    handles = upper.plot(course.index, course["flocked"], color=style.BLUE, linewidth=1.1, label="flocked")
+    handles += upper.plot(course.index, course["polarisation"], color=style.GREEN, linewidth=0.7, label="polarisation")
+    for time in values.get("time_to_goal", []):
+        if begin <= time <= end:
+            upper.axvline(time, color=style.ORANGE, linewidth=0.7, zorder=0)
+    upper.set_ylim(0.0, 1.05)
+    style.dress(upper, y="share (1)")
+    style.legend(upper, handles, columns=2, above=True)
+    lower.plot(course.index, course["n_clusters"], color=style.PURPLE, linewidth=0.9, label="sub-swarms")
+    lower.plot(course.index, course["n_coll"].cumsum(), color=style.RED, linewidth=0.9, label="collisions so far")
+    lower.set_yscale("symlog", linthresh=10.0)
+    lower.set_ylim(bottom=0.0)
+    style.dress(lower, "time (s)", "number")
+    style.legend(lower, lower.get_lines(), columns=2)
+    style.overall(figure, name_of(recording), details_of(recording))
+    return figure

@@ -1,0 +1,123 @@
+"""Checks of a scenario against what stands in its scene: the scene itself, goals inside it, starts inside it."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import SceneError
+from airflock.scenarios.scenario import Scenario
+from airflock.scenes.build import Scene, clearance, scene_of
+from airflock.world import scenery, start
+from airflock.world.shapes import TRIANGLE
+
+CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
+DRAWN = 64  # positions at which a start region is looked at
+MOST = 2000  # the same where none is free
+DIRECTIONS = ((0.31, 0.17, 0.935), (-0.23, 0.41, 0.882), (0.12, -0.37, 0.921))
+
+
+def place_faults(scenario: Scenario) -> list[str]:
+    """What is wrong with a scene, with goals and with the region of starts, one line each."""
+    given = scenario.goals
+    if given.kind == "own" and len(given.points) != scenario.agents:
+        return [
+            f"goals.kind = 'own': {len(given.points)} goals.points are not one for each of {scenario.agents} agents"
+        ]
+    if given.kind == "points" and not given.points:
+        return ["goals.kind = 'points' needs goals.points, [[east, north, up], ...] in m"]
+    try:
+        place = scenario.stands()
+        points = scenario.waypoints()
+    except SceneError as fault:
+        return str(fault).splitlines()
+    found = []
+    for number, point in enumerate(points):
+        depth = _depth(place, point)
+        if depth > 0.0:
+            where = ", ".join(f"{c:g}" for c in point[: scenario.dimensions])
+            found.append(
+                f"goals.points[{number}] = [{where}] m lies {depth:.3g} m inside what stands in the scene; move it out"
+            )
+    if _blocked(scenario) == 1.0:
+        found.append(
+            "start: the whole region in which agents start lies inside what stands in the scene, or nearer to it than "
+            f"start.clearance = {scenario.start.clearance:g} m; enlarge the region or lower scene.density"
+        )
+    return found
+
+
+def place_notes(scenario: Scenario) -> list[str]:
+    """What was adjusted, for a person to read."""
+    notes = list(scenario.stands().notes)
+    share = _blocked(scenario)
+    if share > CROWDED:
+        notes.append(
+            f"start: {share:.0%} of the region lies inside what stands in the scene or nearer than start.clearance = "
+            f"{scenario.start.clearance:g} m; agents start in the rest"
+        )
+    if scenario.goals.role == "herd" and not getattr(scenario.parameters, "s_goal", -1.0) < 0.0:
+        notes.append("goals.role = 'herd': a flock with model.s_goal >= 0 follows the shepherd instead of fleeing it")
+    return notes
+
+
+def start_inside(scenario: Scenario, given: NDArray[Any]) -> str:
+    """Which agent of a given start (component, agent) lies inside the scene, as a sentence; empty if none does."""
+    place, dims = scenario.stands(), scenario.dimensions
+    for agent, column in enumerate(np.asarray(given, float)[:dims].T if len(place.shapes) else ()):
+        depth = _depth(place, np.append(column, [0.0] * (3 - dims)))
+        if depth > 0.0:
+            return f"start: agent {agent} lies {depth:.3g} m inside what stands in the scene"
+    return ""
+
+
+def _depth(place: Scene, point: NDArray[np.float64]) -> float:
+    """How deep a position lies inside a solid or a closed mesh, m; 0 outside."""
+    if not len(place.shapes):
+        return 0.0
+    gap = clearance(place, point)
+    if gap <= 0.0:
+        return max(-gap, 1e-9)
+    return gap if in_mesh(place, point) else 0.0
+
+
+def in_mesh(place: Scene, point: NDArray[np.float64]) -> bool:
+    """Whether a position lies inside a closed mesh: straight lines from it cross an odd number of triangles."""
+    rows = place.shapes[place.shapes[:, 6] == TRIANGLE]
+    if not len(rows):
+        return False
+    a, b, c = (rows[:, 7 + 3 * k : 10 + 3 * k] for k in range(3))
+    odd = 0
+    for direction in DIRECTIONS:
+        across = np.cross(direction, c - a)
+        size = (across * (b - a)).sum(axis=1)
+        size = np.where(np.abs(size) < 1e-30, 1e-30, size)
+        off = point - a
+        s, w = (off * across).sum(axis=1) / size, np.cross(off, b - a)
+        r, t = w @ np.array(direction) / size, (w * (c - a)).sum(axis=1) / size
+        odd += int(((s >= 0.0) & (r >= 0.0) & (s + r <= 1.0) & (t > 0.0)).sum()) % 2
+    return odd >= 2
+
+
+def _blocked(scenario: Scenario) -> float:
+    """Share of the region of starts in which nobody can start."""
+    if scenario.scene.kind == "none" or scenario.start.kind == "arena":
+        return 0.0
+    return _share(scenario.scene, scenario.start, scenario.dimensions)
+
+
+@lru_cache(maxsize=64)
+def _share(scene: scenery.Parameters, begin: start.Parameters, dims: int) -> float:
+    place = scene_of(scene, dims)
+    if not len(place.shapes):
+        return 0.0
+    reach, rng, shut = begin.radius if begin.kind == "ball" else 0.5 * begin.side, np.random.default_rng(0), 0
+    for number in range(1, MOST + 1):
+        spot = rng.uniform(-1.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
+        if begin.kind == "ball":
+            spot *= min(1.0, 1.0 / max(float(np.linalg.norm(spot)), 1e-9))
+        shut += clearance(place, reach * spot) < begin.clearance
+        if number >= DRAWN and shut < number:  # only a region that looks shut is looked at for longer
+            break
+    return shut / number

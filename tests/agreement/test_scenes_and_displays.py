@@ -1,0 +1,72 @@
+"""Flights in scenes are the same as plain Python and compiled: casts, nearest points, goals; and displays."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+from airflock.display import fly_show, points_of
+from airflock.display.assignment import assign
+from airflock.display.show import ranks, recording_of, scenario_of
+from airflock.engine.plain import fly_plainly
+from airflock.recordings.layout import check
+from airflock.scenarios.files import load
+from flocks import flown
+
+CITY = {
+    "agents": 3, "duration": 1.2, "model.rays": 60, "model.r_ray": 12.0, "start.side": 40.0, "start.clearance": 0.5,
+    "scene.block": 8.0, "scene.street": 7.0, "scene.blocks": 6, "scene.later": 0.3, "scene.later_until": 0.8,
+    "goals.count": 3, "goals.apart": 20.0, "goals.clearance": 1.0, "goals.radius": 15.0, "goals.speed": 80.0,
+    "goals.role": "herd", "goals.spread": 8.0, "metrics.r_body": 1.2, "metrics.r_coll": 4.0, "model.s_goal": -0.25,
+}  # fmt: skip
+
+
+def same(found, seed, start=None):
+    plain, compiled = fly_plainly(found, seed, start), flown(found, seed, start)
+    assert plain.status == compiled.status == 0
+    np.testing.assert_allclose(compiled.frames, plain.frames, rtol=0.0, atol=1e-8)
+    assert set(plain.values) == set(compiled.values)
+    for name, value in plain.values.items():
+        assert compiled.values[name] == pytest.approx(value, rel=1e-8, abs=1e-8, nan_ok=True), name
+    return plain.values
+
+
+def test_boids_a_shepherd_and_buildings_that_appear(seed):
+    values = same(load("kidger/city", CITY), seed)
+    assert values["n_avoid"] > 0.0 and values["n_env_coll"] > 0.0  # spheres wider than those that were cast
+
+
+def test_a_display_among_drones_that_hover(seed):
+    """Own goals on their way, and the nearest points of boxes; flown from a given start, as a show is."""
+    points = points_of("O", 8)
+    hulls = tuple((*(hull - 0.35), *(hull + 0.35), 0.0) for hull in points[6:] + (0.4, 0.3, -2.0))
+    keys = {"goals.points": points[:6].tolist(), "duration": 8.0, "scene.boxes": hulls, "agents": 6}
+    start = np.zeros((6, 6))
+    start[:3] = ranks(6, height=20.0).T
+    values = same(scenario_of(6, keys), seed, start)
+    assert values["n_env_coll"] == values["n_coll"] == 0.0
+
+
+@pytest.mark.parametrize("failure", ["fall", "hover"])
+def test_a_show_forms_its_shapes_without_collisions_while_drones_fail(failure, seed):
+    shapes = [points_of(text, 30, seed=number) for number, text in enumerate("AO")]
+    for points in shapes:
+        assert pdist(points).min() == pytest.approx(3.0)
+    show = fly_show(shapes, 30, 0.2, failure, seed)
+    assert [formed.drones for formed in show.formed] == [27, 24]
+    assert all(formed.worst <= 1.0 and formed.collisions == formed.hulls == 0 for formed in show.formed)
+    assert np.isfinite(show.frames[-1]).all(axis=0).sum() == 24
+    check(recording_of(show))
+
+
+def test_an_assignment_is_the_best_of_all_and_its_ways_keep_apart(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.0, 9.0, (6, 3)), rng.uniform(0.0, 9.0, (6, 3))
+    found = assign(a, b, np.zeros(6, bool))
+    least = min(((a - b[list(order)]) ** 2).sum() for order in permutations(range(6)))
+    assert ((a - b[found]) ** 2).sum() == pytest.approx(least)
+    a, b = (np.array([ranks(16)[k] + rng.uniform(-0.4, 0.4, 3) for k in range(16)]) for _ in range(2))
+    b = b[rng.permutation(16)] + (30.0, 5.0, 12.0)
+    ends, apart = b[assign(a, b, np.zeros(16, bool))], min(pdist(a).min(), pdist(b).min())
+    assert min(pdist(a + s * (ends - a)).min() for s in np.linspace(0.0, 1.0, 101)) >= apart / 2**0.5 - 1e-9

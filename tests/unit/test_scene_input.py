@@ -1,0 +1,136 @@
+"""Scenes, goals, starts and displays that cannot be meant end with a clear line, or a note of what was done."""
+
+import re
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.display import assignment, fly_show, points_of
+from airflock.errors import AirflockError, FlightError, ScenarioError
+from airflock.scenarios.places import in_mesh
+from airflock.scenes import meshes
+from airflock.scenes.build import scene_of
+from airflock.world.scenery import Parameters
+
+trimesh = pytest.importorskip("trimesh")
+
+
+@pytest.fixture
+def hall(tmp_path):
+    """A closed hall of 40 x 20 x 10 m as a file."""
+    path = tmp_path / "hall.stl"
+    trimesh.creation.box(bounds=[[0.0, 0.0, 0.0], [40.0, 20.0, 10.0]]).export(path)
+    return path
+
+
+def fly_in(path, **settings):
+    return airflock.load("kidger/city", {"scene.kind": "mesh", "scene.file": str(path), **settings})
+
+
+def refused(*words, preset="kidger/city", **settings):
+    with pytest.raises(ScenarioError) as caught:
+        airflock.load(preset, {key.replace("__", "."): value for key, value in settings.items()})
+    text = str(caught.value)
+    assert all(word in text for word in words), text
+    assert all(line.startswith(f"{preset}: ") for line in text.splitlines())
+
+
+def test_a_goal_inside_a_building_is_named_with_its_depth():
+    points = [[0.0, 0.0, 10.0], [22.0, 22.0, 5.0]]
+    refused("goals.points[1] = [22, 22, 5] m", "inside", goals__kind="points", goals__points=points)
+    refused("lies 5 m inside", goals__kind="points", goals__points=[[0.0, 0.0, -5.0]])
+
+
+def test_points_are_asked_for_where_they_are_missing():
+    refused("goals.points, [[east, north, up], ...]", goals__kind="points")
+    refused("1 goals.points are not one for each of 10 agents", goals__kind="own", goals__points=[[0.0, 0.0, 9.0]])
+
+
+def test_a_start_inside_an_obstacle_is_refused():
+    shut = {"scene__blocks": 9, "start__side": 12.0, "start__separation": 0.5, "world__dimensions": "2"}
+    refused("start: the whole region", "start.clearance", **shut)
+    found = airflock.load("kidger/city", {"agents": 2})
+    start = np.array([[0.0, 22.0], [0.0, 22.0], [20.0, 5.0], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    with pytest.raises(FlightError, match="start: agent 1 lies"):
+        airflock.simulate(found, start=start)
+
+
+def test_a_start_region_full_of_obstacles_is_noted():
+    found = airflock.load("kidger/city", {"scene.street": 2.5, "world.dimensions": "2", "goals.kind": "none"})
+    assert any("agents start in the rest" in note for note in found.notes)
+
+
+def test_a_goal_inside_a_closed_mesh_is_found_by_parity(hall):
+    with pytest.raises(ScenarioError, match=r"goals.points\[0\]"):
+        fly_in(hall, **{"goals.kind": "points", "goals.points": [[20.0, 10.0, 5.0]]})
+    place = scene_of(Parameters(kind="mesh", file=str(hall)), 3)
+    spots = np.random.default_rng(5).uniform((-10.0, -10.0, 0.5), (50.0, 30.0, 20.0), (300, 3))
+    truth = ((spots > 0.0) & (spots < (40.0, 20.0, 10.0))).all(axis=1)
+    assert [in_mesh(place, spot) for spot in spots] == truth.tolist()
+
+
+def test_open_and_inverted_meshes_are_noted(tmp_path):
+    box = trimesh.creation.box(extents=[30.0, 30.0, 30.0])
+    box.update_faces(np.arange(len(box.faces)) > 1)
+    box.export(tmp_path / "open.stl")
+    inverted = trimesh.creation.box(extents=[30.0, 30.0, 30.0])
+    inverted.invert()
+    inverted.export(tmp_path / "inverted.obj")
+    for name, word in (("open.stl", "the mesh is open"), ("inverted.obj", "the mesh is inverted")):
+        found = fly_in(tmp_path / name, **{"goals.kind": "none", "start.side": 200.0})
+        assert any(word in note for note in found.notes), found.notes
+
+
+@pytest.mark.parametrize(("size", "unit"), [(0.005, "1000"), (2e6, "0.001")])
+def test_a_scene_in_the_wrong_unit_is_refused_with_a_guess(tmp_path, size, unit):
+    path = tmp_path / "city.stl"
+    trimesh.creation.box(extents=[size] * 3).export(path)
+    with pytest.raises(ScenarioError, match="may be in another unit, try scene.unit"):
+        fly_in(path)
+
+
+def test_damaged_and_strange_mesh_files_are_refused(tmp_path, hall, monkeypatch):
+    short = tmp_path / "short.stl"
+    short.write_bytes(hall.read_bytes()[:-60])
+    code = tmp_path / "mesh.py"
+    code.write_text("raise SystemExit('run')")
+    garbage = tmp_path / "garbage.glb"
+    garbage.write_bytes(b"glTF" + bytes(range(200)))
+    for path, words in (
+        (short, "cut short"),
+        (code, "is none of"),
+        (garbage, "damaged"),
+        (tmp_path / "no.obj", "no such"),
+    ):
+        with pytest.raises(ScenarioError, match=words):
+            fly_in(path)
+    monkeypatch.setattr(meshes, "MOST_BYTES", 100)
+    with pytest.raises(ScenarioError, match="simplify the mesh"):
+        fly_in(hall, **{"start.speed": 1.0})  # a scene of its own: the one above is kept
+
+
+def test_a_mesh_beside_its_scenario_file_is_found(hall):
+    path = hall.parent / "mine.toml"
+    path.write_text('agents = 3\n[model]\nkind = "kidger"\n[world]\ndimensions = "3"\narena = "none"\n'
+                    '[scene]\nkind = "mesh"\nfile = "hall.stl"\n[start]\nkind = "box"\nside = 90.0\n')  # fmt: skip
+    assert len(airflock.load(path).stands().shapes) == 13  # and the ground
+
+
+def test_more_drones_than_points_is_one_clear_line():
+    with pytest.raises(AirflockError, match="shape 1 has 10 points, fewer than 20 drones"):
+        fly_show([np.zeros((10, 3))], 20)
+    with pytest.raises(AirflockError, match="3 drones are more than 2 points"):
+        assignment.assign(np.zeros((3, 3)), np.zeros((2, 3)), np.zeros(2, bool))
+    with pytest.raises(AirflockError, match=r"failing = 1.5"):
+        fly_show([np.zeros((10, 3))], 5, 1.5)
+
+
+def test_pictures_that_show_nothing_are_refused(tmp_path):
+    import imageio.v3 as iio
+
+    iio.imwrite(tmp_path / "white.png", np.full((20, 20), 255, np.uint8))
+    (tmp_path / "torn.png").write_bytes((tmp_path / "white.png").read_bytes()[:30])
+    for shape, words in (("white.png", "nothing in it"), ("torn.png", "damaged"), ("none.png", "no such file")):
+        with pytest.raises(AirflockError, match=re.escape(words)):
+            points_of(str(tmp_path / shape), 10)
