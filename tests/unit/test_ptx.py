@@ -50,8 +50,13 @@ def test_ptx_of_every_model(name):
             assert "ld.shared.v4.f32" in text  # a neighbour as heard is one load of four numbers
 
 
-def test_every_shipped_model_has_a_kernel_here():
-    assert {load(name).model.name for name in presets()} == {load(name).model.name for name in KERNELS}
+def test_every_shipped_model_has_a_kernel_here_or_says_that_it_flies_on_the_cpu():
+    from airflock.engine.devices import no_cuda
+
+    shipped = {found.model.name: found for found in map(load, presets())}
+    refused = {name: no_cuda(plan_of(found), found.agents) for name, found in shipped.items()}
+    assert {name for name, fault in refused.items() if fault is None} == {load(name).model.name for name in KERNELS}
+    assert all("only cpu" in fault for fault in refused.values() if fault)
 
 
 def test_ptx_of_one_big_flock():

@@ -8,6 +8,7 @@ import numpy as np
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
+from airflock.engine.passes import flock
 from airflock.engine.plan import Plan
 from airflock.engine.tables import clock, tables
 from airflock.errors import DeviceError, ScenarioError
@@ -63,10 +64,8 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
 
 def no_cuda(plan: Plan, agents: int) -> str | None:
     """Why a GPU cannot fly a plan with this many agents; None if it can."""
-    if getattr(plan.model, "flock", None) is not None:
-        return f"{plan.model.name} solves for the whole flock at once, which only cpu does"
-    if plan.own:
-        return "goals.kind = 'own' is flown by the cpu only"
+    if flock.owners(plan):
+        return f"{plan.model.name} or its metrics solve for the whole flock at once, which only cpu does"
     if agents <= MOST_TOGETHER:
         return None
     from airflock.engine.cuda.crowd import refused

@@ -52,7 +52,6 @@ class Plan:
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
-    appearing : some of the scene appears while flying
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     sequential: one agent after another perceives, decides and moves
@@ -76,7 +75,6 @@ class Plan:
     wing_choices: tuple[tuple[str, str], ...] = ()
     herd: bool = False
     own: bool = False
-    appearing: bool = False
     sequential: bool = False
     grid: bool = False
     dimensions: int = 2

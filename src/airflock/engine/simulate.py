@@ -50,7 +50,6 @@ def plan_of(
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
-        appearing=bool(len(scenario.stands().later)),
         sequential=scenario.flight.update == "sequential",
         bits=precision,
         noisy=scenario.sensors.noise > 0.0,

@@ -16,7 +16,7 @@ from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder
 from airflock.engine.plan import Plan
 
-STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "appear_", "measure_")
+STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "glide_", "appear_", "measure_")
 SCRATCH = 24  # totals that one stage reduces at once, at most
 
 

@@ -34,8 +34,8 @@ def refused(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
-    if plan.goals or plan.appearing:
-        return "one big flock with goals, or in a scene that appears, flies on cpu"
+    if plan.goals or plan.own or plan.scene or plan.stop:
+        return "one big flock with goals, in a scene, or up to its first collision flies on cpu"
     if any(metric.clock == "collision" for metric in plan.metrics):
         return "one big flock is not watched for collisions on a GPU; choose metrics.kind = order, or device = cpu"
     if agents > PAIRED and any(metric.pair or metric.cluster for metric in plan.metrics):

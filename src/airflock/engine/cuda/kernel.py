@@ -29,7 +29,9 @@ def flight(plan: Plan, shape: Shape) -> str:
     move.move(build)
     if plan.goals:
         scene.aim(build)
-    if plan.appearing:
+    if plan.own:
+        scene.glide(build)
+    if plan.scene:
         scene.appear(build)
     for clock in clocks(plan):
         measure.measure(build, clock)
@@ -151,18 +153,24 @@ def _time(build: CudaBuilder) -> list[str]:
     if meets:
         step += [*branch("meet", _choose(build)), "to_decide = integer(to_decide - 1)"]
     step += branch("look", _looked(build)) if due else []
+    if plan.stop:
+        found = [name for name, _, _ in columns(plan.metrics)].index("n_coll")
+        step += branch(f"value{found} > HALF", ["break"])
     step += [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
     step += branch("step < steps", _advance(build))
     return [*lines, *loop("step in range(steps + 1)", step)]
 
 
 def _world(build: CudaBuilder) -> list[str]:
-    """The goal goes on its way, and what is due appears; both may look at every agent."""
+    """Goals go on their way, and what is due appears; a shepherd and what appears look at every agent."""
     plan = build.plan
     lines = [build.stages["aim_"].call(elapsed="row_c.dt")] if plan.goals else []
-    lines += [build.stages["appear_"].call()] if plan.appearing else []
-    if plan.herd or plan.appearing:
-        return ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", *lines, "cuda.syncthreads()"]
+    if plan.herd:
+        lines = ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", *lines, "cuda.syncthreads()"]
+    lines += [build.stages["glide_"].call()] if plan.own else []
+    if plan.scene:
+        due = ["cuda.syncthreads()", *_shown(build), "cuda.syncthreads()", build.stages["appear_"].call()]
+        lines += branch("later[0, 6] >= ZERO or later.shape[0] > 1", [*due, "cuda.syncthreads()"])
     return lines
 
 

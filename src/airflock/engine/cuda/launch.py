@@ -157,9 +157,9 @@ def arrays(
         "all_edges": _padded([t.edges for t in jobs]),
         "all_spans": _padded([t.spans for t in jobs]),
         "all_goals": _padded([t.goals for t in jobs]),
-        # one scene for all flocks, or one of its own for each where some of it appears while flying
-        "all_shapes": _padded([t.shapes for t in (jobs if plan.appearing else jobs[:1])]),
-        "all_later": _padded([t.later for t in jobs]),
+        # a scene of its own for each flock where some of it appears while flying
+        "all_shapes": _padded([t.shapes for t in (jobs if any(len(t.later) for t in jobs) else jobs[:1])]),
+        "all_later": _padded([t.later for t in jobs], -1.0),  # a time before the start: nothing to come
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
     }
@@ -183,14 +183,16 @@ def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flo
             plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
         )
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
+        if frames is not None and plan.stop:
+            frames = frames[: int(sums[count])]
         found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
     return found
 
 
-def _padded(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Tables of several flights in one array; short ones are filled with zeros that nobody reads."""
+def _padded(arrays: Sequence[NDArray[Any]], fill: float = 0.0) -> NDArray[Any]:
+    """Tables of several flights in one array; short ones are filled up."""
     length = max(1, *(len(array) for array in arrays))
-    found = np.zeros((len(arrays), length, arrays[0].shape[1]), arrays[0].dtype)
+    found = np.full((len(arrays), length, arrays[0].shape[1]), fill, arrays[0].dtype)
     for flock, array in enumerate(arrays):
         found[flock, : len(array)] = array
     return found

@@ -118,7 +118,7 @@ def _world(build: Builder, elapsed: str) -> list[str]:
     if build.plan.own:
         scene.glide(build)
         lines += ["glide_(time, n, work, row, scene)"]
-    if build.plan.appearing:
+    if build.plan.scene:
         scene.appear(build)
         lines += ["appear_(time, n, work, row, scene)"]
     return lines
