@@ -7,7 +7,14 @@ from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly
 from airflock.scenarios.files import load
 
-SMALL = {"agents": 3, "duration": 1.5, "wing.segments": "5", "wing.tolerance": 1e-12, "start.jitter": 0.05}
+SMALL = {
+    "agents": 3,
+    "duration": 1.5,
+    "wing.segments": "5",
+    "wing.tolerance": 1e-12,
+    "start.jitter": 0.05,
+    "metrics.t_settle": 0.5,
+}
 FLIGHTS = {
     "paper": ("dimock_2003/published", SMALL),
     "sound": ("dimock_2003/physical", SMALL | {"start.spacing_z": 0.1}),
@@ -21,7 +28,7 @@ def test_plain_python_is_the_compiled_flight(name, seed):
     plain, compiled = fly_plainly(found, seed), fly(found, seed, precision=64, record=True)
     assert np.abs(np.diff(plain.frames, axis=0)).max() > 1e-2  # something happens
     np.testing.assert_allclose(compiled.frames, plain.frames, rtol=0.0, atol=1e-7)
-    assert compiled.values == pytest.approx(plain.values, rel=1e-8, abs=1e-9)
+    assert compiled.values == pytest.approx(plain.values, rel=1e-8, abs=1e-9, nan_ok=True)
 
 
 def test_a_collision_ends_both_alike(seed):
@@ -30,4 +37,4 @@ def test_a_collision_ends_both_alike(seed):
     assert plain.values["n_coll"] >= 1.0
     assert 1 < len(plain.frames) < 31
     assert compiled.frames.shape == plain.frames.shape
-    assert compiled.values == pytest.approx(plain.values, rel=1e-8, abs=1e-9)
+    assert compiled.values == pytest.approx(plain.values, rel=1e-8, abs=1e-9, nan_ok=True)
