@@ -7,7 +7,14 @@ from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly
 from airflock.scenarios.files import load
 
-SMALL = {"agents": 3, "duration": 1.5, "wing.segments": "5", "wing.tolerance": 1e-12, "start.jitter": 0.05}
+SMALL = {
+    "agents": 3,
+    "duration": 1.5,
+    "wing.segments": "5",
+    "wing.tolerance": 1e-12,
+    "start.jitter": 0.05,
+    "metrics.t_settle": 0.5,
+}
 FLIGHTS = {
     "paper": ("dimock_2003/published", SMALL),
     "sound": ("dimock_2003/physical", SMALL | {"start.spacing_z": 0.1}),
