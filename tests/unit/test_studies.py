@@ -5,6 +5,7 @@ import sqlite3
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -13,9 +14,11 @@ import pytest
 import airflock
 import toys
 from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.executors import Flight
 from airflock.evolve.executors.here import Here
+from airflock.evolve.executors.together import Together
 from airflock.evolve.folder import open_folder
-from airflock.evolve.run import Interrupted, run
+from airflock.evolve.run import Interrupted, on_device, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
@@ -284,3 +287,44 @@ def test_every_shipped_study_can_be_begun(name):
     parameters = study.space.parameters([0.5] * len(study.space.axes))
     assert with_parameters(study.scenario, parameters).parameters is not None
     assert all(axis.low < axis.high for axis in study.space.axes) and study.title
+
+
+def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monkeypatch):
+    from airflock.engine import simulate
+    from airflock.errors import FlightError
+
+    study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
+    space, flights = study.space, []
+    for i in range(7):
+        flights.append(Flight(i, 0, space.parameters([0.1 + 0.1 * i] * 11), 40 + i))
+    executor = Here(score_of(study), 2)
+    alone = {landed.flight.candidate: landed.values for landed in executor.fly(flights)}
+    executor.close()
+    together = {x.flight.candidate: x.values for x in Together(study, "cpu").fly(flights)}
+    assert together == alone
+    whole = simulate.score_flights
+
+    def faulty(scenarios, seeds, **keywords):
+        if 43 in seeds:
+            raise FlightError("seed 43: agent 1 left the finite numbers at step 3")
+        return whole(scenarios, seeds, **keywords)
+
+    monkeypatch.setattr(simulate, "score_flights", faulty)
+    landed = {x.flight.candidate: x for x in Together(study, "cpu").fly(flights)}
+    assert landed[3].values is None and landed[3].reason.startswith("seed 43")
+    assert {i: x.values for i, x in landed.items() if i != 3} == {i: v for i, v in alone.items() if i != 3}
+
+
+@pytest.mark.parametrize(
+    ("device", "scheduler", "words"),
+    [("tpu", None, "device = 'tpu' is none of cpu, cuda, auto"), ("cuda", "tcp://x:1", "leave out one of the two")],
+)
+def test_devices_that_cannot_be_are_one_line(device, scheduler, words):
+    with pytest.raises(StudyError, match=words):
+        on_device(toys.study(), device, scheduler)
+
+
+def test_a_study_of_another_device_is_another_study():
+    assert differences(toys.study().document(), replace(toys.study(), device="cuda").document()) == [
+        "device = cpu there, cuda now"
+    ]

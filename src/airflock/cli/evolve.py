@@ -30,7 +30,7 @@ def evolve(
     sensitivity: Annotated[
         str, typer.Option(metavar="METHOD", help="Also which parameters matter: sobol or morris.", show_default=False)
     ] = "",
-    device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu.")] = "cpu",
+    device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu, cuda or auto.")] = "cpu",
     changes: options.Set = None,
     agents: options.Agents = None,
     duration: options.Duration = None,
@@ -44,7 +44,7 @@ def evolve(
     """
     from airflock.errors import StudyError
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.run import executor_for, run, study_of
+    from airflock.evolve.run import executor_for, on_device, run, study_of
     from airflock.evolve.search import total_flights
     from airflock.evolve.sensitivity import METHODS
 
@@ -63,8 +63,7 @@ def evolve(
     )
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
-    if device != "cpu":
-        raise StudyError(f"--device {device}: studies fly on the cpu in this version")
+    study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)

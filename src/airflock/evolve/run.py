@@ -54,7 +54,7 @@ def evolve(
     objective : {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters
     fitness   : instead of it, a function of your own: order parameters of one flight → number, more is better
     scheduler : address of a dask scheduler; by default flights fly in this process, `threads` at a time
-    device    : "cpu"
+    device    : cpu, cuda, or auto
     timeout   : s that a flight may take on a dask worker
     sensitivity : "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv
     watch     : called with a Progress after each flight
@@ -67,8 +67,7 @@ def evolve(
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
-    if device != "cpu":
-        raise StudyError(f"device = {device!r}: studies fly on the cpu in this version")
+    study = on_device(study, device, scheduler)
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
     return run(study, folder, executor, watch, sensitivity=sensitivity)
@@ -116,10 +115,28 @@ def score_of(study: Study) -> Score:
     return score
 
 
+def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:
+    """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
+    if device == "cpu":
+        return study
+    if scheduler is not None:
+        raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
+    if device not in ("cuda", "auto"):
+        raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
+    from airflock.engine.simulate import picked
+
+    generation = [study.scenario] * study.population(0) * study.whole("seeds")
+    return replace(study, device=picked(generation, device, precision=int(study.search.precision)))
+
+
 def executor_for(
     study: Study, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
 ) -> Executor:
     """Who flies: this process, or the workers of a dask scheduler."""
+    if study.device != "cpu":
+        from airflock.evolve.executors.together import Together
+
+        return Together(study, study.device)
     if scheduler is not None:
         from airflock.evolve.executors.cluster import Cluster
 

@@ -81,6 +81,7 @@ class Study:
     objectives: tuple[Objective, ...]
     search: Search
     title: str = ""
+    device: str = "cpu"  # cpu or cuda: they agree to rounding, and a study's identity is to the bit
 
     def whole(self, name: str) -> int:
         """A whole number of the search."""
@@ -101,6 +102,7 @@ class Study:
             "layout": LAYOUT,
             "airflock": __version__,
             "rules": fingerprint(self.scenario, int(q.precision)),
+            "device": self.device,
             "title": self.title,
             "name": self.scenario.name,
             "search": {
