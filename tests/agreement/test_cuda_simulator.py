@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
 
-HERE = Path(__file__).resolve().parents[1] / "cuda"
+HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
     "paper", "split", "storm", "polygon", "silo", "links", "table", "couzin", "vicsek", "groups", "together", "city",
     "herd",
@@ -46,6 +46,20 @@ def test_cases_cover_collisions_split_flocks_and_lone_agents(flights):
     assert flights["groups"]["known"]["n_groups"] > 0.0
     assert flights["groups"]["known"]["share_alone"] > 0.0
     assert flights["city"]["known"]["avoiding"] > 0.0
+
+
+@pytest.fixture(scope="module")
+def crowds(request):
+    return simulated("crowded.py", request.config.getoption("--seed"))
+
+
+@pytest.mark.parametrize("name", ["periodic", "one cell", "walls", "open", "plane"])
+def test_one_big_flock_by_cells_flies_as_plain_python(crowds, name, seed):
+    found = crowds[name]
+    assert found["moved"] > 0.01
+    assert max(found["state"], found["frames"], found["values"]) < 1e-9
+    assert found["same bits"]  # agents have an order within their cell
+    assert found["cells"] > (0 if name == "one cell" else 8)
 
 
 def test_random_integers_of_a_kernel_are_those_of_plain_python(seed):

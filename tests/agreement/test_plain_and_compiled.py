@@ -16,6 +16,7 @@ FLIGHTS = {
     "paper": ("vasarhelyi_2018", {"agents": 12, "world.walls": "nearest_per_axis", "metrics.r_coll": 8.0}),
     "storm": ("viragh_2014", {
         "agents": 9, "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.east": 1.0,
+        "sensors.period": 0.15,  # an odd number of steps: decisions fall between the two steps of one draw
         "wind.gust": 2.0, "start.speed": 3.0, "metrics.r_coll": 7.0, "metrics.collision_period": 0.03,
     }),
     "links": ("vasarhelyi_2018", {

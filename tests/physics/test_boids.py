@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
@@ -74,17 +75,38 @@ def test_rays_end_where_shapely_says(seed):
         )
 
 
-@pytest.mark.parametrize("world", ["bounce", "periodic"])
-@pytest.mark.parametrize("side", [1.3, 3.0])
-def test_grid_is_all_pairs(world, side, seed):
-    found = load("zapotecatl_2016/best", {
+def crowd(world, side):
+    return load("zapotecatl_2016/best", {
         "agents": 300, "update": "synchronous", "dt": 0.02, "duration": 0.1, "metrics.kind": "order",
         "start.kind": "arena", "start.separation": 0.0, "world.edges": world, "world.side": side, "world.height": side,
     })  # fmt: skip
+
+
+@pytest.mark.parametrize("world", ["bounce", "periodic"])
+@pytest.mark.parametrize("side", [1.3, 3.0])
+def test_grid_is_all_pairs(world, side, seed):
+    found = crowd(world, side)
     pairs, cells = (plan_of(found, precision=64, grid=grid) for grid in (False, True))
     one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
     assert np.abs(one[3:]).max() > 0.0
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
+
+
+def test_the_number_of_threads_changes_no_bit_of_a_grid(seed):
+    found = crowd("periodic", 3.0)
+    plan = plan_of(found, precision=64, grid=True)
+    most = numba.get_num_threads()
+    states = []
+    for threads in sorted({1, min(2, most), most}):
+        numba.set_num_threads(threads)
+        states.append(cpu.fly(plan, tables(found, plan, seed)).state)
+    numba.set_num_threads(most)
+    assert all((state == states[0]).all() for state in states)
+
+
+def test_a_periodic_box_too_small_for_images_is_met_in_all_pairs():
+    assert not plan_of(crowd("periodic", 0.9), grid=True).grid  # reach 0.5 m
+    assert plan_of(crowd("periodic", 1.0), grid=True).grid
 
 
 def test_particles_are_ordered_at_low_noise_and_not_at_high():

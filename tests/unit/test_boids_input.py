@@ -7,10 +7,19 @@ from airflock.scenarios.files import load
 
 BAD = {
     "model.r_s": (-0.1, "model.r_s = -0.1 m lies outside [0, 1000] m"),
+    "model.r_a": (-0.1, "model.r_a = -0.1 m lies outside [0, 1000] m"),
+    "model.r_c": (-0.1, "model.r_c = -0.1 m lies outside [0, 1000] m"),
+    "model.r_floor": (-0.1, "model.r_floor = -0.1 m lies outside"),
+    "model.rs": (0.1, "model.rs is no key; did you mean model.r_s?"),
+    "model.w_c": (-1.0, "model.w_c = -1 1 lies outside"),
+    "model.w_s": (-1.0, "model.w_s = -1 1 lies outside"),
     "model.w_a": (-1.0, "model.w_a = -1 1 lies outside"),
     "model.fov_c_deg": (400.0, "model.fov_c_deg = 400 deg lies outside [0, 360] deg"),
+    "model.fov_s_deg": (-1.0, "model.fov_s_deg = -1 deg lies outside [0, 360] deg"),
+    "model.fov_a_deg": (361.0, "model.fov_a_deg = 361 deg lies outside [0, 360] deg"),
     "metrics.r_b": (0.0, "metrics.r_b = 0 m lies outside"),
     "world.side": (0.8, "the arena is smaller than the ball in which agents start"),
+    "world.height": (0.8, "the arena is smaller than the ball in which agents start"),
     "metrics.k": (3.0, "metrics.k = 3 m lies outside [0, 2.25] m"),
     "metrics.sigma": (0.7, "metrics.sigma + metrics.gamma = 1.2 is not 1"),
     "body.kind": ("multirotor", "takes a velocity, but model reynolds_1987 commands acceleration"),
@@ -33,3 +42,19 @@ def test_largest_extension_comes_from_the_arena_or_is_asked_for():
     with pytest.raises(ScenarioError, match=r"metrics\.max_e is missing"):
         load("couzin_2002/torus", {"metrics.kind": "zapotecatl"})
     assert load("couzin_2002/torus", {"metrics.kind": "zapotecatl", "metrics.max_e": 9.0}).measured_by().k == 9.0
+
+
+@pytest.mark.parametrize(
+    ("preset", "key", "value", "line"),
+    [
+        ("vicsek_1995/transition", "model.eta", 7.0, "model.eta = 7 rad lies outside"),
+        ("vicsek_1995/transition", "model.r", -1.0, "model.r = -1 m lies outside"),
+        ("couzin_2002/torus", "model.dr_o", -1.0, "model.dr_o = -1 m lies outside"),
+        ("couzin_2002/torus", "model.fov_deg", 400.0, "model.fov_deg = 400 deg lies outside [0, 360] deg"),
+    ],
+)
+def test_bad_input_for_particles_and_schools_is_one_line(preset, key, value, line):
+    with pytest.raises(ScenarioError) as fault:
+        load(preset, {key: value})
+    assert line in str(fault.value)
+    assert len(str(fault.value).splitlines()) == 1

@@ -116,7 +116,7 @@ def decide(own, p):
         ({"Parameters": Parameters, "COMMAND": "thrust", "decide": decide}, "'thrust' is none of velocity"),
         (
             {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": lambda dx: dx},
-            "neighbour but no NamedTuple Sums",
+            "neighbour but no Sums",
         ),
         (
             {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "Sums": Sums, "REDUCE": {"y": "min"}},

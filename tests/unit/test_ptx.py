@@ -38,10 +38,10 @@ def doubles(text):
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_ptx_of_every_model(name):
-    from airflock.engine.cuda.compiled import ptx
+    from airflock.engine.cuda.compiled import ptx, signature
 
     driver, plan = driver_of(name, **KERNELS[name])
-    for (major, minor), text in ptx(driver, plan.bits, CAPABILITIES).items():
+    for (major, minor), text in ptx(driver, signature(plan.bits), CAPABILITIES).items():
         assert f".target sm_{major}{minor}" in text
         assert ".entry" in text
         assert doubles(text) == []  # one double literal would cost a GPU half its speed
@@ -52,3 +52,18 @@ def test_ptx_of_every_model(name):
 
 def test_every_shipped_model_has_a_kernel_here():
     assert {load(name).model.name for name in presets()} == {load(name).model.name for name in KERNELS}
+
+
+def test_ptx_of_one_big_flock():
+    from airflock.engine.cuda.cells import signatures
+    from airflock.engine.cuda.compiled import ptx
+    from airflock.engine.cuda.crowd import crowd_driver
+
+    keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "metrics.kind": "order"}
+    plan = plan_of(load("zapotecatl_2016/literal", keys))
+    assert plan.grid
+    driver = crowd_driver(plan, False)
+    for kernel, types in signatures(32).items():
+        for (major, minor), text in ptx(driver, types, CAPABILITIES, kernel).items():
+            assert f".target sm_{major}{minor}" in text
+            assert doubles(text) == []

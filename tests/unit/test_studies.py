@@ -16,6 +16,7 @@ from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, run
+from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
 from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
@@ -275,3 +276,11 @@ def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path)
     result = airflock.evolve(scenario, tmp_path / "a", space=space, fitness=lambda score: score["phi_vel"], **search)
     assert result.parameters["model.v_flock"] > 4.0
     assert airflock.load(tmp_path / "a" / "best.toml").parameters.v_flock == result.parameters["model.v_flock"]
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_every_shipped_study_can_be_begun(name):
+    study = load_study(name)
+    parameters = study.space.parameters([0.5] * len(study.space.axes))
+    assert with_parameters(study.scenario, parameters).parameters is not None
+    assert all(axis.low < axis.high for axis in study.space.axes) and study.title

@@ -81,19 +81,23 @@ def score(
     series: Annotated[
         Path | None, typer.Option(metavar="FILE.csv", help="Also write the order parameters over time.")
     ] = None,
+    aero: Annotated[
+        bool, typer.Option("--aero", help="Measure the power that the geometry saves; --set wing.span=... and so on.")
+    ] = False,
 ) -> None:
     """Measure recordings, simulated or flown, with the same order parameters.
 
     Example: airflock score flight.nc --set metrics.r_coll=2.0 --series course.csv
     """
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import measure
+    from airflock.recordings.scores import aero_settings, measure
 
     options.writable(series)
     changed = options.settings(changes)
     rows, courses = [], []
     for path in files:
-        values, course = measure(load_recording(path), changed)
+        recording = load_recording(path)
+        values, course = measure(recording, aero_settings(recording, changed) if aero else changed)
         rows.append(values)
         courses.append(course.assign(file=str(path)))
     if series is not None:

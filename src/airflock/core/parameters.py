@@ -7,6 +7,7 @@ constants in a kernel.
 
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.errors import ParameterError
@@ -74,8 +75,14 @@ def text(default: str = "", *, meaning: str, source: str = "") -> Any:
 
 def declarations(record: Any) -> Iterator[tuple[str, Declaration, Any]]:
     """Name, declaration and default of each parameter of a record or of its class."""
-    for item in fields(record):
-        yield item.name, _declared(item), None if item.default is MISSING else item.default
+    return iter(_declarations(record if isinstance(record, type) else type(record)))
+
+
+@cache
+def _declarations(kind: type) -> tuple[tuple[str, Declaration, Any], ...]:
+    return tuple(
+        (item.name, _declared(item), None if item.default is MISSING else item.default) for item in fields(kind)
+    )
 
 
 def _declared(item: Field[Any]) -> Declaration:
@@ -134,7 +141,12 @@ def _frozen(value: Any) -> Any:
 
 def number_names(record: Any) -> tuple[str, ...]:
     """Names of the numbers of a record or its class, in declared order: the columns of its table."""
-    return tuple(name for name, declared, _ in declarations(record) if isinstance(declared, Quantity))
+    return _number_names(record if isinstance(record, type) else type(record))
+
+
+@cache
+def _number_names(kind: type) -> tuple[str, ...]:
+    return tuple(name for name, declared, _ in declarations(kind) if isinstance(declared, Quantity))
 
 
 def choices(record: Any) -> dict[str, str]:

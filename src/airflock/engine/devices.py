@@ -16,6 +16,7 @@ from airflock.scenarios.scenario import Scenario
 DEVICES = ("auto", "cpu", "cuda", "python")
 PAIR = 1.5e-9  # s that one core takes for one pair of agents (2 cores of 2023, single precision)
 STEP = 4e-9  # s for one motion step of one agent
+MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
 
 
@@ -44,12 +45,14 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
         return Choice(device)
     from airflock.engine.cuda.device import required, trouble
 
+    agents = max(scenario.agents for scenario in scenarios)
+    faults = (no_cuda(plan, agents) for plan in plans)
     if device == "cuda":
         required()
-        for plan in plans:
-            _refuse(no_cuda(plan), device)
+        for fault in filter(None, faults):
+            raise DeviceError(f"device = cuda: {fault}")
         return Choice(device)
-    missing = trouble() or next((fault for fault in map(no_cuda, plans) if fault), None)
+    missing = trouble() or next(filter(None, faults), None)
     if missing is not None:
         return Choice("cpu", missing)
     seconds = sum(work(scenario) for scenario in scenarios) / cpu.cores()
@@ -58,18 +61,18 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     return Choice("cuda", f"about {seconds:.2g} s of work on {cpu.cores()} cores would be left to the CPU")
 
 
-def _refuse(fault: str | None, device: str) -> None:
-    if fault is not None:
-        raise DeviceError(f"device = {device}: {fault}")
-
-
-def no_cuda(plan: Plan) -> str | None:
-    """Why a GPU cannot fly a plan; None if it can."""
+def no_cuda(plan: Plan, agents: int) -> str | None:
+    """Why a GPU cannot fly a plan with this many agents; None if it can."""
     if getattr(plan.model, "flock", None) is not None:
         return f"{plan.model.name} solves for the whole flock at once, which only cpu does"
     if plan.own:
         return "goals.kind = 'own' is flown by the cpu only"
-    return None
+    if agents <= MOST_TOGETHER:
+        return None
+    from airflock.engine.cuda.crowd import refused
+
+    fault = refused(plan, agents)
+    return None if fault is None else f"{agents} agents are more than one block flies ({MOST_TOGETHER}), and {fault}"
 
 
 def work(scenario: Scenario) -> float:
@@ -99,12 +102,21 @@ def fly_on_gpu(
     done: Callable[[], None] | None = None,
 ) -> list[Flown]:
     """Fly worlds on the GPU, flight i with plans[i] and seeds[i]; those of one plan together in one launch."""
+    from airflock.engine.cuda.crowd import fly_crowd, refused
     from airflock.engine.cuda.launch import fly_many
 
     groups: dict[Plan, list[int]] = {}
-    for number, plan in enumerate(plans):
-        groups.setdefault(replace(plan, grid=False), []).append(number)
     results: dict[int, Flown] = {}
+    for number, plan in enumerate(plans):
+        if refused(plan, scenarios[number].agents) is None and (
+            starts is not None or not scenarios[number].separation()
+        ):
+            start = None if starts is None else starts[number]
+            results[number] = fly_crowd(scenarios[number], plan, seeds[number], start)
+            if done:
+                done()
+        else:
+            groups.setdefault(replace(plan, grid=False), []).append(number)
     for plan, members in groups.items():
         jobs = [tables(scenarios[m], plan, seeds[m]) for m in members]
         given = None if starts is None else [np.asarray(starts[m]) for m in members]

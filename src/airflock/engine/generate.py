@@ -80,6 +80,7 @@ class Source:
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
         rewritten = ast.fix_missing_locations(_Rewrite(rule, self).visit(node))
+        _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
         loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
@@ -191,3 +192,9 @@ class _Rewrite(ast.NodeTransformer):
     def _closure(self) -> dict[str, Any]:
         cells = self.rule.__closure__ or ()
         return dict(zip(self.rule.__code__.co_freevars, (c.cell_contents for c in cells), strict=True))
+
+
+def _end_at_return(node: ast.FunctionDef) -> None:
+    """Drop what a choice has made unreachable, so that nothing in it counts as read."""
+    ends = [k for k, statement in enumerate(node.body) if isinstance(statement, ast.Return)]
+    del node.body[ends[0] + 1 if ends else len(node.body) :]

@@ -16,6 +16,7 @@ from airflock.errors import FlightError, ScenarioError
 from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
+from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
 
@@ -30,7 +31,7 @@ def plan_of(
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid : neighbours by cells or all pairs; by default what is faster
+    grid : neighbours by cells or all pairs; by default what is faster, and all pairs in a box too small for cells
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -41,7 +42,7 @@ def plan_of(
         scenario.parameters,
         SETS[scenario.metrics.kind] if metrics is None else metrics,
         scenario.world,
-        grid=_pays(scenario) if grid is None else grid,
+        grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
@@ -101,7 +102,7 @@ def fly(
         inside = start_inside(scenario, start) if plan.scene else ""
         if inside:
             raise FlightError(f"{scenario.name}: {inside}")
-    chosen = picked([scenario], device, precision=precision, say=say)
+    chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
 
@@ -115,8 +116,13 @@ def picked(
     """Device on which these flights run: the one that is named if it can fly them, else what `auto` picks."""
     if device == "cpu":
         return device
-    plans = dict.fromkeys(plan_of(scenario, precision=precision) for scenario in scenarios)
-    choice = devices.choose(device, scenarios, list(plans))
+    return _choice(device, scenarios, [plan_of(scenario, precision=precision) for scenario in scenarios], say)
+
+
+def _choice(
+    device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan], say: Callable[[str], None] | None
+) -> str:
+    choice = devices.choose(device, scenarios, list(dict.fromkeys(plans)))
     if say is not None and choice.note:
         say(choice.note)
     return choice.device
@@ -207,9 +213,9 @@ def score_flights(
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
     if device != "cpu":
-        device = picked(scenarios, device, precision=precision, say=say)
+        plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
+        device = _choice(device, scenarios, plans, say)
         if device == "cuda":
-            plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
             flown = devices.fly_on_gpu(scenarios, plans, seeds, None, done)
             together = zip(scenarios, seeds, flown, strict=True)
             return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
@@ -250,4 +256,13 @@ def _pays(scenario: Scenario) -> bool:
         and perfect
         and scenario.radio.kind == "constant"
         and scenario.flight.update == "synchronous"
+        and _has_room(scenario)
     )
+
+
+def _has_room(scenario: Scenario) -> bool:
+    """Whether a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
+    if scenario.world.edges != "periodic" or scenario.model.reach is None:
+        return True
+    halves = half_sizes(scenario.world)[: scenario.dimensions]
+    return min(halves) >= float(scenario.model.reach(scenario.parameters))

@@ -13,6 +13,7 @@ import sys
 import tempfile
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from types import ModuleType
 
 from airflock import atomic
@@ -56,12 +57,18 @@ def cache_folder() -> Path:
     return spare
 
 
+_loading = Lock()
+
+
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
     digest = hashlib.sha256(f"{toolchain()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
-    if name in sys.modules:
-        return sys.modules[name]
+    with _loading:  # a thread must not get a module that another one is still executing
+        return sys.modules[name] if name in sys.modules else _import(name, digest, text, label)
+
+
+def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
     folder = cache_folder() / digest
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{label}.py"

@@ -76,6 +76,17 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
 
 
+def aero_settings(recording: xr.Dataset, changed: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Settings that measure the power of a recording's geometry; `changed` goes before them.
+
+    A flock of birds was flown in a frame that moves with the air; elsewhere forward is the flock's mean heading.
+    """
+    document = json.loads(str(recording.attrs.get("airflock_scenario") or "{}"))
+    birds = document.get("model", {}).get("kind") == "dimock_2003"
+    frame = {} if birds else {"wing.frame": "ground"}
+    return {"metrics.kind": "dimock", "metrics.fitness": "sound", **frame, **(changed or {})}
+
+
 def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from airflock.aero import wing as wings
@@ -73,6 +74,10 @@ class Scenario:
 
     def measured_by(self) -> metric_parameters.Parameters:
         """Metric parameters with everything that was left to the scenario filled in."""
+        return self._measured
+
+    @cached_property
+    def _measured(self) -> metric_parameters.Parameters:
         given = {name: getattr(self.metrics, name) for name in self.metrics.__dataclass_fields__}
         p, model = self.parameters, self.model
         if given["v_flock"] is None and model.preferred_speed is not None:

@@ -9,8 +9,9 @@ from textwrap import indent
 
 from airflock.core.contract import Metric
 from airflock.engine.cuda.clusters import clusters
-from airflock.engine.cuda.lower import Context, lowered, parse, used
+from airflock.engine.cuda.lower import lowered, used
 from airflock.engine.cuda.primitives import head
+from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder
 from airflock.engine.plan import Plan
@@ -125,15 +126,25 @@ class CudaBuilder(Builder):
             found |= {f"hv{a}": ("truth", len(axes) + c) for c, a in enumerate(axes)}
         return found
 
+    def cells(self) -> tuple[str, ...]:
+        """Lines around a pair loop that runs over cells; none where it runs over all pairs."""
+        return ()
+
+    def prepared(self, name: str, lines: list[str]) -> list[str]:
+        """Text of a stage before it is lowered."""
+        if name in ("snapshot", "perceive"):
+            return [line.replace("ring[", "past[") for line in lines]
+        shared = self.shape.registers and self.shape.per_agent > 1
+        return shared_noise(lines) if name == "move" and shared else lines
+
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
-        if name in ("snapshot", "perceive"):
-            lines = [line.replace("ring[", "past[") for line in lines]
-        statements = parse(lines)
+        statements = parse(self.prepared(name, lines))
         if name == "neighbours" and self.receive is not None:
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
+        context.cells = self.cells()
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self, name).visit(s) for s in body]
@@ -170,6 +181,20 @@ class CudaBuilder(Builder):
     def bound_rows(self, read: set[str]) -> set[str]:
         """Rows of the table that a stage takes by name."""
         return {name for name in read if name in self.bound}
+
+
+def shared_noise(lines: list[str]) -> list[str]:
+    """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
+    found = []
+    for line in lines:
+        if line == "if step % 2 == 0:":
+            found += ["if step % (2 * PER_AGENT) == 0:"]
+        elif line.endswith(" if step % 2 == 0 else g2") or line.endswith(" if step % 2 == 0 else g3"):
+            name = line.partition(" = ")[0]
+            found += [line, f"{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"]
+        else:
+            found += [line.replace("(i, step // 2,", "(i, step // 2 + sub,")]
+    return found
 
 
 class _Renamed(ast.NodeTransformer):

@@ -15,13 +15,13 @@ KINDS = dict(zip(ARGUMENTS, (
 ), strict=True))  # fmt: skip
 
 
-def signature(bits: int, kinds: Any = None) -> tuple[Any, ...]:
-    """Numba types of a kernel's arguments."""
+def signature(bits: int) -> tuple[Any, ...]:
+    """Numba types of the arguments of a kernel of many flocks."""
     from numba import types
 
     real = types.float32 if bits == 32 else types.float64
     scalar: dict[str, Any] = {"r": real, "i": types.int64, "s": types.int32, "u": types.uint32}
-    return tuple(types.Array(scalar[kind[1]], int(kind[0]), "C") for kind in (kinds or KINDS).values())
+    return tuple(types.Array(scalar[kind[1]], int(kind[0]), "C") for kind in KINDS.values())
 
 
 class _Absent:
@@ -44,7 +44,10 @@ def pretending(capability: tuple[int, int]) -> Iterator[None]:
 
 
 def ptx(
-    driver: ModuleType, bits: int, capabilities: tuple[tuple[int, int], ...] = ((8, 0), (9, 0)), kernel: str = "fly"
+    driver: ModuleType,
+    types: tuple[Any, ...],
+    capabilities: tuple[tuple[int, int], ...] = ((8, 0), (9, 0)),
+    kernel: str = "fly",
 ) -> dict[tuple[int, int], str]:
     """PTX of a kernel for some compute capabilities; needs no GPU, but the compiler of numba-cuda."""
     compiler: Any = import_module("numba.cuda.compiler")
@@ -53,7 +56,7 @@ def ptx(
     with pretending(capabilities[0]):
         library, _ = compiler._compile_pyfunc_with_fixup(
             dispatched.py_func,
-            getattr(driver, "SIGNATURES", {}).get(kernel) or signature(bits),
+            types,
             device=False,
             fastmath=options.get("fastmath"),
             launch_bounds=options.get("launch_bounds"),

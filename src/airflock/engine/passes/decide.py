@@ -75,8 +75,9 @@ def neighbours(build: Builder) -> None:
     inner += [combine(how[c], f"t{c}", f"choose(ok, t[{c}], {START[how[c]]})") for c in sums]
     after = [f"sum{c}[i] = t{c}" for c in sums]
     if plan.grid:
-        inner = [line.replace("integer(j)", "who[j]") for line in inner]
-        grid.neighbours(build, [line for line in lines if not line.startswith(f"{heard}")], outer, inner, after)
+        inner = [line for line in inner if line not in build.image(axes)]  # candidates come at their image
+        kept = [line for line in lines if not line.startswith((heard, *(f"m{a} =" for a in axes), "mv"))]
+        grid.neighbours(build, kept, outer, inner, sums)
         return
     outer += loop("j in range(m)", inner) + after
     build.stage("neighbours", "k_, n, m, time, late, row, whole, work, store", lines, build.each(outer))

@@ -1,69 +1,61 @@
 """Cell grid: neighbours by cells no smaller than the reach, sorted by counting; for many agents that see a short way.
 
-Agents of one cell share their candidates: those of the cells around it are copied side by side once, so that
-the loop over them runs in whole vectors. Candidates come in the order of cells and within a
-cell by index, whatever the number of threads. Only for perception without noise, delay and loss; there it equals
-all pairs but for the order of sums.
+A line is a row of cells along x. The agents in the cells around a line are copied side by side once, slab by slab (the
+cells of one x), so that the candidates of a cell are three slabs, one piece of memory, and the loop over them runs in
+whole vectors. In a periodic box they are copied at the image that they are met at. Whatever lies at random in memory
+(the agents of a cell, their sums) is kept in rows of one agent, so that it costs one cache line and not one per number.
+Candidates come in the order of slabs and within a cell by index, whatever the number of threads. Only for perception
+without noise, delay and loss; there it equals all pairs but for rounding and the order of sums.
 """
 
 from airflock.engine.passes.build import Builder, loop
 
 CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
+CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
+BLOCK = 8  # candidates taken at once
 
 
-def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], after: list[str]) -> None:
-    """Function `neighbours` over a grid: `before`, `inner` for each candidate j, then `after`, for each agent."""
+def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int]) -> None:
+    """Function `neighbours` over a grid: `before`, then `inner` for each candidate j, for each agent; sums to rows."""
     axes = build.plan.axes
     build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
-    lines = [*lines, *_sorted(build)]
-    fill = [f"box[{c}, found] = packed[{c}, s]" for c in range(2 * len(axes))] + ["who[found] = ident[s]", "found += 1"]
-    copy = loop("s in range(starts[cell], starts[cell + 1])", fill)
-    around = ["cell = (cz * count[1] + cy) * count[0] + cx", *copy]
-    for name, c in zip("xyz", range(3), strict=True):
-        inside = around
-        first, last = f"low_{name}", f"high_{name}"
-        around = loop(f"q{name} in range({first}, {last})", [f"c{name} = q{name} % count[{c}]", *inside])
-    edges = []
-    for c, a in enumerate("xyz"):
-        if build.plan.periodic:
-            edges += [f"low_{a} = o{a} - 1 if count[{c}] > 2 else 0", f"high_{a} = low_{a} + min(3, count[{c}])"]
-            edges += [f"low_{a} += count[{c}]; high_{a} += count[{c}]"]
-        else:
-            edges += [f"low_{a} = max(o{a} - 1, 0)", f"high_{a} = min(o{a} + 2, count[{c}])"]
-    names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
-    pad = loop("s in range(found, padded)", [f"box[{c}, s] = AWAY" for c in range(len(axes))] + [
-        f"box[{c + len(axes)}, s] = ZERO" for c in range(len(axes))
-    ] + ["who[s] = integer(-1)"])  # fmt: skip
-    meet = ["i = ident[e]", *before, *loop("j in range(padded)", inner), *after]
+    names = [*axes, *(f"v{a}" for a in axes)]
+    for c, name in enumerate(names):
+        before = [line.replace(f"m{name}[i]", f"packed[e, {c}]") for line in before]
+    who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
+    before = [line.replace("ii = integer(i)", "ii = ident[e]" if who else "") for line in before]
+    inner = [line.replace("integer(j) != ii", "(integer(q) != me) & (integer(q) < many)") for line in inner]
+    inner = [line.replace("integer(j) < ii", "who[j] < ii") for line in inner]
+    meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
+    # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
+    meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
+    meet += [f"totals[e, {k}] = t{c}" for k, c in enumerate(sums)]
     cell = [
-        "here = (oz * count[1] + oy) * count[0] + ox",
-        "if starts[here] == starts[here + 1]:",
-        "    continue",
-        *edges,
-        "found = 0",
-        *around,
-        "padded = found + (-found) % 16",
-        *pad,
+        "here = line * count[0] + ox",
+        *["if starts[here] == starts[here + 1]:", "    continue"],
+        "first = np.uint64(slab[ox]); many = integer(slab[ox + 3] - slab[ox])",
+        f"padded = -(-(slab[ox + 3] - slab[ox]) // {BLOCK}) * {BLOCK}",
         *loop("e in range(starts[here], starts[here + 1])", meet),
     ]
-    line = [
-        "oy = line % count[1]; oz = line // count[1]",
-        f"box = np.empty(({2 * len(axes)}, room), work.dtype); who = np.empty(room, np.int{build.plan.bits})",
-        *[f"{name} = box[{c}]" for c, name in enumerate(names)],
-        *loop("ox in range(count[0])", cell),
-    ]
-    head = "neighbours(k_, n, m, time, late, row, whole, work, store)"
-    build.function(head, lines, loop("line in prange(count[1] * count[2])", line), "return 0", parallel=True)
+    body = [*_slabs(build, who), *loop("ox in range(count[0])", cell)]
+    lines = [*lines, *_sorted(build, who), f"totals = np.empty((n, {max(1, len(sums))}), work.dtype)"]
+    lines += loop("line in prange(count[1] * count[2])", body)
+    back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
+        "e = place[i]", *[f"sum{c}[i] = totals[e, {k}]" for k, c in enumerate(sums)]
+    ])  # fmt: skip
+    lines += loop("chunk in prange(CHUNKS)", back)
+    lines = [line.replace("CHUNKS", str(CHUNKS)) for line in lines]
+    build.function("neighbours(k_, n, m, time, late, row, whole, work, store)", lines, "return 0", parallel=True)
 
 
 def _box(build: Builder) -> list[str]:
     """Lower corner, cell size (m) and number of cells per axis: of the periodic box, or around the flock."""
-    axes = build.plan.axes
+    axes, periodic = build.plan.axes, build.plan.periodic
     lines = ["low = np.zeros(3, work.dtype); size = np.ones(3, work.dtype); count = np.ones(3, np.int64)"]
     lines += ["width = np.ones(3, work.dtype); volume = ONE"]
     for c, a in enumerate(axes):
         lines += build.bind([a])
-        if build.plan.periodic:
+        if periodic:
             lines += [f"low[{c}] = -w.half_{a}; width[{c}] = w.half_{a} + w.half_{a}"]
         else:
             lines += ["least_ = FAR; most_ = -FAR"]
@@ -72,28 +64,81 @@ def _box(build: Builder) -> list[str]:
         lines += [f"volume *= most(width[{c}] / near, ONE)"]
     coarse = f"(volume / real({CELLS} * n)) ** real({1.0 / len(axes)})"
     lines += [f"side = near * most(ONE, {coarse})"]
+    fewest = 2 if periodic else 1  # an agent is met at two images of which at most one is in reach
     for c in range(len(axes)):
-        lines += [f"count[{c}] = max(1, int(width[{c}] / side))", f"size[{c}] = width[{c}] / real(count[{c}])"]
+        lines += [f"count[{c}] = max({fewest}, int(width[{c}] / side))", f"size[{c}] = width[{c}] / real(count[{c}])"]
     return lines
 
 
-def _sorted(build: Builder) -> list[str]:
-    """Agents sorted by cell: starts (first agent of each cell), ident (who it is), packed (position and velocity)."""
+def _sorted(build: Builder, who: bool) -> list[str]:
+    """Agents sorted by cell: starts (first of each cell), place (of each agent), packed (agent, position and velocity).
+
+    Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
+    """
     axes = build.plan.axes
-    lines = ["low, size, count = cells_of(n, near, row, work)", "cell_of = np.empty(n, np.int64)"]
-    lines += ["starts = np.zeros(count[0] * count[1] * count[2] + 1, np.int64)"]
-    place = ["c = 0"]
-    for c, a in reversed(list(enumerate(axes))):
-        lines += build.bind([a])
-        place += [f"c = c * count[{c}] + min(max(int(({a}[i] - low[{c}]) / size[{c}]), 0), count[{c}] - 1)"]
-    lines += loop("i in range(n)", [*place, "cell_of[i] = c; starts[c + 1] += 1"])
-    lines += ["most_in = 0"]
-    count = ["most_in = max(most_in, starts[c + 1])", "starts[c + 1] += starts[c]"]
-    lines += loop("c in range(len(starts) - 1)", count)
-    lines += [f"room = min(n, most_in * {3 ** len(axes)}) + 16"]
-    lines += ["fill = starts.copy()", f"ident = np.empty(n, np.int{build.plan.bits})"]
-    lines += [f"packed = np.empty(({2 * len(axes)}, n), work.dtype)"]
     names = [*axes, *(f"v{a}" for a in axes)]
-    lines += build.bind([f"v{a}" for a in axes])
-    put = ["d = fill[cell_of[i]]; fill[cell_of[i]] = d + 1; ident[d] = i"]
-    return lines + loop("i in range(n)", put + [f"packed[{c}, d] = {name}[i]" for c, name in enumerate(names)])
+    lines = [*build.bind(names), "low, size, count = cells_of(n, near, row, work)"]
+    lines += ["cells = count[0] * count[1] * count[2]", "starts = np.empty(cells + 1, np.int64)"]
+    lines += [f"fill = np.zeros((CHUNKS, cells), np.int32); packed = np.empty((n, {len(names)}), work.dtype)"]
+    lines += ["cell_of = np.empty(n, np.int32); place = np.empty(n, np.int32)"]
+    lines += [f"ident = np.empty(n, np.int{build.plan.bits})"] if who else []
+    inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
+    part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
+    at = {a: f"min(max(int(({a}[i] - low_{a}) * per_{a}), 0), top_{a})" for a in axes}
+    index = f"({at['z']} * count[1] + {at['y']})" if "z" in axes else at["y"]
+    count = [f"cell = {index} * count[0] + {at['x']}", "cell_of[i] = cell; fill[chunk, cell] += 1"]
+    lines += loop("chunk in prange(CHUNKS)", [*inside, *loop(part, count)])
+    add = ["held = fill[share, cell]; fill[share, cell] = total; total += held"]
+    lines += ["total = 0"]
+    lines += loop("cell in range(cells)", ["starts[cell] = total", *loop("share in range(CHUNKS)", add)])
+    lines += ["starts[cells] = total"]
+    put = ["cell = cell_of[i]; d = fill[chunk, cell]; fill[chunk, cell] = d + 1; place[i] = d"] + ["ident[d] = i"] * who
+    put += [f"packed[d, {c}] = {name}[i]" for c, name in enumerate(names)]
+    return lines + loop("chunk in prange(CHUNKS)", loop(part, put))
+
+
+def _slabs(build: Builder, who: bool) -> list[str]:
+    """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins)."""
+    axes, periodic = build.plan.axes, build.plan.periodic
+    names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
+    shifts = {f"h{a}": f" + shift_{a}" for a in axes} if periodic else {}
+    across = axes[1:]
+    lines = ["oy = line % count[1]; oz = line // count[1]", "room = 0"]
+    rows = ["base = " + ("(cz * count[1] + cy)" if "z" in axes else "cy") + " * count[0]"]
+    span = ["room += starts[base + count[0]] - starts[base]"]
+    ends = "room += starts[base + 1] - starts[base] + starts[base + count[0]] - starts[base + count[0] - 1]"
+    span += [ends] * periodic
+    lines += _around(build, across, rows + span, False)
+    lines += [f"box = np.empty(({len(names)}, room + {2 * BLOCK}), work.dtype)"]
+    lines += [f"who = np.empty(room + {2 * BLOCK}, np.int{build.plan.bits})"] if who else []
+    lines += [f"{name} = box[{c}]" for c, name in enumerate(names)]
+    lines += ["slab = np.zeros(count[0] + 3, np.int64); middle = np.zeros(count[0] + 1, np.int64); found = 0"]
+    copy = [f"{name}[found] = packed[s, {c}]{shifts.get(name, '')}" for c, name in enumerate(names)]
+    copy += ["who[found] = ident[s]"] * who + ["found += 1"]
+    own = "(qy == oy) & (qz == oz)" if "z" in axes else "qy == oy"
+    each = [*rows, f"if {own}:", "    middle[min(max(qx, 0), count[0])] = found"]
+    each += loop("s in range(starts[base + cx], starts[base + cx + 1])", copy)
+    first, last = ("-1", "count[0] + 1") if periodic else ("0", "count[0]")
+    wrap = ["cx = qx"]
+    if periodic:
+        lines += ["width_x = w.half_x + w.half_x"]
+        wrap = ["cx = (qx + count[0]) % count[0]", "shift_x = real((qx - cx) // count[0]) * width_x"]
+    slab = ["slab[qx + 1] = found", *wrap, *_around(build, across, each, True)]
+    lines += loop(f"qx in range({first}, {last})", slab)
+    lines += [f"slab[{'count[0] + 2' if periodic else 'count[0] + 1'}] = found"]
+    lines += [] if periodic else ["slab[count[0] + 2] = found"]
+    rest = [f"h{a}[s] = AWAY; hv{a}[s] = ZERO" for a in axes] + ["who[s] = integer(-1)"] * who
+    return lines + loop(f"s in range(found, found + {BLOCK})", rest)
+
+
+def _around(build: Builder, across: tuple[str, ...], body: list[str], shifted: bool) -> list[str]:
+    """Loops over the rows of cells beside a line, at cy (and cz), and how far their images are shifted."""
+    for a in across:
+        c = "xyz".index(a)
+        if build.plan.periodic:
+            at = [f"c{a} = (q{a} + count[{c}]) % count[{c}]"]
+            at += [f"shift_{a} = real((q{a} - c{a}) // count[{c}]) * (w.half_{a} + w.half_{a})"] * shifted
+            body = loop(f"q{a} in range(o{a} - 1, o{a} + 2)", [*at, *body])
+        else:
+            body = loop(f"q{a} in range(max(o{a} - 1, 0), min(o{a} + 2, count[{c}]))", [f"c{a} = q{a}", *body])
+    return body

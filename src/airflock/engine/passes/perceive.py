@@ -22,12 +22,12 @@ def perceive(build: Builder) -> None:
         for draw, kinds in enumerate(
             (("own_x", "own_y", "sent_x", "sent_y"), ("own_z", "sent_z"))[: plan.dimensions - 1]
         ):
-            lines += normals(build, "k", random.SENSOR + 256 * draw)
+            lines += normals(build, "k", random.SENSOR + 256 * draw, "e")
             for g, kind in enumerate(kinds):
                 who, a = kind.split("_")
                 q, u = f"{who}_q{a}", f"{who}_u{a}"
                 lines += build.bind([q, u])
-                lines += loop("i in range(m)", [f"{q}[i], {u}[i] = {step}({q}[i], {u}[i], g{g}[i], c.period, s)"])
+                lines += loop("i in range(m)", [f"{q}[i], {u}[i] = {step}({q}[i], {u}[i], e{g}[i], c.period, s)"])
         for a in axes:
             lines += build.bind([a, f"v{a}", f"m{a}", f"mv{a}"])
             lines += loop("i in range(m)", [f"m{a}[i] = {a}[i] + own_q{a}[i]", f"mv{a}[i] = v{a}[i] + own_u{a}[i]"])
@@ -46,18 +46,18 @@ def perceive(build: Builder) -> None:
     build.function("perceive(k, slot, m, row, whole, work, ring, words)", lines, "return 0")
 
 
-def normals(build: Builder, step: str, stream: int) -> list[str]:
-    """Four normal numbers per agent, in the rows g0..g3."""
+def normals(build: Builder, step: str, stream: int, row: str = "g") -> list[str]:
+    """Four normal numbers per agent, in rows of their own: those of the outer noise (g0..g3) serve two steps."""
     philox, pair = build.source.name(random.philox), build.source.name(random.normal_pair)
     return [
-        *build.bind(["g0", "g1", "g2", "g3"]),
+        *build.bind([f"{row}{c}" for c in range(4)]),
         "u0 = words[0]; u1 = words[1]; u2 = words[2]; u3 = words[3]",
         *loop(
             "i in range(m)",
             [f"u0[i], u1[i], u2[i], u3[i] = {philox}(i, {step}, {stream}, world, seed_low, seed_high)"],
         ),
-        *loop("i in range(m)", [f"g0[i], g1[i] = {pair}(u0[i], u1[i])"]),
-        *loop("i in range(m)", [f"g2[i], g3[i] = {pair}(u2[i], u3[i])"]),
+        *loop("i in range(m)", [f"{row}0[i], {row}1[i] = {pair}(u0[i], u1[i])"]),
+        *loop("i in range(m)", [f"{row}2[i], {row}3[i] = {pair}(u2[i], u3[i])"]),
     ]
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
 from airflock.papers.flights import Flights, Progress, progress_bar
-from airflock.papers.zapotecatl_2016 import verdicts
+from airflock.papers.zapotecatl_2016 import marks, verdicts
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -71,6 +71,7 @@ def recompute(
     for part in usual if only is None else (only,):
         found[part] = _fly(part, flights)
         claims += verdicts.claims(part, found[part], published().drop(COARSE_OFF if quick else []))
+        claims += marks.claims(flights) if part == "sequential" and not quick else []
     return claims, found
 
 

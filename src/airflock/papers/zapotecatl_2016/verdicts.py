@@ -14,7 +14,7 @@ NOISY_COLUMN = 10  # r_a in cm: there the order of updates changes the result
 ROW_0 = 0.02
 BANDS = {10: (0.55, 0.57), 20: (0.69, 0.70), 30: (0.69, 0.71), 40: (0.64, 0.67), 50: (0.49, 0.51)}  # quality at r_a = 0
 GOOD = (0.90, 0.945)
-STEP = {10: "; at dt = 1 ms, where the programs were measured, it is 0.554 (6 seeds, SD 0.003)"}  # sequential
+COUNT = {10: "; the program misses colliding boids in chains, see sequential.band.10.program_count"}
 
 
 def claims(part: str, flown: pd.DataFrame, figures: pd.DataFrame) -> list[Claim]:
@@ -72,7 +72,7 @@ def band(part: str, r_s: int, flown: pd.DataFrame) -> Claim:
     low, high = BANDS[r_s]
     found = statistics.mean(flown.loc[(r_s, 0), "quality"])
     inside = low <= round(found.ours, 3) <= high
-    reason = "" if inside else f"{found.ours:.3f} lies outside" + STEP.get(r_s, "")
+    reason = "" if inside else f"{found.ours:.3f} lies outside" + COUNT.get(r_s, "")
     return Claim(
         id=f"{part}.band.{r_s}",
         statement=f"quality at r_s = {r_s} cm without alignment",
@@ -105,21 +105,36 @@ def good_region(part: str, means: pd.DataFrame) -> Claim:
 
 def minima(part: str, flown: pd.DataFrame, means: pd.DataFrame) -> list[Claim]:
     """The minima that the captions of Figs 4-6 quote."""
-    floor = means["f_collision"]
     return [
         _minimum(part, "extension_cm", (0, 30), 1.64, "Fig. 4, caption", flown, means),
         _minimum(part, "polarization_deg", (50, 50), 0.79, "Fig. 5, caption", flown, means),
-        Claim(
-            id=f"{part}.minimum.f_collision",
-            statement="least frequency of collision",
-            source="Fig. 6, caption",
-            test="between 1e-4, the paper's, and 1e-3: it is the overlap of the random start, and its place is chance",
-            published=1e-4,
-            ours=float(floor.min()),
-            runs=int(flown.loc[floor.idxmin()].shape[0]),
-            **judged(0.5e-4 <= floor.min() <= 1e-3, f"at (r_s, r_a) = {_cm(floor.idxmin())}"),
-        ),
+        collision_floor(part, flown),
     ]
+
+
+def collision_floor(part: str, flown: pd.DataFrame) -> Claim:
+    """The least frequency of collision: the overlap of the random start, as most flights have it.
+
+    The median over the flights of a configuration, because one flight of fifteen with a pair that sticks together has
+    a hundred times as much; runs of the authors' program do the same.
+    """
+    groups = flown["f_collision"].groupby(level=[0, 1])
+    middle, means = groups.median(), groups.mean()
+    place = middle.idxmin()
+    found = statistics.median(flown.loc[place, "f_collision"])
+    return Claim(
+        id=f"{part}.minimum.f_collision",
+        statement="least frequency of collision",
+        source="Fig. 6, caption",
+        test="least median over the flights of a configuration between 1e-4, the paper's, and 1e-3",
+        published=1e-4,
+        **found.fields(),
+        **judged(
+            0.5e-4 <= found.ours <= 1e-3,
+            f"at (r_s, r_a) = {_cm(place)}, its place is chance; the least mean, {means.min():.2g} at "
+            f"{_cm(means.idxmin())}, holds flights with a pair that sticks together",
+        ),
+    )
 
 
 def _minimum(

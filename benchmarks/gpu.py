@@ -1,6 +1,6 @@
 """Airflock on a GPU against hand-written CUDA C, interleaved: builds, checks and times everything in one call.
 
-    python benchmarks/cuda.py [--quick] [--json FILE] [--trial flock.cu]
+    python benchmarks/gpu.py [--quick] [--json FILE] [--trial flock.cu]
 
 Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; takes about six minutes, --quick one. The reference is built
 with NVRTC, which comes with numba-cuda; --trial also builds and runs a program of its own with nvcc. Only ratios of
@@ -256,7 +256,7 @@ def big_flock(agents: int) -> dict[str, Any]:
     from airflock.engine.cuda.crowd import Crowd
 
     scenario = load("zapotecatl_2016/literal", crowd_settings(agents))
-    crowd = Crowd(scenario, seed=1)
+    crowd = Crowd(scenario, plan_of(scenario), seed=1)
     crowd.advance(5)
     device.runtime().synchronize()
     times = []

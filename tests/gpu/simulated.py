@@ -22,11 +22,13 @@ from airflock.engine.tables import tables  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
 from flocks import IDEAL, ISLANDS, PENTAGON, scenario  # noqa: E402
 
-COMMON = {"duration": 1.2, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}
+COMMON = {"duration": 0.8, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}
 COMMON |= {"start.separation": 4.0, "agents": 5}
 # model or preset, keys, threads per agent, states in registers
 CASES = {
-    "paper": ("vasarhelyi_2018", {"world.walls": "nearest_per_axis", "metrics.r_coll": 9.0}, 1, True),
+    "paper": ("vasarhelyi_2018", {
+        "world.walls": "nearest_per_axis", "metrics.r_coll": 9.0, "sensors.period": 0.15,
+    }, 1, True),
     "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
     "storm": ("viragh_2014", {
         "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
@@ -43,20 +45,20 @@ CASES = {
     "silo": ("viragh_2014", IDEAL | {"world.dimensions": "3", "world.arena": "circle"}, 1, True),
     "table": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4}, 1, False),
     "couzin": ("couzin_2002/swarm", {"agents": 5, "duration": 1.0}, 1, True),
-    "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 8.0, "world.side": 3.0}, 1, True),
+    "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 5.0, "world.side": 3.0}, 1, True),
     "groups": ("zapotecatl_2016/best", {
-        "agents": 4, "dt": 0.02, "duration": 0.08, "metrics.kind": "groups", "metrics.r_cluster": 0.3,
+        "agents": 4, "dt": 0.02, "duration": 0.06, "metrics.kind": "groups", "metrics.r_cluster": 0.3,
         "start.speed": 0.1,
     }, 2, False),
     "together": ("zapotecatl_2016/best", {
-        "agents": 5, "dt": 0.02, "duration": 0.16, "update": "synchronous", "metrics.kind": "groups",
+        "agents": 5, "dt": 0.02, "duration": 0.1, "update": "synchronous", "metrics.kind": "groups",
         "metrics.r_cluster": 0.3, "start.speed": 0.1,
     }, 1, True),
     "herd": ("kidger/city", {
-        "agents": 3, "duration": 0.4, "scene.blocks": 2, "goals.kind": "points", "goals.points": [[5.0, 5.0, 9.0]],
+        "agents": 3, "duration": 0.3, "scene.blocks": 2, "goals.kind": "points", "goals.points": [[5.0, 5.0, 9.0]],
         "goals.role": "herd", "scene.later": 0.5, "scene.later_until": 0.3,
     }, 1, True),
-    "city": ("kidger/city", {"agents": 3, "duration": 0.4, "scene.blocks": 3, "goals.count": 2}, 1, True),
+    "city": ("kidger/city", {"agents": 3, "duration": 0.3, "scene.blocks": 3, "goals.count": 2}, 1, True),
 }  # fmt: skip
 
 

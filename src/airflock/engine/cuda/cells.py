@@ -1,0 +1,183 @@
+"""Cells: kernels of one big flock, whose neighbours lie in the cells around each agent.
+
+Six launches per decision: agents are counted per cell, the counts are summed up (two launches), agents are listed by
+cell and copied in the order of cells, within a cell by their number; then each meets its neighbours, decides and moves.
+So the order of every sum, and with it every bit, is the same in each run. Only for perception without noise, delay and
+loss.
+"""
+
+from typing import Any
+
+from airflock.core import random
+from airflock.core.maths import norm
+from airflock.engine.cuda.build import CudaBuilder
+from airflock.engine.cuda.shape import Shape
+from airflock.engine.cuda.sorting import SORT
+from airflock.engine.passes import decide, move, scene
+from airflock.engine.passes.build import branch, loop
+from airflock.engine.passes.move import ATTEMPTS, beyond
+from airflock.engine.plan import WHOLE, Plan
+from airflock.world import start as start_rules
+
+NEAR = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
+COMMON = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links", "box", "count")
+AROUND = (
+    "for qz in range(low_z, high_z):",
+    "for qy in range(low_y, high_y):",
+    "for part in range(2):",
+    "line = ((qz % count[2]) * count[1] + qy % count[1]) * count[0]; first = low_x if part == 0 else again_low; "
+    "last = high_x if part == 0 else again_high",
+)
+
+
+def crowd(plan: Plan, simulated: bool = False) -> str:
+    """Text of the driver of one big flock."""
+    threads = 4 if simulated else 128
+    build = CellBuilder(plan, Shape(32, 1, threads, simulated=simulated))
+    decide.neighbours(build)
+    decide.boundaries(build)
+    decide.decide(build)
+    move.move(build)
+    options = "fastmath=True" + ("" if simulated else ", cache=True")
+    kernels = [SORT.format(options=options, scan=8 if simulated else 1024, near=NEAR)]
+    kernels += ["\n".join(_kernel(options, "begin", "near", "rest", *COMMON, body=_begin(build)))]
+    given = ("near", "rest", "sorted_", "rest_sorted", "starts", "meet", "step", *COMMON)
+    kernels += ["\n".join(_kernel(options, "advance", *given, body=_advance(build)))]
+    parts = [build.head, *build.source.blocks, *build.functions, *kernels]
+    constants = [f"REST = {rest_columns(plan)}", f"SCAN = {8 if simulated else 1024}"]
+    return "\n\n".join([*parts, *constants]) + "\n"
+
+
+def rest_columns(plan: Plan) -> int:
+    """Columns that only the agent itself reads: command and the model's memory, in whole vectors."""
+    return -(-(3 + len(getattr(plan.model.Memory, "_fields", ()))) // 4) * 4
+
+
+class CellBuilder(CudaBuilder):
+    """Pair loops run over the cells around an agent; agent i has the number that the table gives it."""
+
+    def columns(self) -> dict[str, tuple[str, int]]:
+        """What neighbours read of each other."""
+        found = {name: ("sorted_", c) for c, a in enumerate("xyz") for name in (a, f"h{a}")}
+        return found | {f"hv{a}": ("sorted_", 4 + c) for c, a in enumerate("xyz")}
+
+    def cells(self) -> tuple[str, ...]:
+        """Lines around a pair loop."""
+        return AROUND
+
+    def prepared(self, name: str, lines: list[str]) -> list[str]:
+        """Numbers of agents instead of places in the table; noise of an odd step is drawn again."""
+        lines = [
+            line.replace("integer(j)", "sorted_[j, 3]").replace("ii = integer(i)", "ii = real(i)") for line in lines
+        ]
+        return [line.replace("if step % 2 == 0:", "if step >= 0:") for line in lines]
+
+
+def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[str]:
+    return [f"@cuda.jit({options})", f"def {name}({', '.join(arguments)}):", *(f"    {line}" for line in body)]
+
+
+def _common(build: CellBuilder) -> list[str]:
+    """What every kernel of a flock knows."""
+    wide = {"seed_low": "u32", "seed_high": "u32"}
+    lines = [f"{w if w != 'ring' else 'slots'} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
+    offset = 0
+    for letter, fields in build.plan.records.items():
+        kind = build.source.record(letter.upper() * 2, fields)
+        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
+        offset += len(fields)
+    local = f"np.float{build.plan.bits}"
+    lines += ["n = agents; sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
+    lines += [f"gust = cuda.local.array(3, {local})", f"aim = cuda.local.array(4, {local})"]
+    lines += [f"near_ = cuda.local.array({scene.NEAR}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
+    names = {"near": "near_", "goals": "edges", "reached": "aim", "later": "edges"}
+    return [*lines, f"scene = ({', '.join(names.get(part, part) for part in scene.PARTS)})"]
+
+
+def _begin(build: CellBuilder) -> list[str]:
+    """Every agent at a random place, whoever else is there."""
+    plan, axes = build.plan, build.plan.axes
+    philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
+    spread = build.source.name(start_rules.spread)
+    draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
+    draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
+    draw += [f"free = {beyond(build).replace(', w,', ', row_w,')} <= ZERO"]
+    if plan.start == "ball":
+        draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
+    draw += branch("free", ["placed = True", "break"])
+    turn = [f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)"]
+    turn += [f"gx, gy = {pair}(w0, w1); gz, g_ = {pair}(w2, w3)", f"gz = {build.z('gz')}"]
+    turn += [f"f = row_w.speed / {build.source.name(norm)}(gx, gy, gz)", "vx = f * gx; vy = f * gy; vz = f * gz"]
+    body = ["i = slot; placed = False; sx = ZERO; sy = ZERO; sz = ZERO; vx = ZERO; vy = ZERO; vz = ZERO"]
+    body += [*loop(f"attempt in range({ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
+    put = ("sx", "sy", "sz", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
+    body += [f"near[i, {c}] = {value}" for c, value in enumerate(put)]
+    starts = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
+    values = ["ZERO"] * 3 + [f"real({s})" for s in starts]
+    body += [f"rest[i, {c}] = {v}" for c, v in enumerate(values + ["ZERO"] * (rest_columns(plan) - len(values)))]
+    return [*_common(build), *branch("slot < n", body)]
+
+
+def _advance(build: CellBuilder) -> list[str]:
+    """One step of one agent: from the sorted tables where it decides, else from the tables as they are."""
+    plan, axes = build.plan, build.plan.axes
+    memory = len(getattr(plan.model.Memory, "_fields", ()))
+    registers = sorted({r for s in build.stages.values() for r in (*s.arguments, *s.results) if r.endswith("_i")})
+    state = {f"{a}_i": ("near", c) for c, a in enumerate(axes)} | {
+        f"v{a}_i": ("near", 4 + c) for c, a in enumerate(axes)
+    }
+    state |= {f"c{a}_i": ("rest", c) for c, a in enumerate(axes)} | {
+        f"mem{c}_i": ("rest", 3 + c) for c in range(memory)
+    }
+    sorted_ = {"near": "sorted_", "rest": "rest_sorted"}
+    body = ["time = real(step) * row_c.dt; answer = ZERO; gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    body += ["counts[0] = 0; counts[1] = 0"]
+    body += [f"{r} = {'u32(0)' if r[0] == 'u' and r[1].isdigit() else 'ZERO'}" for r in registers if r not in state]
+    load = [f"{name} = {table}[slot, {c}]" for name, (table, c) in state.items()]
+    fetch = [f"{name} = {sorted_[table]}[slot, {c}]" for name, (table, c) in state.items()]
+    meet = ["i = integer(sorted_[slot, 3])", *fetch, *_edges(build)]
+    meet += ["number = step // decide_every"]
+    meet += [build.stages[s].call(k_="number") for s in ("neighbours", "boundaries", "decide") if s in build.stages]
+    body += ["i = integer(near[slot, 3])", *load, *branch("meet != 0", meet), build.stages["move"].call()]
+    store = [f"{table}[slot, {c}] = {name}" for name, (table, c) in state.items()]
+    return [*_common(build), *branch("slot < n", [*body, *store, "near[slot, 3] = real(i)"])]
+
+
+def _edges(build: CellBuilder) -> list[str]:
+    """Cells around the own one: along z and y from low to high, along x in one or, across an edge, two runs."""
+    lines = []
+    for c, a in enumerate("xyz"):
+        own = f"{a}_i" if a in build.plan.axes else "ZERO"
+        lines += [f"o{a} = cell_along({own}, box[{c}], box[{3 + c}], count[{c}])", f"many = count[{c}]"]
+        if not build.plan.periodic:
+            lines += [f"low_{a} = max(o{a} - 1, 0); high_{a} = min(o{a} + 2, many)"]
+        elif a == "x":
+            lines += ["low_x = max(ox - 1, 0) if many > 2 else 0; high_x = min(ox + 2, many) if many > 2 else many"]
+        else:
+            lines += [f"low_{a} = o{a} - 1 + many if many > 2 else 0; high_{a} = low_{a} + 3 if many > 2 else many"]
+    lines += ["again_low = 0; again_high = 0"]
+    if build.plan.periodic:
+        lines += branch("count[0] > 2 and ox == 0", ["again_low = count[0] - 1; again_high = count[0]"])
+        lines += branch("count[0] > 2 and ox == count[0] - 1", ["again_high = 1"])
+    return lines
+
+
+def signatures(bits: int) -> dict[str, tuple[Any, ...]]:
+    """Numba types of the arguments of every kernel of a crowd."""
+    from numba import types
+
+    real = types.float32 if bits == 32 else types.float64
+    whole, word = types.int32, types.uint32
+    line, table = types.Array(real, 1, "C"), types.Array(real, 2, "C")
+    wholes, words, numbers = (types.Array(kind, 1, "C") for kind in (whole, word, types.int64))
+    spans = types.Array(types.int64, 2, "C")
+    common = (line, numbers, table, table, spans, table, table, spans, line, wholes)
+    return {
+        "count_agents": (table, line, wholes, wholes, wholes, wholes),
+        "sum_within": (wholes, words, wholes),
+        "sum_before": (wholes, words, wholes),
+        "list_agents": (table, wholes, wholes, words, wholes, wholes),
+        "copy_agents": (table, table, wholes, words, wholes, table, table),
+        "begin": (table, table, *common),
+        "advance": (*[table] * 4, words, whole, whole, *common),
+    }

@@ -1,0 +1,130 @@
+"""Rows of agents, as the text of a stage names them, in the hands of one thread: registers and shared tables."""
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from airflock.engine.cuda.shape import Shape
+
+PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
+
+
+@dataclass
+class Context:
+    """What lowering has to know.
+
+    shape    : layout of a flock
+    rows     : names that stand for rows of the work table
+    columns  : row → (shared table, column) for rows that other agents read
+    pair_how : how a total of the pair loop is reduced over the threads of one agent, by its name
+    renamed  : free names that the kernel calls otherwise
+    turn     : one agent i at a time, for all threads
+    carried  : totals stay with each thread instead of being reduced over the block
+    cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
+    alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
+    """
+
+    shape: Shape
+    rows: set[str]
+    columns: dict[str, tuple[str, int]]
+    pair_how: dict[str, str] = field(default_factory=dict)
+    renamed: dict[str, str] = field(default_factory=dict)
+    turn: bool = False
+    carried: bool = False
+    alone: bool = False
+    cells: tuple[str, ...] = ()
+
+
+def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
+    """Statements of a text."""
+    return ast.parse(lines if isinstance(lines, str) else "\n".join(lines)).body
+
+
+class Bound(ast.NodeTransformer):
+    """Drops statements that only take a row or a part of a tuple of arrays: the kernel holds them by name."""
+
+    def __init__(self, context: Context):
+        self.known = ("words", "scene") if context.shape.registers else ("scene",)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
+        """An assignment."""
+        source = node.value.value if isinstance(node.value, ast.Subscript) else None
+        return None if isinstance(source, ast.Name) and source.id in self.known else node
+
+
+class Others(ast.NodeTransformer):
+    """Rows of another agent: columns of the shared tables."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """An element of a row or table."""
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Name) and node.slice.id == "j":
+            name = node.value.id
+            if name in self.context.columns and self.context.shape.registers:
+                table, column = self.context.columns[name]
+                pair = ast.Tuple([ast.Name("j", ast.Load()), ast.Constant(column)], ast.Load())
+                return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
+            if name not in self.context.rows or name in ("heard", "age") or name.startswith("eh"):
+                return ast.Name(f"{name}_j", node.ctx)  # known of this pair alone
+        return node
+
+
+class Everyone(ast.NodeTransformer):
+    """A loop over all agents in the shared table, for a thread that looks at them one after another."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """An element of a row or table."""
+        if isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Name) and node.slice.id == "i":
+            table, column = self.context.columns[node.value.id]
+            pair = ast.Tuple([ast.Name("every", ast.Load()), ast.Constant(column)], ast.Load())
+            return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """A name."""
+        return ast.Name("every", node.ctx) if node.id == "i" else node
+
+
+class Registers(ast.NodeTransformer):
+    """Rows of the own agent: registers."""
+
+    def __init__(self, context: Context):
+        self.context = context
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """An element of a row or table."""
+        self.generic_visit(node)
+        if not isinstance(node.value, ast.Name):
+            return node
+        name, place = node.value.id, node.slice
+        if name == "values" and isinstance(place, ast.Constant):
+            return ast.Name(f"value{place.value!s}", node.ctx)
+        if not self.context.shape.registers:
+            return node
+        if isinstance(place, ast.Name) and place.id == "i" and name in self.context.rows:
+            return ast.Name(f"{name}_i", node.ctx)
+        if name in PER_AGENT_TABLES and isinstance(place, ast.Tuple) and isinstance(place.elts[0], ast.Constant):
+            return ast.Name(f"{PER_AGENT_TABLES[name]}{place.elts[0].value!s}_i", node.ctx)
+        return node
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt:
+        """An assignment."""
+        # a row under another name: gx_ = g0 if step % 2 == 0 else g2
+        carried = self.context.shape.registers and self.context.carried
+        if carried and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+            value = node.value
+            parts = [value.body, value.orelse] if isinstance(value, ast.IfExp) else [value]
+            if all(isinstance(part, ast.Name) and part.id in self.context.rows for part in parts):
+                for part in (*parts, node.targets[0]):
+                    self.context.rows.add(part.id)  # type: ignore[attr-defined]
+                    part.id += "_i"  # type: ignore[attr-defined]
+                return node
+        self.generic_visit(node)
+        return node

@@ -1,0 +1,131 @@
+"""The committed report: claims.toml, README.md and figures in papers/dimock_2003/."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airflock import __version__, atomic
+from airflock.papers import claims as records
+from airflock.papers.claims import VERDICTS, Claim
+from airflock.papers.dimock_2003 import TITLE, recompute
+from airflock.papers.dimock_2003.flights import Flight
+from airflock.papers.dimock_2003.units import FOOT, FT_LBF
+
+COMMAND = "airflock paper dimock_2003"
+WORDS = (
+    ("static.", "Formations that stand still", "The unit of the fitness, bounds, and what selfishness costs."),
+    (
+        "controller.",
+        "The published controller flown again",
+        "Eqs 1 and 2 of the surviving scan are illegible. C1 and 1/n weights are reconstructions, fitted to what the "
+        "paper says its controller does, and not read from it; the spacing of the start is not printed either.",
+    ),
+    ("ga.", "The genetic algorithm, Figs 5-8", "A V of 5 by 6.5 ft; gradients with the others' circulations held."),
+    ("robust.", "A sound fitness", "V, tight, wide, column, random and 3-D starts with noise; 60 s; CMA-ES."),
+)
+
+
+def reproduce(folder: Path, threads: int | None = None) -> list[Claim]:
+    """Compute everything and write the report."""
+    claims, found = recompute(None, False, None, threads, None)
+    write(folder, claims, found)
+    return claims
+
+
+def write(folder: Path, claims: list[Claim], found: dict[str, Any]) -> None:
+    """Write claims.toml, README.md and the figures into a folder."""
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    if "ga" in found:
+        convergence(figures / "fig5.png", found["ga"])
+        for name, (number, flight) in {"early": (6, "early"), "midway": (7, "midway"), "final": (8, "final")}.items():
+            traces(figures / f"fig{number}.png", found["ga"].flights[flight], f"Fig. {number}: best-ever, {name}")
+    if "robust" in found:
+        front(figures / "pareto.png", found["robust"])
+    header = {"paper": TITLE, "command": COMMAND, "version": __version__, "precision": "32 bits"}
+    records.write_claims(folder / "claims.toml", claims, header)
+    atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1], sorted(figures.glob("*"))))
+
+
+def page(claims: list[Claim], figures: list[Path]) -> str:
+    """README.md: verdicts, tables and figures."""
+    count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
+    lines = [
+        f"# {TITLE}", "", f"`{COMMAND}` computes all this again; `python papers/dimock_2003/reproduce.py` also "
+        "rewrites this folder. Numbers are SI (W per bird); ft lbf/s stand beside them.", "",
+        f"**{count['reproduced']} reproduced, {count['not reproduced']} not reproduced, "
+        f"{count['finding']} findings.**", "",
+    ]  # fmt: skip
+    for start, title, words in WORDS:
+        part = [claim for claim in claims if claim.id.startswith(start)]
+        if part:
+            lines += [f"## {title}", "", words, "", records.markdown(part)]
+    lines += [f"![{path.stem}](figures/{path.name})\n" for path in figures]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _axes(title: str, rows: int = 1) -> Any:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(1, rows, figsize=(5.5 * rows, 4.2), layout="constrained")
+    figure.suptitle(title)
+    return figure, axes
+
+
+def _save(figure: Any, path: Path) -> None:
+    from matplotlib import pyplot
+
+    figure.savefig(path, dpi=110)
+    pyplot.close(figure)
+
+
+def convergence(path: Path, run: Any) -> None:
+    """Best-ever and mean fitness over the generations, like Fig. 5."""
+    figure, axes = _axes("Fig. 5: best-ever and average fitness")
+    axes.plot(-np.array(run.best) / FT_LBF, label="best-ever")
+    axes.plot(-np.array(run.mean) / FT_LBF, "--", label="average of those that fly on")
+    axes.axhline(-9.8, color="0.6", linewidth=0.8, label="published best")
+    axes.set(xlabel="generation", ylabel="fitness, ft lbf/s per bird")
+    axes.legend()
+    _save(figure, path)
+
+
+def traces(path: Path, flight: Flight, title: str) -> None:
+    """Traces in the frame of the flock, and the mean induced drag over time, like Figs 6-8."""
+    from airflock.aero import wing as wings
+    from airflock.papers.dimock_2003.static import Air
+    from airflock.scenarios.files import load
+
+    wing: wings.Parameters = load("dimock_2003/published").wing
+    air = Air(wing)
+    figure, (left, right) = _axes(title, 2)
+    x, y = flight.frames[:, 0] / FOOT, flight.frames[:, 1] / FOOT
+    for i in range(x.shape[1]):
+        left.plot(y[:, i], x[:, i], linewidth=0.8)
+        left.plot(y[0, i], x[0, i], "^", color="0.4", markersize=5)
+        left.plot(y[-1, i], x[-1, i], "ko", markersize=4)
+    left.set(xlabel="aside, ft", ylabel="ahead, ft (frame of the air)", aspect="equal")
+    every = range(0, len(x), 2)
+    cells = [np.round(flight.frames[k, :3].T.astype(float) / air.h) * air.h for k in every]
+    drag = [air.powers(places).mean() / wing.speed for places in cells]
+    right.plot([0.1 * k for k in every], drag)
+    right.set(xlabel="time, s", ylabel="mean induced drag, N")
+    _save(figure, path)
+
+
+def front(path: Path, found: Any) -> None:
+    """Power against collision rate: every candidate of the search, and the three controllers on held-out starts."""
+    figure, axes = _axes("Power and collisions over 60 s")
+    powers, rates = zip(*found.front, strict=True)
+    axes.plot(powers, rates, ".", color="0.7", label="candidates, training starts")
+    for name, flights in found.flights.items():
+        alive = [f.power / FT_LBF for f in flights if not f.collided]
+        rate = 1.0 - len(alive) / len(flights)
+        axes.plot(np.mean(alive) if alive else np.nan, rate, "o", markersize=9, label=f"{name}, held out")
+    axes.set(xlabel="mean power of those that survive, ft lbf/s per bird", ylabel="share that collides")
+    axes.legend()
+    _save(figure, path)

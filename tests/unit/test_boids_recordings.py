@@ -1,0 +1,42 @@
+"""Metrics of a recording with nobody, one agent or missing values only: a value or an error, never a silent NaN."""
+
+import math
+
+import numpy as np
+import pytest
+
+from airflock.errors import RecordingError
+from airflock.recordings.layout import dataset
+from airflock.recordings.scores import measure
+
+BY = {"metrics.kind": "zapotecatl", "metrics.max_e": 2.25}
+
+
+def recording(times=3, agents=1, fill=0.3):
+    frames = np.full((times, 9, agents), fill)
+    return dataset(frames, 3, 0.1, {}, "acceleration")
+
+
+def test_one_agent_is_in_nobody_s_way():
+    found, course = measure(recording(), BY)
+    assert found["extension_cm"] == 0.0
+    assert found["polarization_deg"] == pytest.approx(0.0, abs=1e-3)
+    assert found["f_collision"] == 0.0
+    assert found["quality"] == pytest.approx(1.0, abs=1e-6)
+    assert all(math.isfinite(value) for value in found.values())
+    assert np.isfinite(course.to_numpy()).all()
+
+
+@pytest.mark.parametrize("settings", [{"agents": 0}, {"times": 0}])
+def test_an_empty_recording_is_refused(settings):
+    with pytest.raises(RecordingError, match="position is empty"):
+        measure(recording(**settings), BY)
+
+
+def test_missing_values_are_refused_and_named():
+    with pytest.raises(RecordingError, match=r"100\.0% of the positions are missing, first agent_0 at t = 0 s"):
+        measure(recording(agents=4, fill=np.nan), BY)
+    holed = recording(agents=4)
+    holed["position"][2, 1, 0, 3] = np.nan
+    with pytest.raises(RecordingError, match=r"first agent_3 at t = 0\.2 s"):
+        measure(holed, BY)

@@ -1,0 +1,78 @@
+"""Verbs evolve and harden from the command line, with real but tiny flights."""
+
+import json
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+import tomllib
+
+SHORT = ["--duration", "2", "--agents", "10"]
+NAME = "vasarhelyi_2018/4ms"
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "airflock", *map(str, arguments)]
+
+
+def airflock(*arguments):
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
+
+
+def landed(folder):
+    file = folder / "evaluations.sqlite"
+    if not file.exists():
+        return 0
+    try:
+        with sqlite3.connect(f"file:{file}?mode=ro", uri=True) as connection:
+            return connection.execute("SELECT count(*) FROM flight").fetchone()[0]
+    except sqlite3.OperationalError:
+        return 0  # not yet made
+
+
+def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path):
+    asked = ["evolve", NAME, "--population", 4, "--generations", 2, *SHORT, "--json", "--out", tmp_path / "a"]
+    done = airflock(*asked)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["working_ranges"]["candidates"] == 8 and found["fitness"]["seeds"] == 100
+    assert tomllib.loads((tmp_path / "a" / "result.toml").read_text())["parameters"] == found["parameters"]
+    flown = airflock("run", tmp_path / "a" / "best.toml", "--json", "--first-seed", 3)
+    assert flown.returncode == 0 and "fitness" in json.loads(flown.stdout)["runs"][0]
+    again = airflock(*asked)
+    assert again.returncode == 2 and "continue it with --resume" in again.stderr
+    resumed = json.loads(airflock(*asked, "--resume").stdout)
+    assert resumed["parameters"] == found["parameters"] and resumed["fitness"] == found["fitness"]
+    out = tmp_path / "flyable.toml"
+    hardened = airflock("harden", tmp_path / "a", "--out", out, "--seeds", 5, "--json")
+    assert hardened.returncode == 0, hardened.stderr
+    steps = json.loads(hardened.stdout)["steps"]
+    assert [step["name"] for step in steps][:2] == ["optimum", "p_rep up"] and steps[0]["cost"] == [0.0, 0.0, 0.0]
+    assert airflock("validate", out).returncode == 0
+
+
+def test_ctrl_c_ends_with_one_line_and_keeps_what_has_landed(tmp_path):
+    asked = command("evolve", NAME, "--generations", 5000, *SHORT, "--out", tmp_path / "a")
+    running = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while landed(tmp_path / "a") < 50 and running.poll() is None:
+        time.sleep(0.05)
+    running.send_signal(signal.SIGINT)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode == 2 and told.count("\n") == 1, told
+    assert "flights of the search are stored in" in told and "continue with --resume" in told
+    assert landed(tmp_path / "a") >= 50
+
+
+def test_a_second_writer_is_refused_in_one_line(tmp_path):
+    asked = command("evolve", NAME, "--generations", 5000, *SHORT, "--out", tmp_path / "a")
+    running = subprocess.Popen(asked, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        while landed(tmp_path / "a") < 1 and running.poll() is None:
+            time.sleep(0.05)
+        second = subprocess.run([*asked, "--resume"], capture_output=True, text=True, timeout=120)
+        assert second.returncode == 2 and second.stderr.count("\n") == 1
+        assert f"another process (process {running.pid} on" in second.stderr
+    finally:
+        running.kill()
+        running.wait()
