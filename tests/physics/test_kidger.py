@@ -12,6 +12,7 @@ import airflock
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, Percept
 from airflock.engine.simulate import score_flights
+from airflock.metrics import fitness_kidger
 from airflock.models import kidger
 from airflock.world import goals
 
@@ -127,6 +128,15 @@ def test_a_shepherd_stands_behind_whom_it_drives():
     gone = goals.herd(0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0, 50.0, 60.0, 0.0, 40.0, 15.0, 20.0, 1e9)
     assert gone[:3] == pytest.approx((50.0, 75.0, 0.0))  # a stray is gathered first
     assert goals.herd(0.0, 0.0, 0.0, 60.0, 0.0, 0.0, 50.0, *[0.0] * 5, 1.0, 1.0, 20.0, 1.0).reached == 1.0
+
+
+def test_fitness_is_the_share_flocked_of_a_flight_without_faults_and_falls_with_each():
+    sound = {"flocked": 0.8, "goals": 5.0, "goals_reached": 5.0, "n_coll": 0.0, "n_env_coll": 0.0}
+    assert fitness_kidger.fitness(sound, 10, 120.0)["fitness"] == pytest.approx(0.8)
+    for fault in ({"goals_reached": 4.0}, {"n_coll": 3.0}, {"n_env_coll": 1.0}, {"flocked": 0.7}):
+        assert fitness_kidger.fitness(sound | fault, 10, 120.0)["fitness"] < 0.8
+    twice = fitness_kidger.fitness(sound | {"n_coll": 60.0}, 10, 120.0)  # three per agent and minute
+    assert twice["f_coll"] == pytest.approx(0.25)
 
 
 def flights(name, seeds, **keys):

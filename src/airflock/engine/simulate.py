@@ -13,7 +13,7 @@ from airflock.engine.plan import Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
-from airflock.metrics import fitness_dimock
+from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import SETS
 from airflock.scenarios.geometry import half_sizes
@@ -185,6 +185,8 @@ def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
     """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
     if scenario.metrics.kind == "dimock":
         return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
+    if scenario.metrics.kind == "kidger":
+        return {**values, **fitness_kidger.fitness(values, scenario.agents, scenario.flight.duration)}
     if scenario.metrics.kind != "vasarhelyi":
         return values
     return {**values, **fitness(values, scenario.agents, scenario.measured_by())}

@@ -8,6 +8,7 @@ from airflock.metrics import (
     environment,
     excursion,
     fitness_dimock,
+    fitness_kidger,
     fitness_vasarhelyi,
     flocked,
     groups,
@@ -51,6 +52,7 @@ GOALS = {
 # of every order parameter that is reported: its unit and what it means, from the modules that define them
 REPORTS: dict[str, tuple[str, str]] = (
     {name: about for found in SETS.values() for each in found for name, about in each.reports.items()}
+    | fitness_kidger.REPORTS
     | fitness_dimock.REPORTS
     | fitness_vasarhelyi.REPORTS
     | GOALS

@@ -52,7 +52,10 @@ def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float6
 
 def read(path: Path) -> Any:
     """Mesh of a file. Raises SceneError where it is missing, too large, of another format, empty or damaged."""
-    import trimesh
+    try:
+        import trimesh
+    except ModuleNotFoundError as fault:
+        raise SceneError(f"scene.file = {path}: meshes need trimesh; pip install 'airflock[scenes]'") from fault
 
     kind = path.suffix.lower().lstrip(".")
     if not path.is_file():

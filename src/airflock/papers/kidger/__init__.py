@@ -1,7 +1,8 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: shown there by videos, here by numbers.
 
 Parts: schemes (five ways to recombine, in a city and a forest), corners (thin walls), tuning (every radius and scale),
-presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), display (the wish).
+presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), display (its second
+wish).
 """
 
 from typing import Any
