@@ -58,3 +58,13 @@ def test_bad_input_for_particles_and_schools_is_one_line(preset, key, value, lin
         load(preset, {key: value})
     assert line in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
+
+
+def test_order_parameters_over_all_pairs_of_a_large_flock_are_announced():
+    large = {"agents": 100_000, "update": "synchronous"}
+    notes = load("zapotecatl_2016/best", large).notes
+    assert any("metrics.kind = 'zapotecatl' looks at all pairs of 100000 agents" in note for note in notes)
+    assert not any(
+        "all pairs" in note for note in load("zapotecatl_2016/best", {**large, "metrics.kind": "order"}).notes
+    )
+    assert not any("all pairs" in note for note in load("zapotecatl_2016/best").notes)

@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Model
+from airflock.metrics.registry import SETS
 from airflock.scenarios.geometry import largest_extension
 
 
@@ -58,3 +59,18 @@ def metric_faults(q: Any, world: Any) -> list[str]:
     if abs(q.sigma + q.gamma - 1.0) > 1e-9:
         faults.append(f"metrics.sigma + metrics.gamma = {q.sigma + q.gamma:g} is not 1")
     return faults
+
+
+MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
+
+
+def pair_notes(flight: Any, q: Any) -> list[str]:
+    """What order parameters over all pairs cost in a large flock: neighbours may be found by cells, these are not."""
+    paired = [item.name for item in SETS[q.kind] if item.pair is not None or item.cluster is not None]
+    if flight.agents < MANY or not paired:
+        return []
+    seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md
+    return [
+        f"metrics.kind = {q.kind!r} looks at all pairs of {flight.agents:g} agents ({', '.join(paired)}), about "
+        f"{seconds:.2g} s for each sample; metrics.kind = 'order' does not, a longer metrics.period looks less often"
+    ]

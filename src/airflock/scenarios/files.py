@@ -209,7 +209,7 @@ def _timing_faults(flight: Flight, period: float, metrics: Any) -> list[str]:
 
 def _notes(scenario: Scenario) -> list[str]:
     """What is rounded or cannot be meant, for a person to read; nothing here stops a flight."""
-    notes, dt = [], scenario.flight.dt
+    notes, dt = checks.pair_notes(scenario.flight, scenario.metrics), scenario.flight.dt
     times = {
         "sensors.period": scenario.sensors.period,
         "radio.delay": scenario.radio.delay,
