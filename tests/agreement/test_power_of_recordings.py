@@ -9,7 +9,14 @@ from airflock.recordings.layout import dataset
 from airflock.recordings.scores import aero_settings, measure
 from formations import FOOT, drags, vee, wing_of
 
-WING = {"wing.segments": "5", "wing.span": 2.0, "wing.chord": 0.4, "wing.speed": 12.0}
+WING = {
+    "wing.segments": "5",
+    "wing.span": 2.0,
+    "wing.chord": 0.4,
+    "wing.speed": 12.0,
+    "metrics.r_coll": 0.2,
+    "metrics.t_settle": 1.0,
+}
 
 
 def flown(places, heading, speed=12.0, dimensions=3):

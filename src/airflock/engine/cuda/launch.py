@@ -14,10 +14,12 @@ from airflock.engine.cuda.device import free_memory, multiprocessors, required, 
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.shape import Shape, shape_of
 from airflock.engine.passes.build import columns
+from airflock.engine.passes.flock import owners
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.errors import DeviceError
+from airflock.scenarios.wings import FORMATIONS
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
 SHARE = 0.9  # of the free memory that may be used
@@ -44,6 +46,7 @@ def fly_many(
 
     Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
     """
+    refuse(plan)
     required(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
@@ -62,6 +65,15 @@ def fly_many(
                 if done:
                     done()
     return [flown_by[number] for number in range(len(jobs))]
+
+
+def refuse(plan: Plan) -> None:
+    """Raise DeviceError for what only a processor flies: rules of the whole flock, start formations, early ends."""
+    found = [f"{owner.name}.{owner.kind} solves for the whole flock" for owner in owners(plan)]
+    found += [f"start.kind = {plan.start!r}"] if plan.start in FORMATIONS and not plan.given_start else []
+    found += ["metrics.stop = 'collision'"] if plan.stop else []
+    if found:
+        raise DeviceError(f"device = cuda: {found[0]}, which only the CPU does; choose device = cpu")
 
 
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:

@@ -55,6 +55,6 @@ def recompute(
         found["ga"] = ga.evolve(birds, quick)
         claims += ga.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
-        found["robust"] = robust.compare(birds, found["ga"].gains, seeds or (12 if quick else 60), quick)
+        found["robust"] = robust.compare(birds, found["ga"].gains, seeds or (12 if quick else 240), quick)
         claims += robust.claims(found["robust"])
     return claims, found

@@ -109,7 +109,7 @@ def traces(path: Path, flight: Flight, title: str) -> None:
         left.plot(y[0, i], x[0, i], "^", color="0.4", markersize=5)
         left.plot(y[-1, i], x[-1, i], "ko", markersize=4)
     left.set(xlabel="aside, ft", ylabel="ahead, ft (frame of the air)", aspect="equal")
-    every = range(0, len(x), 2)
+    every = range(len(x))
     cells = [np.round(flight.frames[k, :3].T.astype(float) / air.h) * air.h for k in every]
     drag = [air.powers(places).mean() / wing.speed for places in cells]
     right.plot([0.1 * k for k in every], drag)
