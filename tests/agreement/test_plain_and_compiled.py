@@ -79,7 +79,7 @@ def test_single_precision_differs_by_its_rounding(name, chaos, seed, plain_fligh
     plain, compiled = both(name, seed, 32, plain_flights)
     assert compiled.frames.dtype == np.float32
     # Positions of 50 m are known to 4 µm; the law's slopes make 1 mm of it in 10 s. A command is a short sum rescaled
-    # to v_flock, which magnifies its rounding. In the storm agents meet, and every encounter multiplies what went before.
+    # to v_flock, which magnifies its rounding. In the storm agents meet, and every encounter multiplies it.
     for component, margin in enumerate((1e-3, 1e-3, 2e-3, 2e-3, 2e-2, 2e-2)):
         np.testing.assert_allclose(
             compiled.frames[:, component], plain.frames[:, component], rtol=0.0, atol=chaos * margin
