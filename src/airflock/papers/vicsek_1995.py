@@ -60,7 +60,7 @@ def dense() -> dict[Any, Scenario]:
 
 
 def _fly(flights: Flights, title: str, scenarios: dict[Any, Scenario]) -> pd.DataFrame:
-    return flights.score(title, scenarios, flights.count(10, 3))
+    return flights.score(title, scenarios, flights.count(10, 3)).sort_index()
 
 
 def noise_claims(flown: pd.DataFrame) -> list[Claim]:

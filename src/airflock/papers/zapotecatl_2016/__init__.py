@@ -34,10 +34,13 @@ def configurations(preset: str, **settings: Any) -> dict[tuple[int, int], Scenar
 
 
 def published() -> pd.DataFrame:
-    """Figure 7 and the consistencies, digitised from the plots in the authors' slides; index (r_s, r_a) in cm."""
+    """Figure 7 and the consistencies, digitised from the plots in the authors' slides; index (r_s, r_a) in cm.
+
+    The index has no names, as that of flights: pandas joins indices of different rows by name only.
+    """
     text = resources.files(__package__).joinpath("figures.csv").read_text(encoding="utf-8")
     table = pd.DataFrame(list(csv.DictReader(text.splitlines()))).astype(float)
-    return table.astype({"r_s": int, "r_a": int}).set_index(["r_s", "r_a"])
+    return table.astype({"r_s": int, "r_a": int}).set_index(["r_s", "r_a"]).rename_axis([None, None])
 
 
 def run(

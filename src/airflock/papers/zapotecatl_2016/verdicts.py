@@ -15,6 +15,7 @@ ROW_0 = 0.02
 BANDS = {10: (0.55, 0.57), 20: (0.69, 0.70), 30: (0.69, 0.71), 40: (0.64, 0.67), 50: (0.49, 0.51)}  # quality at r_a = 0
 GOOD = (0.90, 0.945)
 COUNT = {10: "; the program misses colliding boids in chains, see sequential.band.10.program_count"}
+IN_TURN = "; the program moves one boid after another; an independent program moved synchronously has 0.49"
 
 
 def claims(part: str, flown: pd.DataFrame, figures: pd.DataFrame) -> list[Claim]:
@@ -142,6 +143,7 @@ def _minimum(
 ) -> Claim:
     found = statistics.mean(flown.loc[at, column])
     place: Any = means[column].idxmin()
+    note = IN_TURN if (part, column) == ("synchronous", "polarization_deg") else ""
     holds = abs(found.ours - value) <= 2.0 * (found.sd or 0.0)
     return Claim(
         id=f"{part}.minimum.{column}",
@@ -150,7 +152,7 @@ def _minimum(
         test="published value within 2 SD of single flights around our mean",
         published=value,
         **found.fields(),
-        **judged(holds, f"our minimum, {means[column].min():.3g}, is at {_cm(place)}"),
+        **judged(holds, f"our minimum, {means[column].min():.3g}, is at {_cm(place)}{note}"),
     )
 
 
