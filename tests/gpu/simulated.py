@@ -29,6 +29,10 @@ CASES = {
     "paper": ("vasarhelyi_2018", {
         "world.walls": "nearest_per_axis", "metrics.r_coll": 9.0, "sensors.period": 0.15,
     }, 1, True),
+    "stop": ("vasarhelyi_2018", {
+        "metrics.stop": "collision", "metrics.r_coll": 14.0, "start.separation": 15.0, "start.speed": 4.0, "agents": 8,
+        "metrics.period": 0.05,
+    }, 1, True),
     "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
     "storm": ("viragh_2014", {
         "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
