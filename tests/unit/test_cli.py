@@ -3,10 +3,11 @@
 import json
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
+
+from processes import hear_interrupts
 
 SHORT = ["--duration", "2", "--agents", "10"]
 
@@ -152,9 +153,8 @@ def test_interrupt_ends_with_one_line_and_status_2():
     import time
 
     command = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--seeds", "2000"]
-    # A shell that runs the tests in the background has them ignore SIGINT; a person's terminal does not.
-    listen = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=Path.home(), preexec_fn=listen) as running:
+    options = {"stderr": subprocess.PIPE, "text": True, "cwd": Path.home(), "preexec_fn": hear_interrupts}
+    with subprocess.Popen(command, **options) as running:
         try:
             time.sleep(4.0)
             running.send_signal(signal.SIGINT)

@@ -8,6 +8,8 @@ import sys
 import time
 import tomllib
 
+from processes import hear_interrupts
+
 SHORT = ["--duration", "2", "--agents", "10"]
 NAME = "vasarhelyi_2018/4ms"
 
@@ -54,7 +56,8 @@ def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path):
 
 def test_ctrl_c_ends_with_one_line_and_keeps_what_has_landed(tmp_path):
     asked = command("evolve", NAME, "--generations", 5000, *SHORT, "--out", tmp_path / "a")
-    running = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    running = subprocess.Popen(asked, **pipes, text=True, preexec_fn=hear_interrupts)
     while landed(tmp_path / "a") < 50 and running.poll() is None:
         time.sleep(0.05)
     running.send_signal(signal.SIGINT)
