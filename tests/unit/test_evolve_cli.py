@@ -58,10 +58,13 @@ def test_ctrl_c_ends_with_one_line_and_keeps_what_has_landed(tmp_path):
     asked = command("evolve", NAME, "--generations", 5000, *SHORT, "--out", tmp_path / "a")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     running = subprocess.Popen(asked, **pipes, text=True, preexec_fn=hear_interrupts)
-    while landed(tmp_path / "a") < 50 and running.poll() is None:
-        time.sleep(0.05)
-    running.send_signal(signal.SIGINT)
-    _, told = running.communicate(timeout=60)
+    try:
+        while landed(tmp_path / "a") < 50 and running.poll() is None:
+            time.sleep(0.05)
+        running.send_signal(signal.SIGINT)
+        _, told = running.communicate(timeout=60)
+    finally:
+        running.kill()
     assert running.returncode == 2 and told.count("\n") == 1, told
     assert "flights of the search are stored in" in told and "continue with --resume" in told
     assert landed(tmp_path / "a") >= 50
