@@ -68,10 +68,9 @@ def fly_many(
 
 
 def refuse(plan: Plan) -> None:
-    """Raise DeviceError for what only a processor flies: rules of the whole flock, start formations, early ends."""
+    """Raise DeviceError for what only a processor flies: rules of the whole flock, start formations."""
     found = [f"{owner.name}.{owner.kind} solves for the whole flock" for owner in owners(plan)]
     found += [f"start.kind = {plan.start!r}"] if plan.start in FORMATIONS and not plan.given_start else []
-    found += ["metrics.stop = 'collision'"] if plan.stop else []
     if found:
         raise DeviceError(f"device = cuda: {found[0]}, which only the CPU does; choose device = cpu")
 
