@@ -30,8 +30,8 @@ CASES = {
         "world.walls": "nearest_per_axis", "metrics.r_coll": 9.0, "sensors.period": 0.15,
     }, 1, True),
     "stop": ("vasarhelyi_2018", {
-        "metrics.stop": "collision", "metrics.r_coll": 14.0, "start.separation": 15.0, "start.speed": 4.0, "agents": 10, "duration": 1.6,
-        "metrics.period": 0.05,
+        "metrics.stop": "collision", "metrics.r_coll": 14.0, "start.separation": 15.0, "start.speed": 4.0,
+        "agents": 10, "duration": 1.6, "metrics.period": 0.05,
     }, 1, True),
     "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
     "storm": ("viragh_2014", {
