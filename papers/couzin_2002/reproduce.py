@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from airflock.papers import couzin_2002
 from airflock.papers.claims import print_claims, write_page
+from airflock.papers.couzin_2002 import PAPER
 
 if __name__ == "__main__":
-    claims = couzin_2002.run()
-    write_page(Path(__file__).parent, couzin_2002.TITLE, "airflock paper couzin_2002", claims)
+    claims = PAPER.run()
+    write_page(Path(__file__).parent, PAPER.title, "airflock paper couzin_2002", claims)
     print_claims(claims)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from airflock.papers import vicsek_1995
 from airflock.papers.claims import print_claims, write_page
+from airflock.papers.vicsek_1995 import PAPER
 
 if __name__ == "__main__":
-    claims = vicsek_1995.run()
-    write_page(Path(__file__).parent, vicsek_1995.TITLE, "airflock paper vicsek_1995", claims)
+    claims = PAPER.run()
+    write_page(Path(__file__).parent, PAPER.title, "airflock paper vicsek_1995", claims)
     print_claims(claims)

@@ -8,8 +8,8 @@ import pytest
 import airflock
 from airflock.engine.simulate import score_flights
 from airflock.errors import AirflockError
-from airflock.papers import kidger as paper
 from airflock.papers.claims import read_claims
+from airflock.papers.kidger import PAPER
 
 FOLDER = Path(__file__).parents[2] / "papers" / "kidger"
 SEEDS = range(20)
@@ -48,7 +48,7 @@ def test_the_report_shows_every_claim_and_figure(committed):
 
 def test_an_unknown_part_is_refused_with_the_known_ones():
     with pytest.raises(AirflockError, match=r"only = 'scheme' is no part; known: schemes, corners"):
-        paper.run(only="scheme", progress=lambda *_: None)
+        PAPER.run(only="scheme", progress=lambda *_: None)
 
 
 def columns(name, **keys):
@@ -70,7 +70,7 @@ def test_scheme_5_stays_out_of_obstacles_where_scheme_2_does_not(scene):
 @pytest.mark.papers
 @pytest.mark.parametrize("part", ["corners", "presets", "shepherd", "cost", "display"])
 def test_parts_hold_when_flown_again(part):
-    for claim in paper.run(only=part, progress=lambda *_: None):
+    for claim in PAPER.run(only=part, progress=lambda *_: None):
         assert claim.verdict != "not reproduced", claim
 
 

@@ -11,10 +11,9 @@ import pytest
 import airflock
 from airflock.errors import AirflockError
 from airflock.papers import statistics
-from airflock.papers import vasarhelyi_2018 as paper
 from airflock.papers.claims import Claim, judged, read_claims, write_claims
 from airflock.papers.flights import Flights
-from airflock.papers.vasarhelyi_2018 import fig1, fig7, outdoor, pressure, report, table_s2
+from airflock.papers.vasarhelyi_2018 import PAPER, fig1, fig7, outdoor, pressure, report, table_s2
 from airflock.papers.vasarhelyi_2018.published import COLUMNS, REFIT, SPEEDS, optimum, program_runs
 
 FOLDER = Path(__file__).parents[2] / "papers" / "vasarhelyi_2018"
@@ -115,7 +114,7 @@ def test_claims_survive_a_file(tmp_path):
 
 def test_an_unknown_part_is_refused_with_the_known_ones():
     with pytest.raises(AirflockError, match="fig34"):
-        paper.run(only="fig9")
+        PAPER.run(only="fig9")
 
 
 def test_intervals_cover_the_truth_about_95_times_in_100():
@@ -178,10 +177,10 @@ def test_quick_table_s2_at_one_speed_is_near_the_table():
 
 
 @pytest.mark.papers
-@pytest.mark.parametrize("part", paper.PARTS)
+@pytest.mark.parametrize("part", PAPER.parts)
 def test_verdicts_are_those_committed(part, committed):
     """The whole reproduction again; a verdict that hangs on a p near 0.05 may flip with another compiler."""
-    for claim in paper.run(only=part, progress=lambda *_: None):
+    for claim in PAPER.run(only=part, progress=lambda *_: None):
         assert claim.verdict == committed[1][claim.id].verdict, (
             f"{claim.id}: {claim.ours}, {claim.test}; {claim.reason}"
         )

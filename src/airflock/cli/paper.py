@@ -23,20 +23,18 @@ def paper(
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
     from importlib import import_module
-    from pkgutil import iter_modules
 
-    import airflock.papers as papers
+    from airflock.papers import PAPERS
 
-    known = [item.name for item in iter_modules(papers.__path__) if item.ispkg]
-    if name not in known:
+    if name not in PAPERS:
         from difflib import get_close_matches
 
-        near = get_close_matches(name, known, n=1)
+        near = get_close_matches(name, PAPERS, n=1)
         raise AirflockError(
-            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(known)}"
+            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
         )
     module = import_module(f"airflock.papers.{name}")
-    claims = module.run(only=only, quick=quick, seeds=seeds, threads=threads)
+    claims = module.PAPER.run(only=only, quick=quick, seeds=seeds, threads=threads)
     if as_json:
         tables.emit_json([claim.as_dict() for claim in claims])
         return

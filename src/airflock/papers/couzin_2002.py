@@ -5,16 +5,16 @@ polarization p_group (here `polarisation`) and the momentum m_group (`milling`);
 is claimed is which of the two is high. The hysteresis between the groups, the paper's title, is not flown.
 """
 
+from collections.abc import Sequence
+
 import pandas as pd
 
-from airflock.errors import AirflockError
 from airflock.papers import statistics
 from airflock.papers.claims import Claim, judged
-from airflock.papers.flights import Flights, Progress, progress_bar
+from airflock.papers.flights import Flights
+from airflock.papers.paper import Found, Paper
 from airflock.scenarios.files import load
 
-TITLE = "Couzin et al. 2002, Collective memory and spatial sorting in animal groups"
-PARTS = ("groups",)
 LOW, HIGH = 0.35, 0.65  # our choice, because the paper's words low and high name no numbers
 # group: statement, then what p_group and m_group must be: (least, most) of each
 GROUPS = {
@@ -25,23 +25,12 @@ GROUPS = {
 }
 
 
-def run(
-    only: str | None = None,
-    quick: bool = False,
-    seeds: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Claim]:
-    """Recompute the paper's statements; arguments as for the other papers."""
-    if only is not None and only not in PARTS:
-        raise AirflockError(f"only = {only!r} is no part; known: {', '.join(PARTS)}")
-    if progress is None:
-        with progress_bar() as bar:
-            return run(only, quick, seeds, threads, bar)
-    flights = Flights(quick=quick, seeds=seeds, threads=threads, progress=progress)
+def fly(_wanted: Sequence[str], flights: Flights) -> Found:
+    """Fly the four groups."""
     scenarios = {name: load(f"couzin_2002/{name}") for name in GROUPS}
     flown = flights.score("Figs 2 and 3", scenarios, flights.count(10, 3))
-    return [*(claim for name in GROUPS for claim in group_claims(name, flown)), order_claim(flown)]
+    claims = [*(claim for name in GROUPS for claim in group_claims(name, flown)), order_claim(flown)]
+    return claims, {"groups": flown}
 
 
 def group_claims(name: str, flown: pd.DataFrame) -> list[Claim]:
@@ -77,3 +66,6 @@ def order_claim(flown: pd.DataFrame) -> Claim:
         **gap.fields(),
         **judged(gap.low > 0.0, "" if gap.low > 0.0 else "the two overlap"),
     )
+
+
+PAPER = Paper("Couzin et al. 2002, Collective memory and spatial sorting in animal groups", ("groups",), fly)

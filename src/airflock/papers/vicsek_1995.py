@@ -5,19 +5,18 @@ density). The figures' points are not digitised; what is claimed are the limits 
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
 
-from airflock.errors import AirflockError
 from airflock.papers import statistics
 from airflock.papers.claims import Claim, judged
-from airflock.papers.flights import Flights, Progress, progress_bar
+from airflock.papers.flights import Flights
+from airflock.papers.paper import Found, Paper
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
-TITLE = "Vicsek et al. 1995, Novel type of phase transition in a system of self-driven particles"
-PARTS = ("noise", "density")
 PRESET = "vicsek_1995/transition"
 NOISES = (0.1, 1.0, 2.0, 3.0, 4.0, 5.0)  # eta, rad
 SMALL = {"agents": 40, "world.side": 3.1}  # the smallest system of Fig. 2 a; the preset is that of N = 400
@@ -26,26 +25,17 @@ NUMBERS = (50, 100, 200, 400)  # in a box of side 10: 0.5 to 4 per unit area
 AT = 3.0  # eta of the part density: our choice, because it lies between order and disorder
 
 
-def run(
-    only: str | None = None,
-    quick: bool = False,
-    seeds: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Claim]:
-    """Recompute the paper's statements; arguments as for the other papers."""
-    if only is not None and only not in PARTS:
-        raise AirflockError(f"only = {only!r} is no part; known: {', '.join(PARTS)}")
-    if progress is None:
-        with progress_bar() as bar:
-            return run(only, quick, seeds, threads, bar)
-    flights = Flights(quick=quick, seeds=seeds, threads=threads, progress=progress)
-    found: list[Claim] = []
-    if only in (None, "noise"):
-        found += noise_claims(_fly(flights, "Fig. 2 a", noisy()))
-    if only in (None, "density"):
-        found += density_claims(_fly(flights, "Fig. 2 b", dense()))
-    return found
+def fly(wanted: Sequence[str], flights: Flights) -> Found:
+    """Fly the parts that are wanted."""
+    claims: list[Claim] = []
+    flown: dict[str, Any] = {}
+    if "noise" in wanted:
+        flown["noise"] = _fly(flights, "Fig. 2 a", noisy())
+        claims += noise_claims(flown["noise"])
+    if "density" in wanted:
+        flown["density"] = _fly(flights, "Fig. 2 b", dense())
+        claims += density_claims(flown["density"])
+    return claims, flown
 
 
 def noisy() -> dict[Any, Scenario]:
@@ -127,3 +117,10 @@ def density_claims(flown: pd.DataFrame) -> list[Claim]:
 
 def _gap(flown: pd.DataFrame, a: Any, b: Any) -> statistics.Estimate:
     return statistics.difference(flown.loc[a, "polarisation"], flown.loc[b, "polarisation"])
+
+
+PAPER = Paper(
+    "Vicsek et al. 1995, Novel type of phase transition in a system of self-driven particles",
+    ("noise", "density"),
+    fly,
+)

@@ -4,47 +4,24 @@ Parts: static (formations that stand still: units, bounds, the horseshoe), contr
 ga (the genetic algorithm, Figs 5-8), robust (the sound fitness on held-out starts).
 """
 
+from collections.abc import Sequence
 from typing import Any
 
-from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
 from airflock.papers.dimock_2003 import controller, ga, robust, static
 from airflock.papers.dimock_2003.flights import Birds
-from airflock.papers.flights import Progress, progress_bar
-
-TITLE = "Dimock & Selig 2003, The Aerodynamic Benefits of Self-Organization in Bird Flocks"
-PARTS = ("static", "controller", "ga", "robust")
+from airflock.papers.flights import Flights
+from airflock.papers.paper import Found, Paper
 
 
-def run(
-    only: str | None = None,
-    quick: bool = False,
-    seeds: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Claim]:
-    """Recompute the paper's numbers.
-
-    only    : one of PARTS (robust takes the winner of ga and runs it too); quick : a short GA, few starts, no robust
-    seeds   : held-out starts per controller; threads : flights side by side
-    progress : called with (title, done, in all), by default a bar
-    """
-    return recompute(only, quick, seeds, threads, progress)[0]
-
-
-def recompute(
-    only: str | None, quick: bool, seeds: int | None, threads: int | None, progress: Progress | None
-) -> tuple[list[Claim], dict[str, Any]]:
-    """Claims, and by part what is behind them."""
-    if only is not None and only not in PARTS:
-        raise AirflockError(f"only = {only!r} is no part; known: {', '.join(PARTS)}")
-    if progress is None:
-        with progress_bar() as bar:
-            return recompute(only, quick, seeds, threads, bar)
-    birds = Birds(threads=threads, progress=progress)
+def fly(wanted: Sequence[str], flights: Flights) -> Found:
+    """Fly the parts that are wanted: robust takes the winner of ga and runs it too; a quick run leaves robust out."""
+    quick = flights.quick
+    if quick and len(wanted) > 1:
+        wanted = [part for part in wanted if part != "robust"]
+    birds = Birds(threads=flights.threads, progress=flights.progress)
     claims: list[Claim] = []
     found: dict[str, Any] = {}
-    wanted = (only,) if only else PARTS[:3] if quick else PARTS
     if "static" in wanted:
         found["static"] = static.measure()
         claims += static.claims(found["static"])
@@ -55,6 +32,13 @@ def recompute(
         found["ga"] = ga.evolve(birds, quick)
         claims += ga.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
-        found["robust"] = robust.compare(birds, found["ga"].gains, seeds or (12 if quick else 240), quick)
+        found["robust"] = robust.compare(birds, found["ga"].gains, flights.count(240, 12), quick)
         claims += robust.claims(found["robust"])
     return claims, found
+
+
+PAPER = Paper(
+    "Dimock & Selig 2003, The Aerodynamic Benefits of Self-Organization in Bird Flocks",
+    ("static", "controller", "ga", "robust"),
+    fly,
+)

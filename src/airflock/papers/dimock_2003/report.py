@@ -8,7 +8,7 @@ import numpy as np
 from airflock import __version__, atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
-from airflock.papers.dimock_2003 import TITLE, recompute
+from airflock.papers.dimock_2003 import PAPER
 from airflock.papers.dimock_2003.flights import Flight
 from airflock.papers.dimock_2003.units import FOOT, FT_LBF
 
@@ -28,7 +28,7 @@ WORDS = (
 
 def reproduce(folder: Path, threads: int | None = None) -> list[Claim]:
     """Compute everything and write the report."""
-    claims, found = recompute(None, False, None, threads, None)
+    claims, found = PAPER.recompute(None, False, None, threads, None)
     write(folder, claims, found)
     return claims
 
@@ -43,7 +43,7 @@ def write(folder: Path, claims: list[Claim], found: dict[str, Any]) -> None:
             traces(figures / f"fig{number}.png", found["ga"].flights[flight], f"Fig. {number}: best-ever, {name}")
     if "robust" in found:
         front(figures / "pareto.png", found["robust"])
-    header = {"paper": TITLE, "command": COMMAND, "version": __version__, "precision": "32 bits"}
+    header = {"paper": PAPER.title, "command": COMMAND, "version": __version__, "precision": "32 bits"}
     records.write_claims(folder / "claims.toml", claims, header)
     atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1], sorted(figures.glob("*"))))
 
@@ -52,7 +52,7 @@ def page(claims: list[Claim], figures: list[Path]) -> str:
     """README.md: verdicts, tables and figures."""
     count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
     lines = [
-        f"# {TITLE}", "", f"`{COMMAND}` computes all this again; `python papers/dimock_2003/reproduce.py` also "
+        f"# {PAPER.title}", "", f"`{COMMAND}` computes all this again; `python papers/dimock_2003/reproduce.py` also "
         "rewrites this folder. Numbers are SI (W per bird); ft lbf/s stand beside them.", "",
         f"**{count['reproduced']} reproduced, {count['not reproduced']} not reproduced, "
         f"{count['finding']} findings.**", "",

@@ -8,7 +8,7 @@ import pandas as pd
 from airflock import __version__, atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
-from airflock.papers.kidger import TITLE, figures, recompute
+from airflock.papers.kidger import PAPER, figures
 from airflock.papers.kidger.schemes import COLUMNS, SCENES, SCHEMES
 from airflock.papers.kidger.tuning import CURVE, DURATION, SEEDS
 
@@ -53,7 +53,7 @@ PICTURES = {"schemes": ("city", "forest", "space", "rays", "flocked"), "tuning":
 
 def reproduce(folder: Path, seeds: int | None = None, threads: int | None = None) -> list[Claim]:
     """Fly everything, then write claims.toml, README.md and the figures."""
-    claims, flown = recompute(None, False, seeds, threads, None)
+    claims, flown = PAPER.recompute(None, False, seeds, threads, None)
     write(folder, claims, flown, seeds)
     return claims
 
@@ -63,7 +63,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int |
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     figures.draw(folder / "figures", flown["tuning"])
     header = {
-        "paper": TITLE,
+        "paper": PAPER.title,
         "command": COMMAND + (f" --seeds {seeds}" if seeds else ""),
         "seeds": "0 to n - 1 of each scenario, n flights",
         "version": __version__,
@@ -78,7 +78,7 @@ def page(claims: list[Claim], schemes: pd.DataFrame) -> str:
     """README.md: verdicts, tables and figures."""
     count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
     lines = [
-        f"# {TITLE}",
+        f"# {PAPER.title}",
         "",
         f"`{COMMAND}` flies all this again; `python papers/kidger/reproduce.py` also rewrites this folder. The thesis "
         "shows its results by videos, which are not available; here its statements are tests. Lengths are in m (one "

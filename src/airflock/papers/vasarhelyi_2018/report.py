@@ -6,7 +6,7 @@ from typing import Any
 from airflock import __version__, atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
-from airflock.papers.vasarhelyi_2018 import TITLE, recompute
+from airflock.papers.vasarhelyi_2018 import PAPER
 
 COMMAND = "airflock paper vasarhelyi_2018"
 SECTIONS = (
@@ -45,7 +45,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int |
     folder.mkdir(parents=True, exist_ok=True)
     draw(folder / "figures", flown)
     header = {
-        "paper": TITLE,
+        "paper": PAPER.title,
         "command": COMMAND + (f" --seeds {seeds}" if seeds else ""),
         "seeds": "0 to n - 1 of each scenario, n flights",
         "version": __version__,
@@ -58,7 +58,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int |
 
 def reproduce(folder: Path, threads: int | None = None) -> list[Claim]:
     """Fly everything and write the report."""
-    claims, flown = recompute(None, False, None, threads, None)
+    claims, flown = PAPER.recompute(None, False, None, threads, None)
     write(folder, claims, flown)
     return claims
 
@@ -67,7 +67,7 @@ def page(claims: list[Claim]) -> str:
     """README.md: verdicts, tables and figures."""
     count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
     lines = [
-        f"# {TITLE}",
+        f"# {PAPER.title}",
         "",
         f"`{COMMAND}` flies all this again; `python papers/vasarhelyi_2018/reproduce.py` also rewrites this folder. "
         f"Airflock {__version__}. Tests and sources of each claim stand in [claims.toml](claims.toml).",

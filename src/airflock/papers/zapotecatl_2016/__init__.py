@@ -5,20 +5,19 @@ r_s and r_a in {0, 10, .. 50} cm and compares extension, polarization, collision
 """
 
 import csv
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
 import pandas as pd
 
-from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
-from airflock.papers.flights import Flights, Progress, progress_bar
+from airflock.papers.flights import Flights
+from airflock.papers.paper import Found, Paper
 from airflock.papers.zapotecatl_2016 import marks, verdicts
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
-TITLE = "Zapotecatl et al. 2016, Performance Metrics of Collective Coordinated Motion in Flocks"
-PARTS = ("sequential", "synchronous", "printed")
 RADII = (0, 10, 20, 30, 40, 50)  # cm
 COARSE = {"dt": 0.004, "duration": 89.996}  # 22,500 samples
 COARSE_OFF = [(0, 0), (20, 10)]  # where the step of the coarse form shows
@@ -43,38 +42,16 @@ def published() -> pd.DataFrame:
     return table.astype({"r_s": int, "r_a": int}).set_index(["r_s", "r_a"]).rename_axis([None, None])
 
 
-def run(
-    only: str | None = None,
-    quick: bool = False,
-    seeds: int | None = None,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Claim]:
-    """Recompute the paper's numbers.
-
-    only    : one of PARTS; quick : dt of 4 ms, few seeds; seeds : flights per configuration instead of the paper's 15
-    threads : flights side by side; progress : called with (title, flights done, flights in all), by default a bar
-    """
-    return recompute(only, quick, seeds, threads, progress)[0]
-
-
-def recompute(
-    only: str | None, quick: bool, seeds: int | None, threads: int | None, progress: Progress | None
-) -> tuple[list[Claim], dict[str, pd.DataFrame]]:
-    """Claims, and by part the order parameters of every flight."""
-    if only is not None and only not in PARTS:
-        raise AirflockError(f"only = {only!r} is no part; known: {', '.join(PARTS)}")
-    if progress is None:
-        with progress_bar() as bar:
-            return recompute(only, quick, seeds, threads, bar)
-    flights = Flights(quick=quick, seeds=seeds, threads=threads, progress=progress)
+def fly(wanted: Sequence[str], flights: Flights) -> Found:
+    """Fly the parts that are wanted; without a name, a quick run leaves the synchronous boids out."""
     found: dict[str, pd.DataFrame] = {}
     claims: list[Claim] = []
-    usual = PARTS if not quick else ("sequential", "printed")
-    for part in usual if only is None else (only,):
+    for part in wanted:
+        if part == "synchronous" and flights.quick and len(wanted) > 1:
+            continue
         found[part] = _fly(part, flights)
-        claims += verdicts.claims(part, found[part], published().drop(COARSE_OFF if quick else []))
-        claims += marks.claims(flights) if part == "sequential" and not quick else []
+        claims += verdicts.claims(part, found[part], published().drop(COARSE_OFF if flights.quick else []))
+        claims += marks.claims(flights) if part == "sequential" and not flights.quick else []
     return claims, found
 
 
@@ -85,3 +62,10 @@ def _fly(part: str, flights: Flights) -> pd.DataFrame:
     settings = COARSE if flights.quick else {}
     scenarios = configurations("zapotecatl_2016/best", update=part, **settings)
     return flights.score(f"Figs 4-7, {part} update", scenarios, flights.count(15, 2))
+
+
+PAPER = Paper(
+    "Zapotecatl et al. 2016, Performance Metrics of Collective Coordinated Motion in Flocks",
+    ("sequential", "synchronous", "printed"),
+    fly,
+)

@@ -8,7 +8,7 @@ import pandas as pd
 from airflock import __version__, atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import Claim
-from airflock.papers.zapotecatl_2016 import RADII, TITLE, recompute
+from airflock.papers.zapotecatl_2016 import PAPER, RADII
 
 COMMAND = "airflock paper zapotecatl_2016"
 SURFACES = {
@@ -21,7 +21,7 @@ SURFACES = {
 
 def reproduce(folder: Path, seeds: int | None = None, threads: int | None = None) -> list[Claim]:
     """Fly everything, then write claims.toml, README.md and the figures."""
-    claims, flown = recompute(None, False, seeds, threads, None)
+    claims, flown = PAPER.recompute(None, False, seeds, threads, None)
     write(folder, claims, flown, seeds)
     return claims
 
@@ -29,14 +29,14 @@ def reproduce(folder: Path, seeds: int | None = None, threads: int | None = None
 def write(folder: Path, claims: list[Claim], flown: dict[str, pd.DataFrame], seeds: int | None = None) -> None:
     """Write the report into a folder."""
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    header = {"paper": TITLE, "command": COMMAND + (f" --seeds {seeds}" if seeds else ""), "version": __version__}
+    header = {"paper": PAPER.title, "command": COMMAND + (f" --seeds {seeds}" if seeds else ""), "version": __version__}
     records.write_claims(folder / "claims.toml", claims, header)
     means = {part: table.groupby(level=[0, 1]).mean() for part, table in flown.items()}
     for part, table in means.items():
         surfaces(folder / "figures" / f"{part}.png", table)
     best = means["sequential"]["quality"].idxmax()
     radii(folder / "figures" / "radii.png", best)
-    text = [f"# {TITLE}\n", f"`{header['command']}` recomputes this page.\n", records.markdown(claims)]
+    text = [f"# {PAPER.title}\n", f"`{header['command']}` recomputes this page.\n", records.markdown(claims)]
     for part, table in means.items():
         text += [f"\n## {part}: quality over r_s (rows) and r_a (columns), cm\n", _grid(table["quality"])]
         text += [f"\n![Figs 4-7, {part}](figures/{part}.png)\n"]

@@ -1,0 +1,44 @@
+"""Every publication that is recomputed can be asked for by name, and its committed page says how."""
+
+import tomllib
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+import pytest
+from typer.testing import CliRunner
+
+import airflock.papers
+from airflock.cli.main import app
+from airflock.papers import PAPERS
+from airflock.papers.paper import Paper
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_module_with_a_paper_is_listed() -> None:
+    names = [item.name for item in iter_modules(airflock.papers.__path__)]
+    found = {name for name in names if hasattr(import_module(f"airflock.papers.{name}"), "PAPER")}
+    assert found == set(PAPERS)
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_the_committed_page_is_of_that_paper(name: str) -> None:
+    paper: Paper = import_module(f"airflock.papers.{name}").PAPER
+    folder = ROOT / "papers" / name
+    assert (folder / "README.md").read_text(encoding="utf-8").startswith(f"# {paper.title}\n")
+    header = tomllib.loads((folder / "claims.toml").read_text(encoding="utf-8"))
+    assert header["command"].startswith(f"airflock paper {name}")
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_an_unknown_part_is_refused_before_anything_flies(name: str) -> None:
+    paper: Paper = import_module(f"airflock.papers.{name}").PAPER
+    with pytest.raises(airflock.AirflockError, match=f"only = 'nothing' is no part; known: .*{paper.parts[0]}"):
+        paper.run(only="nothing")
+
+
+def test_a_mistyped_paper_is_told_its_name() -> None:
+    said = CliRunner().invoke(app, ["paper", "vicsek_1996"])
+    assert said.exit_code != 0
+    assert "did you mean vicsek_1995?" in f"{said.output}{said.exception}"
