@@ -1,5 +1,7 @@
 """Claims about Table S1 follow from the numbers behind them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 
@@ -40,3 +42,11 @@ def test_hard_cores_and_short_alignment_are_told_apart():
     p = parameters(6) | {"model.r0_rep": 14.0, "model.r0_frict": 20.0}
     assert table_s1.soft_repulsion(6, p, flights(np.full(10, 0.8))).verdict == "not reproduced"
     assert table_s1.long_alignment(6, p).verdict == "not reproduced"
+
+
+def test_independent_runs_are_alike_or_not():
+    best = SimpleNamespace(fitness=0.82, above=3000, candidates=15000)
+    close, far = SimpleNamespace(fitness=0.81), SimpleNamespace(fitness=0.70)
+    assert table_s1.alike(6, [best, close]).verdict == "reproduced"
+    assert table_s1.alike(6, [best, far]).verdict == "not reproduced"
+    assert table_s1.working(6, best).ours == 3000

@@ -1,0 +1,61 @@
+"""The committed report on Table S1: evolved.toml and EVOLVED.md in papers/vasarhelyi_2018/."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from airflock import __version__, atomic
+from airflock.papers import claims as records
+from airflock.papers.claims import Claim
+from airflock.papers.flights import Flights, progress_bar
+from airflock.papers.vasarhelyi_2018 import table_s1
+from airflock.papers.vasarhelyi_2018.published import optimum
+from airflock.papers.vasarhelyi_2018.table_s1 import COARSE, COLUMNS, RUNS, Data
+
+COMMAND = "airflock paper vasarhelyi_2018 --only s1"
+TITLE = "Table S1 of Vásárhelyi et al. 2018, evolved again"
+
+
+def reproduce(folder: Path, runs: Mapping[int, int] = RUNS, threads: int | None = None) -> list[Claim]:
+    """Evolve what is not evolved yet and write the report; runs: independent runs by speed (m/s)."""
+    with progress_bar() as bar:
+        data = table_s1.fly(Flights(threads=threads, progress=bar), runs)
+    claims = table_s1.claims(data)
+    write(folder, claims, data)
+    return claims
+
+
+def write(folder: Path, claims: list[Claim], data: Data) -> None:
+    """Write evolved.toml and EVOLVED.md."""
+    steps = ", ".join(f"{key} = {value:g}" for key, value in COARSE.items())
+    header = {
+        "paper": TITLE,
+        "command": COMMAND,
+        "runs": ", ".join(f"{len(runs)} at {v} m/s" for v, runs in data.runs.items()),
+        "seeds": f"studies 0, 1, ...; paired flights 0 to {len(next(iter(data.ours.values()))) - 1}",
+        "search": f"15,000 evaluations a run with {steps}; paired flights with the steps of the paper",
+        "version": __version__,
+        "precision": "32 bits",
+    }
+    records.write_claims(folder / "evolved.toml", claims, header)
+    claims = records.read_claims(folder / "evolved.toml")[1]
+    lines = [f"# {TITLE}", "", f"`{COMMAND}` evolves all this again. Runs: {header['runs']}; {header['search']}.", ""]
+    lines += [records.markdown(claims), "## Optima and working ranges", ""]
+    lines += ["Printed | ours [range of all evaluations that reach our optimum's mean fitness].", ""]
+    lines += _optima(data)
+    atomic.write(folder / "EVOLVED.md", "\n".join(lines) + "\n")
+
+
+def _optima(data: Data) -> list[str]:
+    """Rows of a table: parameters by speed."""
+    speeds = list(data.runs)
+    lines = ["| parameter | " + " | ".join(f"{v} m/s" for v in speeds) + " |", "|---" * (len(speeds) + 1) + "|"]
+    for name in COLUMNS:
+        row = []
+        for v in speeds:
+            best, key = data.runs[v][0], f"model.{name}"
+            low, high = best.ranges[key]
+            row.append(
+                f"{getattr(optimum(v).parameters, name):.3g} \\| {best.parameters[key]:.3g} [{low:.3g}, {high:.3g}]"
+            )
+        lines.append(f"| `{name}` | " + " | ".join(row) + " |")
+    return lines
