@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 import toys
+from airflock.engine.simulate import score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
 from airflock.evolve.executors.here import Here
 from airflock.evolve.sensitivity import sensitivity
+from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
+from airflock.evolve.study import load_study
 from airflock.scenarios.files import load, make
 
 
@@ -44,6 +47,24 @@ def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
     assert steps[1].cost == pytest.approx((-0.035,) * 3) and steps[1].gain == pytest.approx((0.07,) * 3)
     found = make(harden.document(load("vasarhelyi_2018/6ms"), steps[-1]), "hardened")
     assert found.parameters.p_rep == pytest.approx(0.105) and found.published == {}
+
+
+def test_evolving_again_flies_a_stricter_scenario_but_is_measured_in_the_given_one(tmp_path):
+    """Workaround (i): the search minds larger spheres and a longer delay; what it costs and gains is told without."""
+    given = load("vasarhelyi_2018/6ms", {"agents": 8, "duration": 20.0, "dt": 0.05})
+    settings = harden.cautious(given, r_coll=2.0, delay=1.5)
+    search = {"population": 4, "generations": 2, "top": 1, "pool": 0, "final_seeds": 2}
+    study = harden.stricter(given, load_study("vasarhelyi_2018/6ms").space, settings, search)
+    assert study.scenario.metrics.r_coll == 2.0 * given.metrics.r_coll
+    assert study.scenario.radio.delay == 1.5 * given.radio.delay
+    steps = harden.evolved_again(given, study, settings, tmp_path / "again", range(3))
+    optimum, again = steps
+    assert optimum.parameters["model.p_rep"] == given.parameters.p_rep and "metrics.r_coll = 6" in again.reason
+    for step in steps:
+        rows = score_flights([with_parameters(given, step.parameters)] * 3, range(3))
+        assert step.fitness == np.mean([row["fitness"] for row in rows])
+    continued = harden.evolved_again(given, study, settings, tmp_path / "again", range(3))
+    assert continued[1].parameters == again.parameters
 
 
 def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):

@@ -1,8 +1,6 @@
 """Verb evolve: repeat or begin an optimisation."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,7 +43,6 @@ def evolve(
     from airflock.errors import StudyError
     from airflock.evolve.folder import open_folder
     from airflock.evolve.run import executor_for, on_device, run, study_of
-    from airflock.evolve.search import total_flights
     from airflock.evolve.sensitivity import METHODS
 
     given = {
@@ -67,55 +64,12 @@ def evolve(
     open_folder(out, study, resume=resume)
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
-    with _progress(study, total_flights(study), quiet or as_json) as (watch, note):
+    with options.searching(study, quiet or as_json) as (watch, note):
         result = run(study, out, executor, watch, note, sensitivity=sensitivity)
     if as_json:
         tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
         _print(result)
-
-
-@contextmanager
-def _progress(study: Any, total: int, quiet: bool) -> Iterator[tuple[Any, Callable[[bool], None] | None]]:
-    """A line that moves: generation, best, mean, flights per second, time left; then the finalists."""
-    import sys
-
-    if quiet or not sys.stderr.isatty():
-        yield None, None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    from airflock.evolve.race import ROUNDS
-
-    finals = (study.whole("top") + study.whole("restarts") + 2) * study.whole("final_seeds")
-    finals += round(sum(share * seeds for share, seeds in ROUNDS) * study.whole("pool"))
-    shape = (
-        TextColumn("{task.description}"), BarColumn(bar_width=20), TextColumn("{task.percentage:>3.0f} %"),
-        TextColumn("{task.fields[rate]:.1f} flights/s"), TimeRemainingColumn(),
-    )  # fmt: skip
-    begin = time.perf_counter()
-    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
-        searching = bar.add_task("generation 1", total=total, rate=0.0)
-        final: Any = None
-
-        def watch(p: Any) -> None:
-            rate = p.fresh / max(time.perf_counter() - begin, 1e-9)
-            told = "" if p.best is None else f" · best {p.best:.4f}"
-            told += "" if p.mean is None else f" · mean {p.mean:.4f}"
-            where = f"run {p.run + 1}, " if study.whole("restarts") else ""
-            text = f"{where}generation {p.generation + 1}/{study.whole('generations')}{told}"
-            bar.update(searching, completed=p.done, description=text, rate=rate)
-
-        def note(_: bool) -> None:
-            nonlocal final, begin
-            if final is None:
-                begin = time.perf_counter()
-                final = bar.add_task("finalists on fresh seeds", total=finals, rate=0.0)
-            done = bar.tasks[-1].completed + 1
-            bar.update(final, completed=done, rate=done / max(time.perf_counter() - begin, 1e-9))
-
-        yield watch, note
 
 
 def _print(result: Any) -> None:

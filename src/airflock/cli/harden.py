@@ -38,7 +38,7 @@ def harden(
     """
     from airflock.evolve.after import BEST
     from airflock.evolve.folder import write
-    from airflock.evolve.harden import cautious, document, evolved_again, harden
+    from airflock.evolve.harden import cautious, document, evolved_again, harden, stricter
     from airflock.scenarios.files import load
 
     path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
@@ -50,8 +50,10 @@ def harden(
     numbers = range(first_seed, first_seed + seeds)
     if r_coll is not None or delay is not None:
         settings = cautious(found, r_coll or 1.0, delay or 1.0)
-        folder, search = out.parent / f"{out.stem}_study", {"generations": generations}
-        steps = evolved_again(found, _space(scenario, found), settings, folder, search, numbers, threads)
+        study = stricter(found, _space(scenario, found), settings, {"generations": generations})
+        folder = out.parent / f"{out.stem}_study"
+        with options.searching(study, quiet=as_json) as (watch, note):
+            steps = evolved_again(found, study, settings, folder, numbers, threads, watch, note)
     else:
         with options.progress(f"{scenario}: flights", 5 * seeds, quiet=as_json) as done:
             steps = harden(found, numbers, threads=threads, done=done)

@@ -19,7 +19,7 @@ from airflock.evolve.folder import STUDY, open_folder, plain
 from airflock.evolve.run import executor_for, run
 from airflock.evolve.search import Watch
 from airflock.evolve.space import Space, declared, with_parameters
-from airflock.evolve.study import make_study
+from airflock.evolve.study import Study, make_study
 from airflock.scenarios.files import make
 from airflock.scenarios.scenario import Scenario
 
@@ -153,24 +153,29 @@ def cautious(scenario: Scenario, r_coll: float = 1.5, delay: float = 1.0) -> dic
     return {"metrics.r_coll": scenario.metrics.r_coll * r_coll, "radio.delay": scenario.radio.delay * delay}
 
 
+def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], search: Mapping[str, Any]) -> Study:
+    """Study of workaround (i): the scenario's space, searched under the stricter settings."""
+    found = make(scenario.document, f"{scenario.name}, stricter", settings, law=scenario.model)
+    return replace(make_study({}, found.name, search=search, scenario=found), space=space)
+
+
 def evolved_again(
     scenario: Scenario,
-    space: Space,
+    study: Study,
     settings: Mapping[str, float],
     folder: Path,
-    search: Mapping[str, Any],
     seeds: Sequence[int],
     threads: int | None = None,
     watch: Watch | None = None,
+    note: Callable[[bool], None] | None = None,
 ) -> list[Measured]:
-    """Workaround (i): evolve under the stricter settings, then measure the result where the optimum was found.
+    """Workaround (i): run the stricter study, then measure its result where the optimum was found.
 
-    folder : of that evolution's study; one that is there already is continued
+    folder : of that study; one that is there already is continued
+    watch, note : told of flights of the search and after it, as by `run`
     """
-    stricter = make(scenario.document, f"{scenario.name}, stricter", settings, law=scenario.model)
-    study = replace(make_study({}, stricter.name, search=search, scenario=stricter), space=space)
     open_folder(folder, study, resume=(folder / STUDY).exists())
-    result = run(study, folder, executor_for(study, threads=threads), watch)
+    result = run(study, folder, executor_for(study, threads=threads), watch, note)
     known = declared(scenario)
     before = {key: float(known[key][1] or 0.0) for key in result.parameters}
     told = ", ".join(f"{key} = {value:g}" for key, value in settings.items())

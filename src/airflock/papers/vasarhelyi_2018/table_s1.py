@@ -49,7 +49,10 @@ class Data(NamedTuple):
 def fly(flights: Flights, runs: Mapping[int, int] = RUNS) -> Data:
     """All studies, and the paired flights; runs: independent runs by speed (m/s)."""
     found = {
-        v: sorted((_evolve(v, number, flights) for number in range(several)), key=lambda result: -result.fitness)
+        v: sorted(
+            (_evolve(v, number, flights) for number in range(flights.count(several, 1))),
+            key=lambda result: -result.fitness,
+        )
         for v, several in runs.items()
     }
     pairs = flights.count(PAIRS, 20)
