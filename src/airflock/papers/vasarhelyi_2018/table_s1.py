@@ -6,21 +6,16 @@ steps than the paper (`COARSE`); what is claimed of the optima is measured with 
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pandas as pd
 
-from airflock.engine.store import cache_folder
 from airflock.evolve.after import Result
-from airflock.evolve.folder import STUDY, open_folder
-from airflock.evolve.run import executor_for, run
-from airflock.evolve.search import Progress
 from airflock.evolve.space import with_parameters
-from airflock.evolve.study import load_study
 from airflock.papers import statistics
 from airflock.papers.claims import Claim, judged
 from airflock.papers.flights import Flights
+from airflock.papers.studies import evolve
 from airflock.papers.vasarhelyi_2018.published import optimum
 
 RUNS = {4: 3, 6: 3, 8: 3, 16: 1, 32: 1}  # "at least three independent runs" at the first three speeds
@@ -32,7 +27,6 @@ COLUMNS = (
     "r0_rep", "p_rep", "r0_frict", "c_frict", "v_frict", "p_frict", "a_frict", "r0_shill", "v_shill",
     "p_shill", "a_shill",
 )  # fmt: skip
-QUICK = {"population": 12, "generations": 4, "pool": 24, "top": 4, "final_seeds": 10}
 CLOSE = 0.02  # by which a fitness may miss a published one
 ALIKE = 0.02  # by which fitnesses of independent runs may differ
 LOWEST = -0.01  # lower end of the 95 % interval of ours minus S1
@@ -50,7 +44,10 @@ def fly(flights: Flights, runs: Mapping[int, int] = RUNS) -> Data:
     """All studies, and the paired flights; runs: independent runs by speed (m/s)."""
     found = {
         v: sorted(
-            (_evolve(v, number, flights) for number in range(flights.count(several, 1))),
+            (
+                evolve(flights, f"Table S1, evolution at {v} m/s, run {i + 1}", f"vasarhelyi_2018/{v}ms", i, COARSE)
+                for i in range(1 if flights.quick else several)
+            ),
             key=lambda result: -result.fitness,
         )
         for v, several in runs.items()
@@ -60,29 +57,6 @@ def fly(flights: Flights, runs: Mapping[int, int] = RUNS) -> Data:
     ours = flights.score("Table S1, our optima", optima, pairs)
     published = flights.score("Table S1, published optima", {v: optimum(v) for v in found}, pairs)
     return Data(found, {v: ours.loc[v] for v in found}, {v: published.loc[v] for v in found})
-
-
-def _evolve(v: int, number: int, flights: Flights) -> Result:
-    """One run at a speed, begun or continued; number: of the run, which is its study's seed."""
-    search: dict[str, Any] = {"seed": number, **(QUICK if flights.quick else {})}
-    study = load_study(f"vasarhelyi_2018/{v}ms", settings=COARSE, search=search)
-    folder = studies() / f"{v}ms_{number}{'_quick' if flights.quick else ''}"
-    open_folder(folder, study, resume=(folder / STUDY).exists())
-    title = f"Table S1, evolution at {v} m/s, run {number + 1}"
-    return run(study, folder, executor_for(study, threads=flights.threads), _watch(flights, title))
-
-
-def studies() -> Path:
-    """Folder of the studies' folders."""
-    return cache_folder() / "studies" / "vasarhelyi_2018"
-
-
-def _watch(flights: Flights, title: str) -> Any:
-    def watch(p: Progress) -> None:
-        if flights.progress:
-            flights.progress(title, p.done, p.total)
-
-    return watch
 
 
 def claims(data: Data) -> list[Claim]:
