@@ -1,0 +1,59 @@
+"""What the paper proposes for the future: radii, fields of view and weights evolved for its quality.
+
+Long: 1,000 evaluations of 90 s, so it is flown only when it is asked for by name. The study lies in Airflock's cache
+folder and is continued where it was left.
+"""
+
+from typing import NamedTuple
+
+import pandas as pd
+
+from airflock.evolve.after import Result
+from airflock.evolve.space import with_parameters
+from airflock.papers import statistics
+from airflock.papers.claims import Claim
+from airflock.papers.flights import Flights
+from airflock.papers.studies import evolve
+from airflock.scenarios.files import load
+
+STUDY = "zapotecatl_2016/best"
+PAIRS = 100  # paired flights, evolved against the best of the paper's experiment
+MEASURES = ("quality", "cns_ext", "cns_pol", "extension_cm", "polarization_deg", "f_collision")
+
+
+class Data(NamedTuple):
+    """The study's result, and paired flights with its parameters and with the paper's best."""
+
+    result: Result
+    ours: pd.DataFrame
+    published: pd.DataFrame
+
+
+def fly(flights: Flights) -> Data:
+    """The study, and the paired flights on seeds that the search never saw."""
+    result = evolve(flights, "boids evolved for quality", STUDY)
+    best = load(STUDY)
+    pair = {"evolved": with_parameters(best, result.parameters), "best": best}
+    flown = flights.score("evolved and best boids", pair, flights.count(PAIRS, 10))
+    return Data(result, flown.loc["evolved"], flown.loc["best"])
+
+
+def claims(data: Data) -> list[Claim]:
+    """What evolution gains on the best of the paper's grid, by each of its measures."""
+    told = ", ".join(f"{key.removeprefix('model.')} {value:.3g}" for key, value in data.result.parameters.items())
+    found = []
+    for name in MEASURES:
+        gap = statistics.mean(data.ours[name] - data.published[name])
+        found.append(
+            Claim(
+                id=f"evolved.{name}",
+                statement=f"{name} of boids evolved for quality less that of the best of the paper's radii",
+                source="Concluding Remarks and Future Work",
+                test="none: the paper has not done it",
+                verdict="finding",
+                **gap.fields(),
+                reason=f"{data.ours[name].mean():.4g} against {data.published[name].mean():.4g}"
+                + (f"; {told}" if name == "quality" else ""),
+            )
+        )
+    return found
