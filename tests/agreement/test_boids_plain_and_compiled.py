@@ -13,6 +13,9 @@ FLIGHTS = {
         "world.height": 0.9, "start.radius": 0.4, "model.fov_a_deg": 200.0, "start.speed": 0.2,
     }),
     "printed": ("zapotecatl_2016/literal", {"agents": 7, "duration": 20.0}),
+    "counted by the program": ("zapotecatl_2016/best", {
+        "agents": 9, "dt": 0.02, "duration": 2.0, "metrics.count": "program", "metrics.r_b": 0.3, "start.radius": 0.4,
+    }),
     "vicsek": ("vicsek_1995/ordered", {"agents": 12, "world.side": 3.0, "duration": 30.0, "model.eta": 1.0}),
     "couzin": ("couzin_2002/torus", {"agents": 9, "duration": 6.0, "start.radius": 3.0}),
 }  # fmt: skip

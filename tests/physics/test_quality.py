@@ -65,6 +65,59 @@ def test_quality_of_a_hand_made_flock():
     assert found["polarization_deg"] == pytest.approx(np.degrees(turn.mean()), abs=1e-5)
 
 
+PROGRAM = {"metrics.kind": "zapotecatl", "metrics.count": "program"}
+
+
+def row_of(order):
+    """Boids 4 cm apart in a row, each touching the next, numbered in this order."""
+    place = np.zeros((len(order), 3))
+    place[order, 0] = 0.04 * np.arange(len(order))
+    return place
+
+
+@pytest.mark.parametrize(
+    ("order", "marked"),
+    [
+        ([0, 1, 2], 2),  # 0 marks 1; 1 is marked already, so that the pair 1 2 is never looked at
+        ([1, 0, 2], 3),  # the middle one comes first and marks both
+        ([0, 1, 2, 3], 4),  # 0 marks 1, 2 marks 3
+        ([0, 2, 4, 1, 3], 5),  # 0 marks 2, 1 marks 4 and 3
+        ([0, 1, 2, 3, 4], 4),  # 4 is left
+    ],
+)
+def test_the_program_misses_the_end_of_a_chain_and_eq_18_does_not(order, marked):
+    place = row_of(order)
+    n = len(order)
+    assert measured(place, alike(n))["f_collision"] == 1.0
+    found = measured(place, alike(n), **PROGRAM)
+    assert found["f_collision"] == pytest.approx(marked / n)
+    assert found["cns_pol"] == pytest.approx(1.0 - marked / n, abs=1e-6)  # the others fly alike
+
+
+def marks(place, r_b=0.05):
+    """The program's loop over pairs, as a person would write it down."""
+    found = [False] * len(place)
+    for i in range(len(place)):
+        if not found[i]:
+            for j in range(i + 1, len(place)):
+                if math.dist(place[i], place[j]) < r_b:
+                    found[i] = found[j] = True
+    return found
+
+
+def test_the_program_counts_at_most_those_that_collide(seed):
+    rng = np.random.default_rng(seed)
+    missed = 0
+    for _ in range(20):
+        place, ahead = rng.uniform(0.0, 0.2, (40, 3)), rng.normal(size=(40, 3))
+        each, program = measured(place, ahead), measured(place, ahead, **PROGRAM)
+        assert program["f_collision"] == pytest.approx(sum(marks(place)) / 40)
+        assert program["f_collision"] <= each["f_collision"]
+        assert program["extension_cm"] == pytest.approx(each["extension_cm"], rel=1e-12)
+        missed += round(40 * (each["f_collision"] - program["f_collision"]))
+    assert missed > 0  # so dense a flock has chains
+
+
 def test_all_in_collision_is_no_quality_and_one_agent_is_perfect():
     assert measured(np.zeros((5, 3)), alike(5))["quality"] == pytest.approx(0.0, abs=1e-9)
     alone = measured([[0.3, 0.2, 0.1]], alike(1))

@@ -22,6 +22,7 @@ BAD = {
     "world.height": (0.8, "the arena is smaller than the ball in which agents start"),
     "metrics.k": (3.0, "metrics.k = 3 m lies outside [0, 2.25] m"),
     "metrics.sigma": (0.7, "metrics.sigma + metrics.gamma = 1.2 is not 1"),
+    "metrics.count": ("all", "metrics.count = 'all' is none of each, program"),
     "body.kind": ("multirotor", "takes a velocity, but model reynolds_1987 commands acceleration"),
     "radio.delay": (0.5, "update = 'sequential' needs ideal perception"),
     "update": ("random", "update = 'random' is none of synchronous, sequential"),
@@ -58,6 +59,11 @@ def test_bad_input_for_particles_and_schools_is_one_line(preset, key, value, lin
         load(preset, {key: value})
     assert line in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
+
+
+def test_the_programs_count_knows_no_images():
+    with pytest.raises(ScenarioError, match=r"metrics\.count = 'program': the program knows no periodic box"):
+        load("zapotecatl_2016/best", {"metrics.count": "program", "world.edges": "periodic"})
 
 
 def test_order_parameters_over_all_pairs_of_a_large_flock_are_announced():

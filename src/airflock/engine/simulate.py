@@ -7,6 +7,7 @@ from typing import Any
 
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
+from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan, make_plan
@@ -15,7 +16,7 @@ from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
 from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock.metrics.registry import SETS
+from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
@@ -40,7 +41,7 @@ def plan_of(
     return make_plan(
         scenario.model,
         scenario.parameters,
-        SETS[scenario.metrics.kind] if metrics is None else metrics,
+        metrics_of(scenario.metrics) if metrics is None else metrics,
         scenario.world,
         grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
         body=scenario.vehicle,
@@ -65,8 +66,10 @@ def plan_of(
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
-    found = SETS[scenario.metrics.kind] if metrics is None else metrics
-    used = scenario.model.flock is not None or any(metric.survey is not None for metric in found)
+    found = metrics_of(scenario.metrics) if metrics is None else metrics
+    used = scenario.model.flock is not None or any(
+        "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
+    )
     return tuple(sorted(choices(scenario.wing).items())) if used else ()
 
 

@@ -29,6 +29,11 @@ class Parameters(Record):
         "paper", ("paper", "sound"), source="Dimock & Selig 2003, Eq. 10, and its future work",
         meaning="fitness of kind = dimock: minus power; or with penalties for closeness, oscillation, no formation",
     )  # fmt: skip
+    count: str = choice(
+        "each", ("each", "program"), source="Zapotecatl et al. 2016, Eq. 18, or the authors' program",
+        meaning="agents in collision that quality counts: each that has another within r_b; or those that the authors' "
+        "program marks, which skips the pairs of agents marked before and so misses some in chains",
+    )  # fmt: skip
     t_settle: float = quantity(10.0, "s", low=0.0, high=1e6, source="our choice", meaning="a formation is settled then")
     v_settle: float = quantity(
         0.25, "m/s", low=0.0, high=100.0, source="our choice", meaning="it is if unrest is below this"

@@ -1,5 +1,7 @@
 """The order parameters that flights are scored with: sets of metrics by the key metrics.kind."""
 
+from typing import Any
+
 from airflock.core.contract import Metric, metric
 from airflock.metrics import (
     avoidance,
@@ -12,6 +14,7 @@ from airflock.metrics import (
     fitness_vasarhelyi,
     flocked,
     groups,
+    marks,
     milling,
     nearest,
     polarisation,
@@ -41,6 +44,13 @@ SETS: dict[str, tuple[Metric, ...]] = {
     "kidger": KIDGER,
     "dimock": DIMOCK,
 }
+COUNTS: dict[str, Metric] = {"each": metric(quality), "program": metric(marks)}  # by the key metrics.count
+
+
+def metrics_of(q: Any) -> tuple[Metric, ...]:
+    """Metrics of a scenario from its parameters `metrics.*`: the set of kind, its collisions counted as count says."""
+    return tuple(COUNTS[q.count] if found.name == "quality" else found for found in SETS[q.kind])
+
 
 # what the engine itself keeps of a flight with goals
 GOALS = {

@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Model
-from airflock.metrics.registry import SETS
+from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import largest_extension
 
 
@@ -54,6 +54,8 @@ def metric_faults(q: Any, world: Any) -> list[str]:
     if not most:
         return ["metrics.max_e is missing: without an arena the largest extension is unknown; give metrics.max_e in m"]
     faults = []
+    if q.count == "program" and world.edges == "periodic":
+        faults.append("metrics.count = 'program': the program knows no periodic box (world.edges); count each")
     if q.k is not None and q.k > most * (1.0 + 1e-9):
         faults.append(f"metrics.k = {q.k:g} m lies outside [0, {most:g}] m, the largest extension metrics.max_e")
     if abs(q.sigma + q.gamma - 1.0) > 1e-9:
@@ -66,7 +68,7 @@ MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 
 def pair_notes(flight: Any, q: Any) -> list[str]:
     """What order parameters over all pairs cost in a large flock: neighbours may be found by cells, these are not."""
-    paired = [item.name for item in SETS[q.kind] if item.pair is not None or item.cluster is not None]
+    paired = [item.name for item in metrics_of(q) if item.pair or item.cluster or item.survey]
     if flight.agents < MANY or not paired:
         return []
     seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md

@@ -5,7 +5,8 @@ from typing import Any
 
 from airflock.aero import wing as wings
 from airflock.core.contract import Model
-from airflock.metrics.registry import SETS
+from airflock.core.vocabulary import asks
+from airflock.metrics.registry import metrics_of
 from airflock.world import start
 
 Place = Callable[[int, float, float, float], tuple[float, float, float]]
@@ -15,7 +16,9 @@ THIN = 0.1  # of a span: wings farther apart in height do not meet
 
 def flies_on_wings(found: Model | None, q: Any) -> bool:
     """Whether a rule of this scenario solves for the wings of the flock."""
-    return (found is not None and found.flock is not None) or any(m.survey is not None for m in SETS[q.kind])
+    return (found is not None and found.flock is not None) or any(
+        "wing" in asks(m.survey, "survey") for m in metrics_of(q) if m.survey
+    )
 
 
 def faults(parts: Mapping[str, Any], found: Model | None) -> list[str]:
@@ -24,7 +27,7 @@ def faults(parts: Mapping[str, Any], found: Model | None) -> list[str]:
     if q is None or wing is None:
         return []
     lines = []
-    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in SETS[q.kind]):  # type: ignore[attr-defined]
+    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics_of(q)):  # type: ignore[attr-defined]
         lines.append(f"metrics.stop = 'collision' needs collisions, which metrics.kind = {q.kind!r} does not count")
     if not flies_on_wings(found, q):
         return lines

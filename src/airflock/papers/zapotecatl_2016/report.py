@@ -11,6 +11,10 @@ from airflock.papers.claims import Claim
 from airflock.papers.zapotecatl_2016 import PAPER, RADII
 
 COMMAND = "airflock paper zapotecatl_2016"
+COUNTED = (
+    "The figures were measured by the authors' program; sequential and synchronous flights are counted as it counts, "
+    'with `metrics.count = "program"`, printed ones by Eq. 18.'
+)
 SURFACES = {
     "extension_cm": ("Fig. 4", "extension, cm"),
     "polarization_deg": ("Fig. 5", "polarization, °"),
@@ -36,7 +40,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, pd.DataFrame], see
         surfaces(folder / "figures" / f"{part}.png", table)
     best = means["sequential"]["quality"].idxmax()
     radii(folder / "figures" / "radii.png", best)
-    text = [f"# {PAPER.title}\n", f"`{header['command']}` recomputes this page.\n", records.markdown(claims)]
+    text = [f"# {PAPER.title}\n", f"`{header['command']}` recomputes this page. {COUNTED}\n", records.markdown(claims)]
     for part, table in means.items():
         text += [f"\n## {part}: quality over r_s (rows) and r_a (columns), cm\n", _grid(table["quality"])]
         text += [f"\n![Figs 4-7, {part}](figures/{part}.png)\n"]
