@@ -10,7 +10,9 @@ from airflock.display import fly_show, points_of
 from airflock.display.assignment import assign
 from airflock.display.show import ranks, recording_of, scenario_of
 from airflock.engine.plain import fly_plainly
+from airflock.recordings.flights import simulate
 from airflock.recordings.layout import check
+from airflock.recordings.scores import scenario_of as of_recording
 from airflock.scenarios.files import load
 from flocks import flown
 
@@ -35,6 +37,19 @@ def same(found, seed, start=None):
 def test_boids_a_shepherd_and_buildings_that_appear(seed):
     values = same(load("kidger/city", CITY), seed)
     assert values["n_avoid"] > 0.0 and values["n_env_coll"] > 0.0  # spheres wider than those that were cast
+
+
+def test_each_flight_has_a_city_of_its_own_and_its_recording_knows_it(seed):
+    found = load("kidger/city", {**CITY, "scene.draw": "flight", "duration": 0.4})
+    first, second = (found.in_flight(number) for number in (seed, seed + 1))
+    assert first.stands().shapes.shape == second.stands().shapes.shape  # as many buildings, of other heights
+    assert not np.array_equal(first.stands().shapes, second.stands().shapes)
+    assert not np.allclose(first.waypoints(), second.waypoints())
+    values = same(found, seed)
+    assert repr(values) == repr(same(first, seed))
+    recorded = of_recording(simulate(found, seed, precision=64))
+    assert recorded.scene == first.scene
+    np.testing.assert_array_equal(recorded.stands().shapes, first.stands().shapes)
 
 
 def test_a_display_among_drones_that_hover(seed):

@@ -131,12 +131,23 @@ def test_a_shepherd_stands_behind_whom_it_drives():
 
 
 def test_fitness_is_the_share_flocked_of_a_flight_without_faults_and_falls_with_each():
-    sound = {"flocked": 0.8, "goals": 5.0, "goals_reached": 5.0, "n_coll": 0.0, "n_env_coll": 0.0}
+    sound = {"flocked": 0.8, "time_to_goal": [0.0, 0.0], "n_coll": 0.0, "phi_coll": 0.0, "n_env_coll": 0.0}
     assert fitness_kidger.fitness(sound, 10, 120.0)["fitness"] == pytest.approx(0.8)
-    for fault in ({"goals_reached": 4.0}, {"n_coll": 3.0}, {"n_env_coll": 1.0}, {"flocked": 0.7}):
+    late, never = {"time_to_goal": [0.0, 30.0]}, {"time_to_goal": [0.0, math.nan]}
+    for fault in (late, {"n_coll": 3.0}, {"phi_coll": 0.1}, {"n_env_coll": 1.0}, {"flocked": 0.7}):
         assert fitness_kidger.fitness(sound | fault, 10, 120.0)["fitness"] < 0.8
+    assert fitness_kidger.fitness(sound | late, 10, 120.0)["f_goals"] == pytest.approx(0.875)
+    assert fitness_kidger.fitness(sound | never, 10, 120.0)["f_goals"] == pytest.approx(0.5)
     twice = fitness_kidger.fitness(sound | {"n_coll": 60.0}, 10, 120.0)  # three per agent and minute
     assert twice["f_coll"] == pytest.approx(0.25)
+
+
+def test_a_flock_that_fell_together_has_not_avoided_collisions():
+    """It met once and never parted: 9 meetings of ten boids are fewer than anyone's who keeps a distance for long."""
+    heap = {"flocked": 1.0, "n_coll": 9.0, "phi_coll": 1.0, "n_env_coll": 0.0}
+    parted = {"flocked": 1.0, "n_coll": 90.0, "phi_coll": 0.001, "n_env_coll": 0.0}
+    found = [fitness_kidger.fitness(values, 10, 60.0)["f_coll"] for values in (heap, parted)]
+    assert found[0] < 0.01 * found[1]
 
 
 def flights(name, seeds, **keys):

@@ -47,6 +47,10 @@ def test_points_are_asked_for_where_they_are_missing():
     refused("1 goals.points are not one for each of 10 agents", goals__kind="own", goals__points=[[0.0, 0.0, 9.0]])
 
 
+def test_only_cities_and_forests_are_drawn_anew():
+    refused("scene.draw = 'flight' with scene.kind = 'none'", scene__kind="none", scene__draw="flight")
+
+
 def test_a_start_inside_an_obstacle_is_refused():
     shut = {"scene__blocks": 9, "start__side": 12.0, "start__separation": 0.5, "world__dimensions": "2"}
     refused("start: the whole region", "start.clearance", **shut)

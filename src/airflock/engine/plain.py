@@ -62,6 +62,7 @@ def fly_plainly(
     Returns what a compiled driver returns: order parameters over time, frames (time, component, agent), the state at
     the end, and minus the number of the agent that found no room to start in.
     """
+    scenario = scenario.in_flight(seed)
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)

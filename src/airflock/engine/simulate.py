@@ -47,7 +47,7 @@ def plan_of(
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
-        scene=bool(len(scenario.stands().shapes)),
+        scene=scenario.scene.draw == "flight" or bool(len(scenario.stands().shapes)),
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
@@ -98,6 +98,7 @@ def fly(
 
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
+    scenario = scenario.in_flight(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)

@@ -122,6 +122,7 @@ def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     """Numbers of one world for a plan's driver."""
+    scenario = scenario.in_flight(seed)
     real = np.float32 if plan.bits == 32 else np.float64
     dt, times = scenario.flight.dt, clock(scenario)
     surfaces, families = faces(scenario)

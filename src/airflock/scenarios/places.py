@@ -27,6 +27,8 @@ def place_faults(scenario: Scenario) -> list[str]:
         ]
     if given.kind == "points" and not given.points:
         return ["goals.kind = 'points' needs goals.points, [[east, north, up], ...] in m"]
+    if scenario.scene.draw == "flight" and scenario.scene.kind not in ("city", "forest"):
+        return [f"scene.draw = 'flight' with scene.kind = {scenario.scene.kind!r}: only a city or a forest is drawn"]
     try:
         place = scenario.stands()
         points = scenario.waypoints()

@@ -1,13 +1,14 @@
 """Scenario: model, body, radio, sensors, world, number of agents, duration and sampling; frozen data."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
+from airflock.core import random
 from airflock.core.contract import Body, Model
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.geometry import largest_extension
@@ -60,6 +61,14 @@ class Scenario:
     def vehicle(self) -> Body:
         """The body that `body` holds the numbers of."""
         return next(found for found in BODIES.values() if type(self.body) is found.Parameters)
+
+    def in_flight(self, seed: int) -> "Scenario":
+        """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws."""
+        if self.scene.draw == "once":
+            return self
+        own = {"seed": random.words(seed, random.SCENE, 0, 0, int(self.scene.seed))[0] >> 1, "draw": "once"}
+        document = {**self.document, "scene": {**self.document.get("scene", {}), **own}}
+        return replace(self, scene=replace(self.scene, **own), document=document)
 
     def stands(self) -> Scene:
         """What stands in the world; for a model that casts, polygons are walls of it too."""

@@ -14,6 +14,13 @@ class Parameters(Record):
 
     kind: str = choice("none", ("none", "city", "forest", "mesh", "boxes"), meaning="what stands in the world")
     seed: float = quantity(0, "1", low=0, high=2**31, meaning="seed of the city or forest, a whole number")
+    draw: str = choice(
+        "once",
+        ("once", "flight"),
+        source="our choice",
+        meaning="city, forest: the same for all flights, or each flight draws its own, with its free goals, from "
+        "scene.seed and the flight's seed",
+    )
     density: float = quantity(
         1.0, "1", low=0.0, high=5.0, source=OURS, meaning="share of the blocks or trees that stand"
     )
