@@ -8,7 +8,7 @@ from typing import Any
 
 from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
-from airflock.papers.dimock_2003 import controller, ga, robust, static
+from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, static
 from airflock.papers.dimock_2003.flights import Birds
 from airflock.papers.flights import Progress, progress_bar
 
@@ -53,8 +53,8 @@ def recompute(
         claims += controller.claims(found["controller"])
     if "ga" in wanted or "robust" in wanted:
         found["ga"] = ga.evolve(birds, quick)
-        claims += ga.claims(found["ga"]) if "ga" in wanted else []
+        claims += ga_claims.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
-        found["robust"] = robust.compare(birds, found["ga"].gains, seeds or (12 if quick else 240), quick)
+        found["robust"] = robust.compare(birds, found["ga"].winners, seeds or (12 if quick else 240), quick)
         claims += robust.claims(found["robust"])
     return claims, found
