@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from airflock.papers.claims import Claim
-from airflock.papers.dimock_2003 import controller, ga, robust, static
+from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, static
 from airflock.papers.dimock_2003.flights import Birds
 from airflock.papers.flights import Flights
 from airflock.papers.paper import Found, Paper
@@ -30,9 +30,9 @@ def fly(wanted: Sequence[str], flights: Flights) -> Found:
         claims += controller.claims(found["controller"])
     if "ga" in wanted or "robust" in wanted:
         found["ga"] = ga.evolve(birds, quick)
-        claims += ga.claims(found["ga"]) if "ga" in wanted else []
+        claims += ga_claims.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
-        found["robust"] = robust.compare(birds, found["ga"].gains, flights.count(240, 12), quick)
+        found["robust"] = robust.compare(birds, found["ga"].winners, flights.count(240, 12), quick)
         claims += robust.claims(found["robust"])
     return claims, found
 

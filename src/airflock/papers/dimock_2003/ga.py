@@ -1,18 +1,41 @@
-"""The paper's genetic algorithm on the paper's fitness: convergence, collapse of K_a, geometry of the winners."""
+"""The paper's genetic algorithm on the paper's fitness, by seeds and under several readings; CMA-ES beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.evolve.genetic import Bits, decode, genetic
-from airflock.papers.claims import Claim, judged
-from airflock.papers.dimock_2003.flights import Birds, Flight, Start, Task, holds_vee, spacing
-from airflock.papers.dimock_2003.units import FT_LBF, SPAN, Gains, both, gains
+from airflock.evolve.cmaes import CMAES
+from airflock.evolve.genetic import decode, genetic
+from airflock.papers.dimock_2003.flights import Birds, Flight, Start, Task
+from airflock.papers.dimock_2003.units import Gains, gains
 
 LOST = 1e3  # W: loss of a controller that collides, or whose range of cohesion lies inside that of avoidance
-START = Start()
-SEED = 1
+POPULATION, GENERATIONS = 50, 150
+SEEDS = (1, 2, 3)
+Points = NDArray[np.float64]
+
+
+class Reading(NamedTuple):
+    """What the paper leaves open: what divides the weighted sums (Eq. 2), and the start of the V."""
+
+    centroid: str
+    start: Start
+
+    @property
+    def words(self) -> str:
+        """For a table."""
+        return f"{WEIGHTS[self.centroid]} weights, start ({self.start.sx:g}, {self.start.sy:g}) ft"
+
+
+WEIGHTS = {"others": "1/(n-1)", "n": "1/n"}
+READINGS = {
+    "mean": Reading("others", Start()),  # the prototype's
+    "near": Reading("others", Start(sx=5.0, sy=5.0)),  # the prototype's, tip to tip from the start
+    "n": Reading("n", Start()),  # those under which the published gains hold a V
+}
 
 
 @dataclass
@@ -20,15 +43,17 @@ class Run:
     """One run: by generation the best-ever and the mean power of the fit (W), share of K_a below 2 ft/s.
 
     champions : the best-ever controller after each generation
+    flown     : flights; a controller that comes again is not flown again
     flights   : of the best-ever after the paper's generations 5 and 13 and the last; full gradient of the last
     """
 
+    reading: Reading
+    seed: int
     best: list[float] = field(default_factory=list)
     mean: list[float] = field(default_factory=list)
     timid: list[float] = field(default_factory=list)
-    fit: list[float] = field(default_factory=list)
     champions: list[Gains] = field(default_factory=list)
-    evaluations: int = 0
+    flown: int = 0
     flights: dict[str, Flight] = field(default_factory=dict)
 
     @property
@@ -36,92 +61,93 @@ class Run:
         """The winner."""
         return self.champions[-1]
 
+    def note(self, points: Points, losses: NDArray[np.float64]) -> None:
+        """One more generation: controllers (candidate, axis) in the unit cube, and their losses."""
+        fit = losses[losses < LOST]
+        i = int(np.argmin(losses))
+        better = not self.best or losses[i] < self.best[-1]
+        self.champions.append(gains(points[i]) if better else self.champions[-1])
+        self.best.append(float(losses[i]) if better else self.best[-1])
+        self.mean.append(float(fit.mean()) if fit.size else float("nan"))
+        self.timid.append(float(np.mean([gains(point).k_a < 2.0 for point in points])))
 
-def evolve(birds: Birds, quick: bool = False, seed: int = SEED) -> Run:
-    """150 generations of 50; the gradient holds the others' circulations, winners fly again with the full one."""
-    run = Run()
-    known: dict[bytes, float] = {}
-    generations = 12 if quick else 150
 
-    def losses(chromosomes: Bits) -> NDArray[np.float64]:
-        fresh = {bits.tobytes(): bits for bits in chromosomes if bits.tobytes() not in known}
-        found = [gains(decode(bits)) for bits in fresh.values()]
-        inside = [i for i, g in enumerate(found) if g.r_c >= g.r_a]
-        flown = birds.fly("", [Task(found[i], START) for i in inside])
-        run.evaluations += len(flown)
-        known.update(dict.fromkeys(fresh, LOST))
-        keys = list(fresh)
-        for i, flight in zip(inside, flown, strict=True):
-            known[keys[i]] = LOST if flight.collided else flight.power
-        every = np.array([known[bits.tobytes()] for bits in chromosomes])
-        _note(run, chromosomes, every)
+@dataclass
+class Evolution:
+    """All runs of the genetic algorithm by the name of their reading, and of CMA-ES, seed by seed."""
+
+    runs: dict[str, list[Run]]
+    cmaes: list[Run]
+
+    @property
+    def winners(self) -> list[Gains]:
+        """Winners under the prototype's reading."""
+        return [run.gains for run in self.runs["mean"]]
+
+
+def evolve(birds: Birds, quick: bool = False) -> Evolution:
+    """Three readings and CMA-ES, three seeds each; quick: one seed, few generations."""
+    seeds, generations = (SEEDS[:1], 12) if quick else (SEEDS, GENERATIONS)
+    count, title = 0, "evolution"
+    total = len(seeds) * (len(READINGS) + 1)
+
+    def told(run: Run) -> Run:
+        nonlocal count
+        count += 1
         if birds.progress:
-            birds.progress("genetic algorithm", len(run.best), generations)
+            birds.progress(title, count, total)
+        return run
+
+    runs = {
+        name: [told(with_genetic(birds, reading, seed, generations)) for seed in seeds]
+        for name, reading in READINGS.items()
+    }
+    return Evolution(runs, [told(with_cmaes(birds, READINGS["mean"], run.seed, run.flown)) for run in runs["mean"]])
+
+
+def with_genetic(birds: Birds, reading: Reading, seed: int, generations: int = GENERATIONS) -> Run:
+    """The paper's algorithm; the gradient holds the others' circulations, winners fly again with the full one."""
+    run = Run(reading, seed)
+    losses = losses_of(birds, run)
+    genetic(lambda bits: losses(decode(bits)), 50, population=POPULATION, generations=generations, seed=seed)
+    return _flown_again(birds, run)
+
+
+def with_cmaes(birds: Birds, reading: Reading, seed: int, flights: int, population: int = 20) -> Run:
+    """CMA-ES on the same fitness, for as many flights as the genetic algorithm took."""
+    run = Run(reading, seed)
+    losses, search = losses_of(birds, run), CMAES(5, population, seed)
+    while run.flown < flights and len(run.best) < flights // population:
+        points = search.ask()
+        search.tell(points, losses(points)[:, None])
+    return _flown_again(birds, run)
+
+
+def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]:
+    """Losses (W) of controllers (candidate, axis) of one generation: all that are new fly side by side."""
+    known: dict[bytes, float] = {}
+
+    def losses(points: Points) -> NDArray[np.float64]:
+        fresh = {point.tobytes(): gains(point) for point in points if point.tobytes() not in known}
+        inside = {key: found for key, found in fresh.items() if found.r_c >= found.r_a}
+        tasks = [Task(found, run.reading.start) for found in inside.values()]
+        flown = birds.fly("", tasks, centroid=run.reading.centroid)
+        run.flown += len(flown)
+        known.update(dict.fromkeys(fresh, LOST))
+        known.update((key, LOST if f.collided else f.power) for key, f in zip(inside, flown, strict=True))
+        every = np.array([known[point.tobytes()] for point in points])
+        run.note(points, every)
         return every
 
-    genetic(losses, 50, population=50, generations=generations, seed=seed)
-    moments = {"early": 5, "midway": 13, "final": generations - 1}
-    tasks = [Task(run.champions[min(at, generations - 1)], START) for at in moments.values()]
-    run.flights = dict(zip(moments, birds.fly("best-ever controllers", tasks), strict=True))
-    run.flights["full gradient"] = birds.fly("winner, full gradient", [Task(run.gains, START)], gradient="cells")[0]
-    return run
+    return losses
 
 
-def _note(run: Run, chromosomes: Bits, losses: NDArray[np.float64]) -> None:
-    fit = losses[losses < LOST]
-    i = int(np.argmin(losses))
-    if not run.best or losses[i] < run.best[-1]:
-        run.champions.append(gains(decode(chromosomes[i])))
-        run.best.append(float(losses[i]))
-    else:
-        run.champions.append(run.champions[-1])
-        run.best.append(run.best[-1])
-    run.mean.append(float(fit.mean()) if fit.size else float("nan"))
-    run.fit.append(fit.size / losses.size)
-    run.timid.append(float(np.mean([gains(decode(bits)).k_a < 2.0 for bits in chromosomes])))
-
-
-def claims(run: Run) -> list[Claim]:
-    """Verdicts on Figs 5-8."""
-    final, full = run.flights["final"], run.flights["full gradient"]
-    aside, swing = spacing(final)
-    fall = run.mean[0] / run.mean[-1]
+def _flown_again(birds: Birds, run: Run) -> Run:
     last = len(run.best) - 1
-    tenth = min(10, last)
-    source = "Results, Fig. 5"
-    return [
-        Claim(
-            id="ga.best", statement="the GA reaches -9.8 (read as ft lbf/s per bird)", source=source,
-            test="best-ever within 5 % of it", published=9.8 * FT_LBF, ours=run.best[-1], runs=run.evaluations,
-            **judged(
-                run.best[-1] <= 1.05 * 9.8 * FT_LBF,
-                f"{both(run.best[-1])} after {last + 1} generations ({run.gains.text()}); with the full gradient "
-                f"{'a collision' if full.collided else both(full.power)}; 9.8 needs coarser filaments or another start",
-            ),
-        ),
-        Claim(
-            id="ga.range", statement="best-ever at 10 segments from a V of 5 by 6.5 ft",
-            source="a prototype with the same conventions: 11.7 to 12.0 ft lbf/s",
-            test="between 11.0 and 12.4 ft lbf/s", published=11.9 * FT_LBF, ours=run.best[-1],
-            **judged(11.0 <= run.best[-1] / FT_LBF <= 12.4, both(run.best[-1])),
-        ),
-        Claim(
-            id="ga.fall", statement="the population's mean power falls as the GA converges", source=source,
-            test="by a factor of 1.7 or more (the figure: about 25 to about 11)", published=2.3, ours=fall,
-            runs=run.evaluations,
-            **judged(fall >= 1.7, f"from {both(run.mean[0])} to {both(run.mean[-1])}, collided ones left out"),
-        ),
-        Claim(
-            id="ga.timid", statement="the gain of avoidance collapses: K_a < 2 in over 75 % of controllers",
-            source="Results: within 10 generations", test=f"in over 75 % of the population at generation {last}",
-            published=0.75, ours=run.timid[-1], runs=50,
-            **judged(run.timid[-1] > 0.75, f"{run.timid[tenth]:.0%} at generation {tenth}, {run.timid[-1]:.0%} at the "
-                     "end: the speed of the collapse varies with the seed"),
-        ),
-        Claim(
-            id="ga.vee", statement="the best-ever controller flies in a stable V", source="Results, Fig. 8",
-            test="a V at the end, neighbours 0.88 to 0.95 spans aside", ours=aside / SPAN,
-            **judged(holds_vee(final) and 0.88 <= aside / SPAN <= 0.95,
-                     f"{aside / SPAN:.2f} spans; {'a' if holds_vee(final) else 'no'} V; a bird swings {swing:.2g} ft"),
-        ),
-    ]  # fmt: skip
+    moments = {"early": 5, "midway": 13, "final": last}
+    tasks = [Task(run.champions[min(at, last)], run.reading.start) for at in moments.values()]
+    flown = birds.fly("", tasks, centroid=run.reading.centroid)
+    run.flights = dict(zip(moments, flown, strict=True))
+    full = birds.fly("", tasks[-1:], centroid=run.reading.centroid, gradient="cells")[0]
+    run.flights["full gradient"] = full
+    return run

@@ -10,6 +10,7 @@ from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
 from airflock.papers.dimock_2003 import PAPER
 from airflock.papers.dimock_2003.flights import Flight
+from airflock.papers.dimock_2003.ga import WEIGHTS
 from airflock.papers.dimock_2003.units import FOOT, FT_LBF
 
 COMMAND = "airflock paper dimock_2003"
@@ -21,7 +22,12 @@ WORDS = (
         "Eqs 1 and 2 of the surviving scan are illegible. C1 and 1/n weights are reconstructions, fitted to what the "
         "paper says its controller does, and not read from it; the spacing of the start is not printed either.",
     ),
-    ("ga.", "The genetic algorithm, Figs 5-8", "A V of 5 by 6.5 ft; gradients with the others' circulations held."),
+    (
+        "ga.",
+        "The genetic algorithm, Figs 5-8",
+        "Three seeds of each reading of Eq. 2 and of the start; gradients with the others' circulations held. "
+        "Intervals are the least and the greatest of the seeds. Figures are of the first seed with 1/(n-1) weights.",
+    ),
     ("robust.", "A sound fitness", "V, tight, wide, column, random and 3-D starts with noise; 60 s; CMA-ES."),
 )
 
@@ -38,9 +44,10 @@ def write(folder: Path, claims: list[Claim], found: dict[str, Any]) -> None:
     figures = folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     if "ga" in found:
+        run = found["ga"].runs["mean"][0]
         convergence(figures / "fig5.png", found["ga"])
         for name, (number, flight) in {"early": (6, "early"), "midway": (7, "midway"), "final": (8, "final")}.items():
-            traces(figures / f"fig{number}.png", found["ga"].flights[flight], f"Fig. {number}: best-ever, {name}")
+            traces(figures / f"fig{number}.png", run.flights[flight], f"Fig. {number}: best-ever, {name}")
     if "robust" in found:
         front(figures / "pareto.png", found["robust"])
     header = {"paper": PAPER.title, "command": COMMAND, "version": __version__, "precision": "32 bits"}
@@ -83,11 +90,14 @@ def _save(figure: Any, path: Path) -> None:
     pyplot.close(figure)
 
 
-def convergence(path: Path, run: Any) -> None:
-    """Best-ever and mean fitness over the generations, like Fig. 5."""
-    figure, axes = _axes("Fig. 5: best-ever and average fitness")
-    axes.plot(-np.array(run.best) / FT_LBF, label="best-ever")
-    axes.plot(-np.array(run.mean) / FT_LBF, "--", label="average of those that fly on")
+def convergence(path: Path, found: Any) -> None:
+    """Best-ever and mean fitness over the generations of every seed, like Fig. 5."""
+    figure, axes = _axes("Fig. 5: best-ever (solid) and average (dashed) fitness")
+    for name, colour in (("mean", "C0"), ("n", "C1")):
+        for run in found.runs[name]:
+            label = f"{WEIGHTS[run.reading.centroid]} weights" if run is found.runs[name][0] else None
+            axes.plot(-np.array(run.best) / FT_LBF, color=colour, linewidth=1.0, label=label)
+            axes.plot(-np.array(run.mean) / FT_LBF, "--", color=colour, linewidth=0.6)
     axes.axhline(-9.8, color="0.6", linewidth=0.8, label="published best")
     axes.set(xlabel="generation", ylabel="fitness, ft lbf/s per bird")
     axes.legend()

@@ -37,13 +37,13 @@ class Comparison:
     front: list[tuple[float, float]]
 
 
-def compare(birds: Birds, winner: Gains, count: int, quick: bool) -> Comparison:
+def compare(birds: Birds, winners: list[Gains], count: int, quick: bool) -> Comparison:
     """Evolve the robust controller, then fly it, the winner and the published one on `count` held-out starts."""
     found, front = evolve(birds, 4 if quick else 25)
     tasks = [(TRAINED[k % len(TRAINED)], TEST + k) for k in range(count)]
     flights = {
         "published": birds.fly("held out: published", [Task(BEST, *t) for t in tasks], DURATION),
-        "winner": birds.fly("held out: winner of the GA", [Task(winner, *t) for t in tasks], DURATION),
+        "winner": birds.fly("held out: winner of the GA", [Task(winners[0], *t) for t in tasks], DURATION),
         "robust": birds.fly("held out: robust", [Task(found, *t) for t in tasks], DURATION, avoidance="barrier"),
     }
     return Comparison(flights, found, front)
