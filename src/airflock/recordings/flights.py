@@ -36,7 +36,7 @@ def simulate(
     Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
-    device = picked([scenario], device, precision=precision, say=say)
+    device = picked([scenario], device, precision=precision, record=True, say=say)
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     period = clock(scenario)["sample_every"] * scenario.flight.dt
