@@ -17,12 +17,11 @@ pytestmark = pytest.mark.gpu
 
 def both(found, seeds, precision=64, **layout):
     """Flights of the CPU and of the GPU."""
-    from airflock.engine.cuda.launch import fly_many
-    from airflock.engine.cuda.shape import shape_of
+    from airflock.engine.cuda.launch import fly_many, layout_of
 
     plan = replace(plan_of(found, precision=precision, record=True), grid=False)
     jobs = [tables(found, plan, seed) for seed in seeds]
-    shape = replace(shape_of(found.agents, len(jobs), sequential=plan.sequential), **layout) if layout else None
+    shape = replace(layout_of(plan, found.agents, len(jobs)), **layout) if layout else None
     return [cpu.fly(plan, job) for job in jobs], fly_many(plan, jobs, shape=shape)
 
 
@@ -35,6 +34,7 @@ CASES = {
     "links": ("vasarhelyi_2018/4ms", {"duration": 6.0, "agents": 30, "radio.kind": "links", "radio.loss": 0.3}, {}),
     "in turn": ("zapotecatl_2016/best", {"duration": 0.2}, {}),
     "city": ("kidger/city", {"duration": 2.0}, {}),
+    "wings": ("dimock_2003/physical", {"duration": 3.0}, {}),
 }
 
 

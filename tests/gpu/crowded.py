@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.engine.cuda.crowd import Crowd, fly_crowd  # noqa: E402
+from airflock.engine.cuda.crowd import Crowd, cells_of, fly_crowd  # noqa: E402
 from airflock.engine.plain import fly_plainly  # noqa: E402
 from airflock.engine.simulate import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
@@ -42,7 +42,7 @@ def differ(name, seed):
     flock.advance(3)
     other = Crowd(found, plan, seed)
     other.advance(3)
-    cells = int(np.prod(flock._cells()[2]))
+    cells = int(np.prod(cells_of(found, plan, flock.tables)[2]))
     return {
         "state": float(np.abs(flown.state - known.state).max()),
         "frames": float(np.abs(flown.frames - known.frames).max()),

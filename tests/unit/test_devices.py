@@ -11,6 +11,7 @@ from airflock.engine.cuda.shape import MOST_THREADS, shape_of
 from airflock.engine.simulate import picked, plan_of, score_flights
 from airflock.errors import DeviceError, ScenarioError
 from flocks import scenario
+from gpus import runtime
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
 
@@ -18,6 +19,7 @@ SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
 @pytest.fixture
 def present(monkeypatch):
     monkeypatch.setattr(gpu, "trouble", lambda: None)
+    monkeypatch.setattr(gpu, "runtime", lambda: runtime(free=140e9))
 
 
 @pytest.fixture

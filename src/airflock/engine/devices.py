@@ -8,7 +8,6 @@ import numpy as np
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
-from airflock.engine.passes import flock
 from airflock.engine.plan import Plan
 from airflock.engine.tables import clock, tables
 from airflock.errors import DeviceError, ScenarioError
@@ -37,8 +36,7 @@ class Choice:
 def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) -> Choice:
     """Device for these flights: ScenarioError for an unknown name, DeviceError where a named one cannot fly them.
 
-    scenarios : one per flight
-    plans     : the distinct plans among them
+    plans : one per scenario
     """
     if device not in DEVICES:
         raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
@@ -46,12 +44,17 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
         return Choice(device)
     from airflock.engine.cuda.device import required, trouble
 
-    agents = max(scenario.agents for scenario in scenarios)
-    faults = (no_cuda(plan, agents) for plan in plans)
+    largest: dict[Plan, Scenario] = {}
+    for scenario, plan in zip(scenarios, plans, strict=True):
+        if plan not in largest or scenario.agents > largest[plan].agents:
+            largest[plan] = scenario
+    faults = (no_cuda(plan, scenario.agents) for plan, scenario in largest.items())
     if device == "cuda":
         required()
         for fault in filter(None, faults):
             raise DeviceError(f"device = cuda: {fault}")
+        for fault in filter(None, map(no_room, largest.values(), largest)):
+            raise DeviceError(f"device = cuda: {fault}; or choose device = cpu")
         return Choice(device)
     missing = trouble() or next(filter(None, faults), None)
     if missing is not None:
@@ -59,13 +62,31 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     seconds = sum(work(scenario) for scenario in scenarios) / cpu.cores()
     if seconds < WORTH:
         return Choice("cpu", f"about {seconds:.2g} s of work on {cpu.cores()} cores")
+    missing = next(filter(None, map(no_room, largest.values(), largest)), None)
+    if missing is not None:
+        return Choice("cpu", missing)
     return Choice("cuda", f"about {seconds:.2g} s of work on {cpu.cores()} cores would be left to the CPU")
+
+
+def by_cells(scenario: Scenario, plan: Plan, given: bool = False) -> bool:
+    """Whether a GPU flies a flock by cells, step by step, and not as one block; given: from given places."""
+    from airflock.engine.cuda.crowd import refused
+
+    return refused(plan, scenario.agents) is None and (given or not scenario.separation())
+
+
+def no_room(scenario: Scenario, plan: Plan) -> str | None:
+    """Why a flock does not fit into the GPU's free memory; None if it does."""
+    from airflock.engine.cuda import crowd, launch
+
+    if by_cells(scenario, plan, plan.given_start):
+        return crowd.too_large(scenario, plan)
+    plan = replace(plan, grid=False)
+    return launch.too_large(plan, tables(scenario, plan, 0))
 
 
 def no_cuda(plan: Plan, agents: int) -> str | None:
     """Why a GPU cannot fly a plan with this many agents; None if it can."""
-    if flock.owners(plan):
-        return f"{plan.model.name} or its metrics solve for the whole flock at once, which only cpu does"
     if agents <= MOST_TOGETHER:
         return None
     from airflock.engine.cuda.crowd import refused
@@ -101,15 +122,13 @@ def fly_on_gpu(
     done: Callable[[], None] | None = None,
 ) -> list[Flown]:
     """Fly worlds on the GPU, flight i with plans[i] and seeds[i]; those of one plan together in one launch."""
-    from airflock.engine.cuda.crowd import fly_crowd, refused
+    from airflock.engine.cuda.crowd import fly_crowd
     from airflock.engine.cuda.launch import fly_many
 
     groups: dict[Plan, list[int]] = {}
     results: dict[int, Flown] = {}
     for number, plan in enumerate(plans):
-        if refused(plan, scenarios[number].agents) is None and (
-            starts is not None or not scenarios[number].separation()
-        ):
+        if by_cells(scenarios[number], plan, starts is not None):
             start = None if starts is None else starts[number]
             results[number] = fly_crowd(scenarios[number], plan, seeds[number], start)
             if done:

@@ -114,18 +114,20 @@ def picked(
     device: str = "auto",
     *,
     precision: int = 32,
+    record: bool = False,
     say: Callable[[str], None] | None = None,
 ) -> str:
     """Device on which these flights run: the one that is named if it can fly them, else what `auto` picks."""
     if device == "cpu":
         return device
-    return _choice(device, scenarios, [plan_of(scenario, precision=precision) for scenario in scenarios], say)
+    plans = [plan_of(scenario, precision=precision, record=record) for scenario in scenarios]
+    return _choice(device, scenarios, plans, say)
 
 
 def _choice(
     device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan], say: Callable[[str], None] | None
 ) -> str:
-    choice = devices.choose(device, scenarios, list(dict.fromkeys(plans)))
+    choice = devices.choose(device, scenarios, plans)
     if say is not None and choice.note:
         say(choice.note)
     return choice.device

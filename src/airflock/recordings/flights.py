@@ -37,7 +37,7 @@ def simulate(
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
     scenario = scenario.in_flight(seed)
-    device = picked([scenario], device, precision=precision, say=say)
+    device = picked([scenario], device, precision=precision, record=True, say=say)
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     period = clock(scenario)["sample_every"] * scenario.flight.dt

@@ -13,11 +13,14 @@ from airflock.engine.cuda.lower import lowered, used
 from airflock.engine.cuda.primitives import head
 from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
-from airflock.engine.passes.build import JIT, Builder
+from airflock.engine.passes.build import JIT, Builder, branch
 from airflock.engine.plan import Plan
 
-STAGES = ("snapshot", "perceive", "neighbours", "boundaries", "decide", "move", "aim_", "glide_", "appear_", "measure_")
-SCRATCH = 24  # totals that one stage reduces at once, at most
+STAGES = (
+    "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
+    "measure_",
+)  # fmt: skip
+REDUCED = 24  # totals that one stage reduces at once, at most
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,10 @@ class CudaBuilder(Builder):
         if name != "receive":
             self.letters, self.bound = set(), set()
 
+    def once(self, lines: Iterable[str]) -> list[str]:
+        """Lines that one thread of the block runs."""
+        return ["cuda.syncthreads()", *branch("tid == 0", lines), "cuda.syncthreads()"]
+
     def clusters(self, metric: Metric) -> list[str]:  # type: ignore[override]
         """Clusters are found by all threads of a block together."""
         return clusters(self, metric)
@@ -171,7 +178,7 @@ class CudaBuilder(Builder):
         free = (free - set(tables)) | ({"work"} if tables else set())
         order = tuple(sorted(free))
         text = [*lines, *(line for s in body for line in ast.unparse(s).splitlines())]
-        if "scratch" in read:
+        if "reduced" in read:
             text = ["cuda.syncthreads()", *text]
         if results:
             text += [f"return {', '.join(results)}"]

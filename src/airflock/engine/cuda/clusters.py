@@ -5,9 +5,9 @@ thread keeps the links of its agent as bits, so that a round reads a few words; 
 """
 
 from airflock.core.contract import Metric
-from airflock.core.vocabulary import Mean, asks
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.passes.decide import START, combine
+from airflock.engine.passes.members import members
 
 VALID = "np.uint32(FULL) if n >= 32 * part + 32 else (np.uint32((1 << max(n - 32 * part, 0)) - 1))"
 
@@ -114,27 +114,10 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
 
 def _members(build: Builder, metric: Metric) -> tuple[list[str], str]:
     """Lines that sum the member rule over the cluster at hand, after its own mean; and the name of that mean."""
-    rule = metric.member
-    if rule is None:
+    if metric.member is None:
         return [], "mean"
-    axes, fields = build.plan.axes, metric.Member._fields  # type: ignore[union-attr]
-    names = [*axes, *(f"v{a}" for a in axes), *(f"head_{a}" for a in axes)]
-    lines = [f"c_{name} = ZERO" for name in names]
-    lines += loop("i in range(n)", [f"c_{name} += mine[i] * {name}[i]" for name in names])
-    means = [f"c_{kind}{a} / real(size)" if a in axes else "ZERO" for kind in ("", "v", "head_") for a in "xyz"]
-    lines += [f"own_mean = {build.source.name(Mean)}({', '.join(means)}, real(size))"]
-    given = {"mean": "own_mean", "speed": "speed[i]"}
-    for a in "xyz":
-        flown = {a: f"{a}[i]", f"v{a}": f"v{a}[i]", f"h{a}": f"head_{a}[i]"}
-        given |= flown if a in axes else dict.fromkeys(flown, "ZERO")
-    body = []
-    if "pair" in asks(rule, "member", metric.name):
-        values = ", ".join(f"{metric.name}_{name}[i]" for name in metric.Pair._fields)  # type: ignore[union-attr]
-        body += [f"pair = {build.source.name(metric.Pair)}({values})"]
-    how = [metric.reduce.get(name, "sum") for name in fields]
-    lines += [f"m{c} = {START[how[c]]}" for c in range(len(fields))]
-    body += [f"t = {build.call(rule, 'member', given, metric.name)}"]
-    terms = [f"(t[{c}] if mine[i] > HALF else {START[how[c]]})" for c in range(len(fields))]
-    body += [combine(how[c], f"m{c}", term) for c, term in enumerate(terms)]
-    values = ", ".join(f"m{c}" for c in range(len(fields)))
-    return [*lines, *loop("i in range(n)", body), f"members = {build.source.name(metric.Member)}({values})"], "own_mean"
+    text = members(build, metric, "i")
+    lines = [*text.zeros, *loop("i in range(n)", [f"c_{x} += mine[i] * {x}[i]" for x in text.rows])]
+    terms = [f"(t[{c}] if mine[i] > HALF else {START[how]})" for c, how in enumerate(text.how)]
+    body = [*text.body, *(combine(text.how[c], f"m{c}", term) for c, term in enumerate(terms))]
+    return [*lines, *text.mean, *loop("i in range(n)", body), text.record], "own_mean"

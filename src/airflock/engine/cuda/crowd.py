@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
-from airflock.engine.cuda.cells import COMMON, NEAR, crowd
+from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
 from airflock.engine.cuda.device import free_memory, required, runtime, simulating
+from airflock.engine.cuda.memory import SHARE, unfit
 from airflock.engine.passes.build import columns
+from airflock.engine.passes.flock import owners
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, clock, tables
 from airflock.errors import DeviceError
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.wings import FORMATIONS
 
 CELLS = 4  # at most so many cells per agent, as on the CPU
 PAIRED = 20_000  # agents from which order parameters that look at all pairs are refused
@@ -34,6 +37,10 @@ def refused(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
+    if owners(plan):
+        return f"{plan.model.name} or its order parameters solve for the whole flock"
+    if plan.start in FORMATIONS and not plan.given_start:
+        return f"one big flock starts at random or given places, not in start.kind = {plan.start}"
     if plan.goals or plan.own or plan.scene or plan.stop:
         return "one big flock with goals, in a scene, or up to its first collision flies on cpu"
     if any(metric.clock == "collision" for metric in plan.metrics):
@@ -41,6 +48,31 @@ def refused(plan: Plan, agents: int) -> str | None:
     if agents > PAIRED and any(metric.pair or metric.cluster for metric in plan.metrics):
         return f"order parameters of pairs take too long for {agents} agents; choose metrics.kind = order"
     return None
+
+
+def cells_of(scenario: Scenario, plan: Plan, tables: Tables) -> tuple[list[float], list[float], list[int]]:
+    """Lower corner and size of the cells (m), and their number, per axis. Who is outside is in the nearest cell."""
+    row = dict(zip([f"{k}.{f}" for k, fields in plan.records.items() for f in fields], tables.row, strict=True))
+    assert scenario.model.reach is not None
+    near = min(float(scenario.model.reach(scenario.parameters)), float(scenario.radio.range), 1e8)
+    half = [float(row[f"w.half_{a}"]) if a in plan.axes else 0.0 for a in "xyz"]
+    if not plan.periodic:  # an arena without walls has no size: where the agents start is as good a box as any
+        half = [h if 0.0 < h < 1e7 else float(row[f"w.extent_{a}"]) for h, a in zip(half, "xyz", strict=True)]
+    width = [2.0 * h for h in half]
+    volume = math.prod(max(w / near, 1.0) for w in width)
+    side = near * max(1.0, (volume / (CELLS * scenario.agents)) ** (1.0 / plan.dimensions))
+    count = [max(1, int(w / side)) for w in width]
+    size = [w / c if w > 0.0 else 1.0 for w, c in zip(width, count, strict=True)]
+    return [-h for h in half], size, count
+
+
+def too_large(scenario: Scenario, plan: Plan) -> str | None:
+    """Why a flock does not fit into the GPU's free memory: what it needs and how many agents fit; None if it does."""
+    each = 2 * (NEAR + rest_columns(plan)) * plan.bits // 8 + 12  # two copies of the tables; cell, rank, number
+    each += 8 * CELLS  # at most so many cells, each with a count and a first agent
+    room = int(SHARE * free_memory())
+    n = scenario.agents
+    return None if n * each <= room else unfit(n, n * each, room, room // each)
 
 
 class Crowd:
@@ -68,15 +100,11 @@ class Crowd:
     def _allocate(self) -> None:
         """All tables."""
         cuda, real, n = runtime(), self.tables.row.dtype, self.agents
-        low, size, count = self._cells()
+        low, size, count = cells_of(self.scenario, self.plan, self.tables)
         cells = int(np.prod(count))
-        needed = (2 * n * (NEAR + self.driver.REST)) * real.itemsize + 12 * n + 8 * cells
-        if not simulating() and needed > 0.9 * free_memory():
-            fits = int(n * 0.9 * free_memory() / needed)
-            raise DeviceError(
-                f"device = cuda: a flock of {n} agents needs {needed / 1e9:.2g} GB of the GPU's memory and "
-                f"{free_memory() / 1e9:.2g} GB are free; about {fits} agents fit"
-            )
+        fault = None if simulating() else too_large(self.scenario, self.plan)
+        if fault is not None:
+            raise DeviceError(f"device = cuda: {fault}")
         t = self.tables
         shapes = t.shapes if len(t.shapes) else np.zeros((1, 16), real)
         whole = [t.faces, t.edges, t.spans, shapes, t.nodes.reshape(-1, 6), t.links.reshape(-1, 3)]
@@ -91,24 +119,6 @@ class Crowd:
         self.starts = cuda.to_device(np.zeros(cells + 1, np.uint32))
         self.blocks = -(-cells // self.driver.SCAN)
         self.sums = cuda.to_device(np.zeros(self.blocks, np.int32))
-
-    def _cells(self) -> tuple[list[float], list[float], list[int]]:
-        """Lower corner and size of the cells (m), and their number, per axis. Who is outside is in the nearest cell."""
-        plan, scenario = self.plan, self.scenario
-        row = dict(
-            zip([f"{k}.{f}" for k, fields in plan.records.items() for f in fields], self.tables.row, strict=True)
-        )
-        assert scenario.model.reach is not None
-        near = min(float(scenario.model.reach(scenario.parameters)), float(scenario.radio.range), 1e8)
-        half = [float(row[f"w.half_{a}"]) if a in plan.axes else 0.0 for a in "xyz"]
-        if not plan.periodic:  # an arena without walls has no size: where the agents start is as good a box as any
-            half = [h if 0.0 < h < 1e7 else float(row[f"w.extent_{a}"]) for h, a in zip(half, "xyz", strict=True)]
-        width = [2.0 * h for h in half]
-        volume = math.prod(max(w / near, 1.0) for w in width)
-        side = near * max(1.0, (volume / (CELLS * self.agents)) ** (1.0 / plan.dimensions))
-        count = [max(1, int(w / side)) for w in width]
-        size = [w / c if w > 0.0 else 1.0 for w, c in zip(width, count, strict=True)]
-        return [-h for h in half], size, count
 
     def _begin(self, start: Any) -> None:
         """Agents at random places, or at given ones: (component, agent)."""

@@ -1,18 +1,17 @@
 """Kernel: a whole flight of one flock per block, as the order in which the stages run."""
 
-import re
-
-from airflock.engine.cuda.build import SCRATCH, CudaBuilder
+from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
-from airflock.engine.cuda.start import agents, begin, own, tables
-from airflock.engine.passes import decide, measure, move, perceive, scene
+from airflock.engine.cuda.start import agents, begin, own
+from airflock.engine.cuda.state import memory
+from airflock.engine.passes import decide, flock, measure, move, perceive, scene
 from airflock.engine.passes.build import branch, columns, loop
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
     "starts", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums",
-    "all_reached", "all_frames",
+    "all_reached", "all_frames", "scratches", "scratch_rows",
 )  # fmt: skip
 CUT = 0.01  # m, slack that covers the rounding of positions in single precision
 
@@ -25,6 +24,7 @@ def flight(plan: Plan, shape: Shape) -> str:
     perceive.receive(build)
     decide.neighbours(build)
     decide.boundaries(build)
+    flock.flock(build)
     decide.decide(build)
     move.move(build)
     if plan.goals:
@@ -36,7 +36,7 @@ def flight(plan: Plan, shape: Shape) -> str:
     for clock in clocks(plan):
         measure.measure(build, clock)
     body = _time(build)  # first: it may still name rules
-    lines = [*_memory(build), *begin(build), *body, *_end(build)]
+    lines = [*memory(build), *begin(build), *body, *_end(build)]
     options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.threads}, cache=True")
     text = [f"@cuda.jit({options})", f"def fly({', '.join(ARGUMENTS)}):", *(f"    {line}" for line in lines)]
     parts = [build.head, *build.source.blocks, *build.functions, "\n".join(text)]
@@ -47,74 +47,6 @@ def flight(plan: Plan, shape: Shape) -> str:
 def clocks(plan: Plan) -> list[str]:
     """Clocks that any metric of a plan runs on."""
     return [clock for clock in measure.CLOCKS if any(metric.clock == clock for metric in plan.metrics)]
-
-
-# --------------------------------------------------------------------------------------------------------- memory
-
-
-def _memory(build: CudaBuilder) -> list[str]:
-    """Where everything of this flock and this thread lies."""
-    plan, shape = build.plan, build.shape
-    lines = ["flock = cuda.blockIdx.x; tid = integer(cuda.threadIdx.x)"]
-    lines += ["i = integer(tid // PER_AGENT); sub = integer(tid % PER_AGENT)"]
-    lines += ["row = rows[flock]; whole = wholes[flock]"]
-    lines += ["faces = all_faces[flock]; edges = all_edges[flock]; spans = all_spans[flock]"]
-    lines += ["goals = all_goals[flock]; reached = all_reached[flock]; past = pasts[flock]; store = stores[flock]"]
-    lines += ["later = all_later[flock]; shapes = all_shapes[flock % all_shapes.shape[0]]"]
-    wide = {"seed_low": "u32", "seed_high": "u32"}
-    names = {"ring": "slots"}
-    lines += [f"{names.get(w, w)} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
-    lines += ["n = agents", *_records(build), "late = real(delay) * row_c.dt"]
-    kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
-    if shape.registers:
-        for table, width in tables(build).items():
-            lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
-        lines += ["links_ = cuda.local.array(WORDS, np.uint32)"]
-        lines += ["seen = cuda.shared.array(WORDS, np.uint32)", "grown = cuda.shared.array(WORDS, np.uint32)"]
-    else:
-        lines += ["work = works[flock]; words = all_words[flock]; mem = all_mem[flock]; memory = all_memory[flock]"]
-    lines += [f"scratch = cuda.shared.array((2, WARPS, {SCRATCH}), {kind})"]
-    count = len(columns(plan.metrics))
-    lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
-    lines += [f"gust = cuda.local.array(3, {kind})", "gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
-    lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
-    lines += [f"near = cuda.local.array({scene.NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
-    lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
-    lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
-    lines += [f"scene = ({', '.join(scene.PARTS)})"]
-    return [*lines, *_registers(build)]
-
-
-def _records(build: CudaBuilder) -> list[str]:
-    """Records of numbers, once per flight."""
-    lines, offset = [], 0
-    for letter, fields in build.plan.records.items():
-        kind = build.source.record(letter.upper() * 2, fields)
-        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
-        offset += len(fields)
-    return lines
-
-
-def _registers(build: CudaBuilder) -> list[str]:
-    """First values of all registers; the memories of model and metrics at their start values."""
-    lines = []
-    for name in sorted({r for stage in build.stages.values() for r in (*stage.arguments, *stage.results)}):
-        if re.fullmatch(r"u[0-3]_i", name):
-            lines += [f"{name} = u32(0)"]
-        elif name.endswith("_i"):
-            lines += [f"{name} = {_first_value(build, name)}"]
-    return lines if build.shape.registers else []
-
-
-def _first_value(build: CudaBuilder, name: str) -> str:
-    """First value of one register."""
-    kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
-    if not kept:
-        return "ZERO"
-    starts = [s for m in build.plan.metrics for s in getattr(m.Memory, "_field_defaults", {}).values()]
-    if kept[1] == "mem":
-        starts = list(getattr(build.plan.model.Memory, "_field_defaults", {}).values())
-    return f"real({starts[int(kept[2])]})"
 
 
 # ------------------------------------------------------------------------------------------------------------ time
@@ -232,7 +164,7 @@ def _choose(build: CudaBuilder) -> list[str]:
     """Meet neighbours and surfaces, decide."""
     barrier = [] if build.shape.registers else ["cuda.syncthreads()"]
     lines = []
-    for name in ("neighbours", "boundaries", "decide"):
+    for name in ("neighbours", "boundaries", "flock", "decide"):
         if name in build.stages:
             lines += [build.stages[name].call(k_="k"), *barrier]
     lines += ["k = integer(k + 1); to_decide = decide_every"]
@@ -255,7 +187,7 @@ def _taken(build: CudaBuilder) -> list[str]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
         names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
-        body = [f"all_frames[flock, frame, {c}, i] = {own(build, name)}" for c, name in enumerate(names)]
+        body = [f"all_frames[block, frame, {c}, i] = {own(build, name)}" for c, name in enumerate(names)]
         lines += [*agents(build, body), "frame = integer(frame + 1)"]
     return lines
 
@@ -286,11 +218,11 @@ def _end(build: CudaBuilder) -> list[str]:
     """What a flight leaves behind."""
     axes = build.plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
-    lines = agents(build, [f"states[flock, {c}, i] = {own(build, name)}" for c, name in enumerate(names)])
+    lines = agents(build, [f"states[block, {c}, i] = {own(build, name)}" for c, name in enumerate(names)])
     count = len(columns(build.plan.metrics))
-    last = [f"all_sums[flock, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
+    last = [f"all_sums[block, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
     last += [
-        f"all_sums[flock, {count}, 0] = real(count_sample)",
-        f"all_sums[flock, {count + 1}, 0] = real(count_collision)",
+        f"all_sums[block, {count}, 0] = real(count_sample)",
+        f"all_sums[block, {count + 1}, 0] = real(count_collision)",
     ]
-    return [*lines, *branch("tid == 0", [*last, "statuses[flock] = 0"])]
+    return [*lines, *branch("tid == 0", [*last, "statuses[block] = 0"])]

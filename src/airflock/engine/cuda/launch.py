@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 from airflock.engine.cpu import Flown, combined, goals_reached
 from airflock.engine.cuda.device import free_memory, multiprocessors, required, runtime
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
-from airflock.engine.cuda.shape import Shape, shape_of
+from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
+from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import columns
-from airflock.engine.passes.flock import owners
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.errors import DeviceError
-from airflock.scenarios.wings import FORMATIONS
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
-SHARE = 0.9  # of the free memory that may be used
 
 
 @lru_cache(maxsize=256)
@@ -46,14 +44,13 @@ def fly_many(
 
     Raises DeviceError where no GPU can be used, or one flock does not fit into its memory.
     """
-    refuse(plan)
     required(shape is not None and shape.simulated)
     groups: dict[Any, list[int]] = {}
     for number, tables in enumerate(jobs):
         groups.setdefault(_alike(plan, tables), []).append(number)
     flown_by: dict[int, Flown] = {}
     for key, members in groups.items():
-        layout = shape or shape_of(key[0], len(members), multiprocessors(), sequential=plan.sequential)
+        layout = shape or layout_of(plan, key[0], len(members), multiprocessors())
         driver = flight_driver(plan, layout)
         size = _batch(plan, driver, layout, [jobs[m] for m in members])
         for first in range(0, len(members), size):
@@ -67,14 +64,6 @@ def fly_many(
     return [flown_by[number] for number in range(len(jobs))]
 
 
-def refuse(plan: Plan) -> None:
-    """Raise DeviceError for what only a processor flies: rules of the whole flock, start formations."""
-    found = [f"{owner.name}.{owner.kind} solves for the whole flock" for owner in owners(plan)]
-    found += [f"start.kind = {plan.start!r}"] if plan.start in FORMATIONS and not plan.given_start else []
-    if found:
-        raise DeviceError(f"device = cuda: {found[0]}, which only the CPU does; choose device = cpu")
-
-
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
     whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
@@ -83,54 +72,27 @@ def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     return whole["agents"], frames, len(tables.goals), len(tables.later), scene
 
 
-def _sizes(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays that a launch works on, for one flock, by argument name."""
-    whole = [dict(zip(WHOLE, tables.whole.tolist(), strict=True)) for tables in jobs]
-    n, dims, lanes = max(w["agents"] for w in whole), plan.dimensions, shape.lanes
-    frames = max(w["steps"] // w["sample_every"] + 1 for w in whole)
-    table = not shape.registers
-    model = len(getattr(plan.model.Memory, "_fields", ()))
-    kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    heard = plan.noisy or plan.delayed
-    return {
-        "starts": (2 * dims, n) if plan.given_start else (1, 1),
-        "pasts": (max(w["ring"] for w in whole), 2 * dims, lanes) if heard else (1, 1, 1),
-        "stores": (lanes, 2 * dims + 1, lanes) if plan.links else (1, 2 * dims + 1, 1),
-        "works": (driver.ROWS, lanes) if table else (1, 1),
-        "all_words": (4, lanes) if table else (1, 1),
-        "all_mem": (max(model, 1), lanes) if table else (1, 1),
-        "all_memory": (max(kept, 1), lanes) if table else (1, 1),
-        "states": (2 * dims, n),
-        "all_sums": (driver.COLUMNS + 2, 2),
-        "all_reached": (max(len(jobs[0].goals), 1),),
-        "all_frames": (frames, 3 * dims, n) if plan.record else (1, 1, 1),
-    }
-
-
-def memory_needed(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
-    """Bytes in the GPU's memory that one flock of these flights needs."""
-    numbers = sum(int(np.prod(size)) for size in _sizes(plan, driver, shape, jobs).values())
-    tables = max(t.row.size + 2 * t.whole.size + t.faces.size + t.edges.size + 2 * t.spans.size for t in jobs)
-    return (numbers + tables + 64) * plan.bits // 8
-
-
 def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables]) -> int:
     """How many flocks one launch takes; raises DeviceError if not even one fits."""
     if shape.simulated:
         return len(jobs)
-    needed, free = memory_needed(plan, driver, shape, jobs), int(SHARE * free_memory())
-    if needed > free:
-        agents = int(jobs[0].whole[WHOLE.index("agents")])
-        raise DeviceError(
-            f"a flock of {agents} agents needs {needed / 1e9:.2g} GB of the GPU's memory and {free / 1e9:.2g} GB are "
-            f"free; about {_fitting(agents, needed, free)} agents fit, or choose device = cpu"
-        )
-    return max(1, min(AT_ONCE, free // needed, len(jobs)))
+    free = free_memory()
+    largest = _largest(jobs)
+    fault = lacking(plan, driver, largest, free)
+    if fault is not None:
+        raise DeviceError(f"device = cuda: {fault}")
+    return max(1, min(AT_ONCE, int(SHARE * free) // needed(plan, driver, shape, largest), len(jobs)))
 
 
-def _fitting(agents: int, needed: int, free: int) -> int:
-    """Agents that fit, if memory grows with their square at worst."""
-    return max(1, int(agents * (free / needed) ** 0.5))
+def _largest(jobs: Sequence[Tables]) -> Tables:
+    """That of flights of one launch whose ring of past states is the longest."""
+    return max(jobs, key=lambda tables: int(tables.whole[WHOLE.index("ring")]))
+
+
+def too_large(plan: Plan, tables: Tables) -> str | None:
+    """Why one such flock does not fit into the GPU's free memory; None if it does."""
+    layout = layout_of(plan, int(tables.whole[WHOLE.index("agents")]), 1, multiprocessors())
+    return lacking(plan, flight_driver(plan, layout), tables, free_memory())
 
 
 def _fly(
@@ -147,20 +109,20 @@ def arrays(
 ) -> dict[str, Any]:
     """All arguments of a kernel, in the GPU's memory, by name."""
     cuda, real = runtime(), jobs[0].row.dtype
-    sizes = _sizes(plan, driver, shape, jobs)
-    written = ("pasts", "works", "states", "all_sums", "all_frames")
-    own: dict[str, Any] = {name: cuda.device_array((len(jobs), *sizes[name]), real) for name in written}
-    own["all_words"] = cuda.device_array((len(jobs), *sizes["all_words"]), np.uint32)
+    size = sizes(plan, driver, shape, _largest(jobs))
+    written = ("pasts", "works", "states", "all_sums", "all_frames", "scratches")
+    own: dict[str, Any] = {name: cuda.device_array((len(jobs), *size[name]), real) for name in written}
+    own["all_words"] = cuda.device_array((len(jobs), *size["all_words"]), np.uint32)
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
-    own["all_reached"] = cuda.to_device(np.full((len(jobs), *sizes["all_reached"]), -1.0, real))
+    own["all_reached"] = cuda.to_device(np.full((len(jobs), *size["all_reached"]), -1.0, real))
     own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
-    own["stores"] = cuda.to_device(_silent(len(jobs), sizes["stores"], real))
+    own["stores"] = cuda.to_device(_silent(len(jobs), size["stores"], real))
     model = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
     kept = [s for metric in plan.metrics for s in getattr(metric.Memory, "_field_defaults", {}).values()]
     for name, begin in (("all_mem", model), ("all_memory", kept)):
-        own[name] = cuda.to_device(_memories(len(jobs), sizes[name], begin, real))
+        own[name] = cuda.to_device(_memories(len(jobs), size[name], begin, real))
     if not shape.registers:
-        own["works"] = cuda.to_device(np.zeros((len(jobs), *sizes["works"]), real))
+        own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {
         "rows": np.stack([t.row for t in jobs]),
         "wholes": np.stack([t.whole for t in jobs]),
@@ -173,6 +135,7 @@ def arrays(
         "all_later": _padded([t.later for t in jobs], -1.0),  # a time before the start: nothing to come
         "nodes": jobs[0].nodes.reshape(-1, 6),
         "links": jobs[0].links.reshape(-1, 3),
+        "scratch_rows": np.array(scratch_of(plan, jobs[0])[1], np.int64),
     }
     own |= {name: cuda.to_device(np.ascontiguousarray(array)) for name, array in given.items()}
     return own

@@ -42,7 +42,7 @@ class _Totals:
         done: list[ast.stmt] = []
         for statement in statements:
             agents = _over_agents(statement)
-            if self.waiting and _names(statement, ast.Load) & set(self.waiting):
+            if self.waiting and (_of_one_thread(statement) or _names(statement, ast.Load) & set(self.waiting)):
                 done += self.flush()
             if agents is not None:
                 done += self.agents(agents)
@@ -94,9 +94,9 @@ class _Totals:
         lane, side = ("tid & 31", "tid >> 5") if not shape.simulated else ("0", "tid")
         side_ = self.count % 2  # one half is read while the other is written
         first = [f"{name} = warp_{self.waiting[name]}({name}, tid)" for name in names]
-        put = [f"scratch[{side_}, {side}, {c}] = {name}" for c, name in enumerate(names)]
-        get = [f"{name} = scratch[{side_}, 0, {c}]" for c, name in enumerate(names)]
-        turn = [TOTAL[self.waiting[n]].format(a=n, b=f"scratch[{side_}, part, {c}]") for c, n in enumerate(names)]
+        put = [f"reduced[{side_}, {side}, {c}] = {name}" for c, name in enumerate(names)]
+        get = [f"{name} = reduced[{side_}, 0, {c}]" for c, name in enumerate(names)]
+        turn = [TOTAL[self.waiting[n]].format(a=n, b=f"reduced[{side_}, part, {c}]") for c, n in enumerate(names)]
         text = [*first, f"if {lane} == 0:", *(f"    {line}" for line in put), "cuda.syncthreads()", *get]
         if shape.warps > 1:
             text += ["for part in range(1, WARPS):", *(f"    {line}" for line in turn)]
@@ -166,6 +166,11 @@ def carried_totals(body: list[ast.stmt]) -> dict[str, str]:
 def _over_agents(statement: ast.stmt) -> ast.For | None:
     """The statement, if it is a loop over all agents."""
     return statement if isinstance(statement, ast.For) and _target(statement) == "i" else None
+
+
+def _of_one_thread(statement: ast.stmt) -> bool:
+    """Whether only the first thread runs a statement, so that no barrier may stand in it."""
+    return isinstance(statement, ast.If) and ast.unparse(statement.test) == "tid == 0"
 
 
 def _target(loop: ast.For) -> str:

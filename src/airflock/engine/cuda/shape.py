@@ -36,16 +36,23 @@ class Shape:
         return self.lanes // WARP
 
 
-def shape_of(agents: int, flocks: int, processors: int = 132, *, sequential: bool = False) -> Shape:
+def shape_of(
+    agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, whole: bool = False
+) -> Shape:
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
     Few flocks leave most of a GPU idle: then several threads share the pairs of one agent. When there are flocks enough
     to fill it, one thread per agent wastes nothing (trial on an H200: the change pays below some 3 flocks of 100 agents
     per multiprocessor).
+
+    sequential : one agent after another
+    whole      : some rule solves for the whole flock, which one thread does
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs
         return Shape(lanes, WARP, WARP, registers=False)
+    if whole:
+        return Shape(lanes, 1, WARP, registers=False)
     if agents > MOST_REGISTERED:
         return Shape(lanes, 1, MOST_THREADS, registers=False)
     per_agent = 1

@@ -7,7 +7,8 @@ from airflock.core.maths import norm
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.move import ATTEMPTS, beyond
+from airflock.engine.passes.move import ATTEMPTS, beyond, in_formation
+from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
 
@@ -35,8 +36,12 @@ def begin(build: CudaBuilder) -> list[str]:
     lines += ["cuda.syncthreads()"]
     names = [*axes, *(f"v{a}" for a in axes)]
     if plan.given_start:
-        given = [f"{own(build, name)} = starts[flock, {c}, i]" for c, name in enumerate(names)]
+        given = [f"{own(build, name)} = starts[block, {c}, i]" for c, name in enumerate(names)]
         return [*lines, *agents(build, given), "cuda.syncthreads()", *_heard_at_start(build)]
+    if plan.start in FORMATIONS:
+        placed = in_formation(build, "s_{}", "row_w")
+        placed += [f"{own(build, a)} = s_{a}" for a in axes]
+        return [*lines, *agents(build, placed), "cuda.syncthreads()", *_heard_at_start(build)]
     philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
     spread = build.source.name(start_rules.spread)
     draw = [f"w0, w1, w2, w3 = {philox}(e, attempt, {random.START}, world, seed_low, seed_high)"]
@@ -55,7 +60,7 @@ def begin(build: CudaBuilder) -> list[str]:
     draw += branch("free", ["placed = True", "break"])
     seat = [f"{place(build, 'e', a)} = s{a}" for a in axes]
     body = ["placed = False; sx = ZERO; sy = ZERO; sz = ZERO", *loop(f"attempt in range({ATTEMPTS})", draw)]
-    body += branch("not placed", [*branch("tid == 0", ["statuses[flock] = -(e + 1)"]), "return"])
+    body += branch("not placed", [*branch("tid == 0", ["statuses[block] = -(e + 1)"]), "return"])
     body += [*branch("tid == 0", seat), "cuda.syncthreads()"]
     turn = [
         f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)",

@@ -91,6 +91,10 @@ class Builder:
         self.function(f"{name}_of({given})", body, f"return {answer}")
         self.turns.append((lines, f"{name}_of({given})"))
 
+    def once(self, lines: Iterable[str]) -> list[str]:
+        """Lines that run once for the whole flock, and see all that came before."""
+        return list(lines)
+
     def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
         """Lines that take offsets to the nearest image of a periodic box."""
         if not self.plan.periodic:

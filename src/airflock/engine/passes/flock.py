@@ -73,7 +73,7 @@ def _call(build: Builder, owner: Owner) -> list[str]:
     columns = [f"work[{build.row(f'shared_{owner.name}_{name}')}]" for name in owner.Shared._fields]
     lines += [f"shared_{owner.name} = {build.source.name(owner.Shared)}({', '.join(columns)})"]
     build.source.solver(owner.rule)
-    return [*lines, build.call(owner.rule, owner.kind, given, owner.name)]
+    return [*lines, *build.once([build.call(owner.rule, owner.kind, given, owner.name)])]
 
 
 def columns_of(build: Builder, record: Any, name: str) -> list[str]:
@@ -114,8 +114,10 @@ def scratch(plan: Plan, row: NDArray[Any], agents: int) -> tuple[tuple[tuple[NDA
     if not found:
         return ()
     # pages of zeros cost nothing until they are written: what is meant for rare cases may be large
-    made = tuple(
-        tuple(np.zeros(shape, row.dtype) for shape in owner.workspace(agents, *_parameters(plan, owner, row)))
-        for owner in found
-    )
+    made = tuple(tuple(np.zeros(size, row.dtype) for size in sizes) for sizes in scratch_sizes(plan, row, agents))
     return (made,)
+
+
+def scratch_sizes(plan: Plan, row: NDArray[Any] | None, agents: int) -> list[list[tuple[int, int]]]:
+    """Rows and columns of the scratch arrays of every rule of the whole flock; without a row of numbers, with zeros."""
+    return [list(owner.workspace(agents, *_parameters(plan, owner, row))) for owner in owners(plan)]

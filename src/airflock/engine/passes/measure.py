@@ -6,6 +6,7 @@ from airflock.core.vocabulary import Mean, asks
 from airflock.engine.passes import flock, scene
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.passes.decide import START, combine
+from airflock.engine.passes.members import members
 from airflock.engine.passes.move import beyond
 
 CLOCKS = ("sample", "collision")
@@ -206,31 +207,14 @@ def _clusters(build: Builder, metric: Metric) -> list[str]:
 
 def _members(build: Builder, metric: Metric) -> tuple[list[str], str]:
     """Lines that sum the member rule over the cluster at hand, after its own mean; and the name of that mean."""
-    rule = metric.member
-    if rule is None:
+    if metric.member is None:
         return [], "mean"
-    axes, fields = build.plan.axes, metric.Member._fields  # type: ignore[union-attr]
-    names = [*axes, *(f"v{a}" for a in axes), *(f"head_{a}" for a in axes)]
-    lines = [f"c_{name} = ZERO" for name in names]
-    lines += loop("j in range(n)", branch("state[j] == 1", [f"c_{name} += {name}[j]" for name in names]))
-    means = [f"c_{kind}{a} / real(size)" if a in axes else "ZERO" for kind in ("", "v", "head_") for a in "xyz"]
-    lines += [f"own_mean = {build.source.name(Mean)}({', '.join(means)}, real(size))"]
-    given = {"mean": "own_mean", "speed": "speed[j]"}
-    for a in "xyz":
-        flown = {a: f"{a}[j]", f"v{a}": f"v{a}[j]", f"h{a}": f"head_{a}[j]"}
-        given |= flown if a in axes else dict.fromkeys(flown, "ZERO")
-    body = []
-    if "pair" in asks(rule, "member", metric.name):
-        values = ", ".join(f"{metric.name}_{name}[j]" for name in metric.Pair._fields)  # type: ignore[union-attr]
-        body += [f"pair = {build.source.name(metric.Pair)}({values})"]
-    how = [metric.reduce.get(name, "sum") for name in fields]
-    lines += [f"m{c} = {START[how[c]]}" for c in range(len(fields))]
-    body += [f"t = {build.call(rule, 'member', given, metric.name)}"]
-    body += [combine(how[c], f"m{c}", f"t[{c}]") for c in range(len(fields))]
-    lines += loop("j in range(n)", branch("state[j] == 1", body))
+    text = members(build, metric, "j")
+    lines = [*text.zeros, *loop("j in range(n)", branch("state[j] == 1", [f"c_{x} += {x}[j]" for x in text.rows]))]
+    body = [*text.body, *(combine(how, f"m{c}", f"t[{c}]") for c, how in enumerate(text.how))]
+    lines += [*text.mean, *loop("j in range(n)", branch("state[j] == 1", body))]
     lines += loop("j in range(n)", ["state[j] = integer(2) if state[j] != 0 else integer(0)"])
-    values = ", ".join(f"m{c}" for c in range(len(fields)))
-    return [*lines, f"members = {build.source.name(metric.Member)}({values})"], "own_mean"
+    return [*lines, text.record], "own_mean"
 
 
 def _sample(build: Builder, metric: Metric) -> list[str]:

@@ -25,7 +25,8 @@ def begin(build: Builder) -> None:
         build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
         return
     if plan.start in FORMATIONS:
-        _formation(build, lines)
+        body = loop("i in range(n)", in_formation(build))
+        build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, body, "return 0")
         return
     philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
     spread = build.source.name(start_rules.spread)
@@ -54,20 +55,20 @@ def begin(build: Builder) -> None:
     build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
 
 
-def _formation(build: Builder, lines: list[str]) -> None:
-    """Place all agents in a formation, each off its place by start.jitter."""
+def in_formation(build: Builder, put: str = "{}[i]", w: str = "w") -> list[str]:
+    """Lines that place agent i in a formation, off its place by start.jitter.
+
+    put : where a coordinate goes, with the axis for its braces; w : name of the arena's record
+    """
     axes = build.plan.axes
     philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
     place = build.source.name(FORMATIONS[build.plan.start])
-    body = [
-        f"sx, sy, sz = {place}(i, w.spacing_x, w.spacing_y, w.spacing_z)",
+    return [
+        f"sx, sy, sz = {place}(i, {w}.spacing_x, {w}.spacing_y, {w}.spacing_z)",
         f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 512}, world, seed_low, seed_high)",
         f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
-        *[f"{a}[i] = s{a} + w.jitter * g{a}" for a in axes],
+        *[f"{put.format(a)} = s{a} + {w}.jitter * g{a}" for a in axes],
     ]
-    build.function(
-        "begin(n, m, row, whole, work, edges, spans, start, scene)", lines, loop("i in range(n)", body), "return 0"
-    )
 
 
 def beyond(build: Builder) -> str:

@@ -1,0 +1,96 @@
+"""Memory: how much of a GPU's memory the flocks of one launch need, and how many agents fit."""
+
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from airflock.engine.cuda.shape import Shape, shape_of
+from airflock.engine.passes.flock import owners, scratch_sizes
+from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.tables import Tables
+
+SHARE = 0.9  # of the free memory that may be used
+
+
+def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> Shape:
+    """Layout of flocks of one plan and size."""
+    return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=bool(owners(plan)))
+
+
+def integers(tables: Tables) -> dict[str, int]:
+    """Integers of a world by name."""
+    return dict(zip(WHOLE, tables.whole.tolist(), strict=True))
+
+
+def sizes(plan: Plan, driver: ModuleType, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays that a launch works on, for one flock, by argument name."""
+    whole, dims, lanes = integers(tables), plan.dimensions, shape.lanes
+    n, table = whole["agents"], not shape.registers
+    model = len(getattr(plan.model.Memory, "_fields", ()))
+    kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
+    heard = plan.noisy or plan.delayed
+    return {
+        "starts": (2 * dims, n) if plan.given_start else (1, 1),
+        "pasts": (whole["ring"], 2 * dims, lanes) if heard else (1, 1, 1),
+        "stores": (lanes, 2 * dims + 1, lanes) if plan.links else (1, 2 * dims + 1, 1),
+        "works": (driver.ROWS, lanes) if table else (1, 1),
+        "all_words": (4, lanes) if table else (1, 1),
+        "all_mem": (max(model, 1), lanes) if table else (1, 1),
+        "all_memory": (max(kept, 1), lanes) if table else (1, 1),
+        "states": (2 * dims, n),
+        "all_sums": (driver.COLUMNS + 2, 2),
+        "all_reached": (max(len(tables.goals), 1),),
+        "all_frames": (whole["steps"] // whole["sample_every"] + 1, 3 * dims, n) if plan.record else (1, 1, 1),
+        "scratches": scratch_of(plan, tables)[0],
+    }
+
+
+def scratch_of(plan: Plan, tables: Tables) -> tuple[tuple[int, int], list[int]]:
+    """One table that holds all scratch arrays of a flock below each other: its shape, and the first row of each."""
+    found = scratch_sizes(plan, tables.row, integers(tables)["agents"])
+    first, width = [0], 1
+    for rows, columns in (size for sizes in found for size in sizes):
+        first.append(first[-1] + rows)
+        width = max(width, columns)
+    return (max(first[-1], 1), width), first
+
+
+def needed(plan: Plan, driver: ModuleType, shape: Shape, tables: Tables) -> int:
+    """Bytes in the GPU's memory that one such flock needs, its share of the scene included."""
+    numbers = sum(int(np.prod(size)) for size in sizes(plan, driver, shape, tables).values())
+    given: list[Any] = [tables.row, tables.whole, tables.faces, tables.edges, tables.spans, tables.goals, tables.later]
+    given += [tables.shapes] if len(tables.later) else []
+    return numbers * plan.bits // 8 + sum(int(array.nbytes) for array in given) + 256
+
+
+def lacking(plan: Plan, driver: ModuleType, tables: Tables, free: int) -> str | None:
+    """Why one such flock does not fit into this many free bytes: what it needs and how many agents fit; or None."""
+    agents, room = integers(tables)["agents"], int(SHARE * free)
+
+    def bytes_of(n: int) -> int:
+        whole = tables.whole.copy()
+        whole[WHOLE.index("agents")] = n
+        return needed(plan, driver, layout_of(plan, n, 1), replace(tables, whole=whole))
+
+    if bytes_of(agents) <= room:
+        return None
+    return unfit(agents, bytes_of(agents), room, most_below(agents, lambda n: bytes_of(n) <= room))
+
+
+def unfit(agents: int, bytes_: int, room: int, fit: int) -> str:
+    """The one line about it."""
+    return (
+        f"a flock of {agents} agents needs {bytes_ / 1e9:.3g} GB of the GPU's memory and {room / 1e9:.3g} GB are free; "
+        f"about {fit} agents fit"
+    )
+
+
+def most_below(high: int, fits: Any) -> int:
+    """The largest number up to `high` that fits, 0 if not even one does."""
+    low = 0
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low

@@ -1,0 +1,89 @@
+"""State: where everything of one flock and of one thread lies: rows of the arguments, shared tables, registers."""
+
+import re
+
+from airflock.engine.cuda.build import REDUCED, CudaBuilder
+from airflock.engine.cuda.start import tables
+from airflock.engine.passes import flock, scene
+from airflock.engine.passes.build import columns, loop
+from airflock.engine.plan import WHOLE, Plan
+
+
+def memory(build: CudaBuilder) -> list[str]:
+    """Where everything of this flock and this thread lies."""
+    plan, shape = build.plan, build.shape
+    lines = ["block = cuda.blockIdx.x; tid = integer(cuda.threadIdx.x)"]
+    lines += ["i = integer(tid // PER_AGENT); sub = integer(tid % PER_AGENT)"]
+    lines += ["row = rows[block]; whole = wholes[block]"]
+    lines += ["faces = all_faces[block]; edges = all_edges[block]; spans = all_spans[block]"]
+    lines += ["goals = all_goals[block]; reached = all_reached[block]; past = pasts[block]; store = stores[block]"]
+    lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
+    wide = {"seed_low": "u32", "seed_high": "u32"}
+    names = {"ring": "slots"}
+    lines += [f"{names.get(w, w)} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
+    lines += ["n = agents", *_records(build), "late = real(delay) * row_c.dt"]
+    kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
+    if shape.registers:
+        for table, width in tables(build).items():
+            lines += [f"{table} = cuda.shared.array((LANES, {width}), {kind}{align})"]
+        lines += ["links_ = cuda.local.array(WORDS, np.uint32)"]
+        lines += ["seen = cuda.shared.array(WORDS, np.uint32)", "grown = cuda.shared.array(WORDS, np.uint32)"]
+    else:
+        lines += ["work = works[block]; words = all_words[block]; mem = all_mem[block]; memory = all_memory[block]"]
+    lines += [f"reduced = cuda.shared.array((2, WARPS, {REDUCED}), {kind})"]
+    count = len(columns(plan.metrics))
+    lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
+    lines += [f"gust = cuda.local.array(3, {kind})", "gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
+    lines += [f"near = cuda.local.array({scene.NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
+    lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
+    lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
+    lines += [f"scene = ({', '.join(scene.PARTS)})"]
+    return [*lines, *_scratch(plan), *_registers(build)]
+
+
+def _scratch(plan: Plan) -> list[str]:
+    """Scratch of the rules of the whole flock: rows of one table, each array the rows from its first on; zeros."""
+    sizes = flock.scratch_sizes(plan, None, 1)
+    if not sizes:
+        return []
+    made, first = [], 0
+    for arrays in sizes:
+        made += [
+            ", ".join(f"room[scratch_rows[{c}] : scratch_rows[{c + 1}]]" for c in range(first, first + len(arrays)))
+        ]
+        first += len(arrays)
+    zeros = loop("e in range(tid, room.shape[0], THREADS)", loop("c in range(room.shape[1])", ["room[e, c] = ZERO"]))
+    return ["room = scratches[block]", *zeros, f"scratch = ({' '.join(f'({arrays}),' for arrays in made)})"]
+
+
+def _records(build: CudaBuilder) -> list[str]:
+    """Records of numbers, once per flight."""
+    lines, offset = [], 0
+    for letter, fields in build.plan.records.items():
+        kind = build.source.record(letter.upper() * 2, fields)
+        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
+        offset += len(fields)
+    return lines
+
+
+def _registers(build: CudaBuilder) -> list[str]:
+    """First values of all registers; the memories of model and metrics at their start values."""
+    lines = []
+    for name in sorted({r for stage in build.stages.values() for r in (*stage.arguments, *stage.results)}):
+        if re.fullmatch(r"u[0-3]_i", name):
+            lines += [f"{name} = u32(0)"]
+        elif name.endswith("_i"):
+            lines += [f"{name} = {_first_value(build, name)}"]
+    return lines if build.shape.registers else []
+
+
+def _first_value(build: CudaBuilder, name: str) -> str:
+    """First value of one register."""
+    kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
+    if not kept:
+        return "ZERO"
+    starts = [s for m in build.plan.metrics for s in getattr(m.Memory, "_field_defaults", {}).values()]
+    if kept[1] == "mem":
+        starts = list(getattr(build.plan.model.Memory, "_field_defaults", {}).values())
+    return f"real({starts[int(kept[2])]})"
