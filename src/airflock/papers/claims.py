@@ -121,12 +121,15 @@ def markdown(claims: Sequence[Claim], reasons: bool = True) -> str:
     return text + ("\n" + "\n".join(notes) + "\n" if notes else "")
 
 
-def write_page(folder: Path, title: str, command: str, claims: Sequence[Claim]) -> None:
-    """Write claims.toml and README.md of a publication whose claims need no figures."""
+def write_page(
+    folder: Path, title: str, command: str, claims: Sequence[Claim], names: tuple[str, str] = ("claims", "README")
+) -> None:
+    """Write claims.toml and README.md, or files of other names, for claims that need no figures."""
     from airflock import __version__
 
-    write_claims(folder / "claims.toml", claims, {"paper": title, "command": command, "version": __version__})
-    atomic.write(folder / "README.md", f"# {title}\n\n`{command}` recomputes this page.\n\n{markdown(claims)}")
+    header = {"paper": title, "command": command, "version": __version__}
+    write_claims(folder / f"{names[0]}.toml", claims, header)
+    atomic.write(folder / f"{names[1]}.md", f"# {title}\n\n`{command}` recomputes this page.\n\n{markdown(claims)}")
 
 
 def print_claims(claims: Sequence[Claim]) -> None:
