@@ -8,9 +8,8 @@ import pytest
 import airflock
 from airflock.display import assignment, fly_show, points_of
 from airflock.errors import AirflockError, FlightError, ScenarioError
-from airflock.scenarios.places import in_mesh
 from airflock.scenes import meshes
-from airflock.scenes.build import scene_of
+from airflock.scenes.build import in_mesh, scene_of
 from airflock.world.scenery import Parameters
 
 trimesh = pytest.importorskip("trimesh")
@@ -65,13 +64,57 @@ def test_a_start_region_full_of_obstacles_is_noted():
     assert any("agents start in the rest" in note for note in found.notes)
 
 
-def test_a_goal_inside_a_closed_mesh_is_found_by_parity(hall):
+def test_a_goal_inside_a_closed_mesh_is_refused(hall):
     with pytest.raises(ScenarioError, match=r"goals.points\[0\]"):
         fly_in(hall, **{"goals.kind": "points", "goals.points": [[20.0, 10.0, 5.0]]})
     place = scene_of(Parameters(kind="mesh", file=str(hall)), 3)
     spots = np.random.default_rng(5).uniform((-10.0, -10.0, 0.5), (50.0, 30.0, 20.0), (300, 3))
     truth = ((spots > 0.0) & (spots < (40.0, 20.0, 10.0))).all(axis=1)
     assert [in_mesh(place, spot) for spot in spots] == truth.tolist()
+
+
+def test_inside_means_closed_all_around(tmp_path, seed):
+    """Two balls that overlap, one of them inside out; a hollow ball's cavity, a roof and a bowl have nothing inside."""
+    balls = [trimesh.creation.icosphere(subdivisions=3, radius=10.0) for _ in range(5)]
+    balls[1].apply_translation((12.0, 0.0, 0.0))
+    balls[2].apply_translation((60.0, 0.0, 0.0))
+    balls[2].invert()
+    balls[3].apply_translation((0.0, 60.0, 0.0))
+    cavity = trimesh.creation.icosphere(subdivisions=3, radius=6.0)
+    cavity.apply_translation((0.0, 60.0, 0.0))
+    cavity.invert()
+    balls[4].apply_translation((60.0, 60.0, 0.0))
+    bowl = balls[4].slice_plane((60.0, 60.0, 2.0), (0.0, 0.0, -1.0))
+    trimesh.util.concatenate([*balls[:4], cavity, bowl]).export(tmp_path / "bodies.stl")
+    place = scene_of(Parameters(kind="mesh", file=str(tmp_path / "bodies.stl"), ground="no"), 3)
+    spots = np.random.default_rng(seed).uniform((-12.0, -12.0, -12.0), (72.0, 72.0, 12.0), (3000, 3))
+    distances = np.linalg.norm(spots - np.array([[[0.0, 0, 0]], [[12, 0, 0]], [[60, 0, 0]], [[0, 60, 0]]]), axis=2)
+    truth = (distances < 10.0).any(axis=0) & (distances[3] > 6.0)
+    clear = (np.abs(distances - 10.0) > 0.2).all(axis=0) & (np.abs(distances[3] - 6.0) > 0.2)  # balls with facets
+    assert truth.sum() > 100
+    assert [in_mesh(place, spot) for spot in spots[clear]] == truth[clear].tolist()
+
+
+def test_free_goals_and_starts_lie_outside_a_closed_mesh(tmp_path, seed):
+    """A ball around the middle of the start region, deeper than any clearance; once in space, once cut by the plane."""
+    trimesh.creation.icosphere(subdivisions=2, radius=24.0).export(tmp_path / "ball.stl")
+    for dims in ("3", "2"):
+        keys = {"start.side": 50.0, "world.dimensions": dims, "goals.high": 20.0, "goals.apart": 1.0, "agents": 8}
+        found = fly_in(tmp_path / "ball.stl", **keys, **{"scene.ground": "no", "goals.count": 8, "duration": 0.02})
+        assert np.linalg.norm(found.waypoints(), axis=1).min() > 23.0
+        for number in range(seed, seed + 3):
+            for device in ("python", "cpu"):
+                start = airflock.simulate(found, number, device=device)["position"].values[0, :, 0]
+                assert np.linalg.norm(start, axis=0).min() > 23.0
+
+
+def test_a_start_region_inside_a_closed_mesh_is_refused(tmp_path):
+    trimesh.creation.icosphere(subdivisions=2, radius=60.0).export(tmp_path / "dome.stl")
+    with pytest.raises(ScenarioError, match="the whole region in which agents start"):
+        fly_in(tmp_path / "dome.stl", **{"scene.ground": "no", "goals.kind": "none"})
+    found = fly_in(tmp_path / "dome.stl", **{"scene.ground": "no", "goals.kind": "none", "start.side": 100.0})
+    with pytest.raises(FlightError, match="start: agent 0 lies"):
+        airflock.simulate(found, start=np.zeros((6, 10)))
 
 
 def test_open_and_inverted_meshes_are_noted(tmp_path):
