@@ -1,8 +1,8 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: shown there by videos, here by numbers.
 
 Parts: schemes (five ways to recombine, in a city and a forest), corners (thin walls), tuning (every radius and scale),
-presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), display (its second
-wish).
+presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), learnt (its first wish:
+parameters learnt from its measures), display (its second).
 """
 
 from typing import Any
@@ -10,13 +10,13 @@ from typing import Any
 from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
 from airflock.papers.flights import Flights, Progress, progress_bar
-from airflock.papers.kidger import corners, cost, display, presets, schemes, shepherd, tuning
+from airflock.papers.kidger import corners, cost, display, learnt, presets, schemes, shepherd, tuning
 
 TITLE = "Kidger, An Investigation into Drone Swarms & Swarm Intelligence"
-PARTS = ("schemes", "corners", "tuning", "presets", "shepherd", "cost", "display")
+PARTS = ("schemes", "corners", "tuning", "presets", "shepherd", "cost", "learnt", "display")
 MODULES: dict[str, Any] = {
     "schemes": schemes, "corners": corners, "tuning": tuning, "presets": presets, "shepherd": shepherd, "cost": cost,
-    "display": display,
+    "learnt": learnt, "display": display,
 }  # fmt: skip
 
 
