@@ -8,6 +8,7 @@ import pytest
 import airflock
 from airflock.engine.simulate import score_flights
 from airflock.errors import AirflockError
+from airflock.evolve.study import load_study
 from airflock.papers.claims import read_claims
 from airflock.papers.kidger import PAPER
 
@@ -30,6 +31,9 @@ def test_committed_claims_hold_what_must_hold(committed):
         assert claims[f"schemes.{scene}.goals"].ours >= 0.9
     for name in ("corners.swept", "corners.fast", "display.placed", "display.collisions", "cost.real_time"):
         assert claims[name].verdict == "reproduced", name
+    for place in ("city.1", "city.0.5", "forest.1", "forest.2"):
+        assert claims[f"learnt.{place}.fitness"].verdict == "reproduced"
+        assert claims[f"learnt.{place}.n_coll"].high < 0.0 and claims[f"learnt.{place}.n_env_coll"].high <= 0.0
     for column in ("flocked", "n_coll", "goals_reached"):
         assert claims[f"presets.poor.{column}"].verdict == "reproduced"
 
@@ -57,6 +61,18 @@ def columns(name, **keys):
     return {key: np.array([row[key] for row in rows]) for key in ("n_env_coll", "n_avoid", "goals_reached", "goals")}
 
 
+@pytest.mark.parametrize("scene", ["city", "forest"])
+def test_a_learnt_preset_differs_from_the_final_set_by_what_its_study_varies(scene):
+    final, learnt = (airflock.load(f"kidger/{name}").document for name in (scene, f"learnt_{scene}"))
+    varied = load_study(f"kidger/{scene}").space.keys
+    assert {key: value for key, value in final.items() if key not in ("model", "title")} == {
+        key: value for key, value in learnt.items() if key not in ("model", "title")
+    }
+    changed = {f"model.{key}" for key, value in learnt["model"].items() if value != final["model"][key]}
+    assert changed == set(varied)
+    assert all("airflock evolve" in learnt["model"][key.partition(".")[2]]["source"] for key in varied)
+
+
 @pytest.mark.papers
 @pytest.mark.parametrize("scene", ["city", "forest"])
 def test_scheme_5_stays_out_of_obstacles_where_scheme_2_does_not(scene):
@@ -68,7 +84,7 @@ def test_scheme_5_stays_out_of_obstacles_where_scheme_2_does_not(scene):
 
 
 @pytest.mark.papers
-@pytest.mark.parametrize("part", ["corners", "presets", "shepherd", "cost", "display"])
+@pytest.mark.parametrize("part", ["corners", "presets", "shepherd", "cost", "learnt", "display"])
 def test_parts_hold_when_flown_again(part):
     for claim in PAPER.run(only=part, progress=lambda *_: None):
         assert claim.verdict != "not reproduced", claim

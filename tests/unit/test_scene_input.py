@@ -1,5 +1,6 @@
 """Scenes, goals, starts and displays that cannot be meant end with a clear line, or a note of what was done."""
 
+import json
 import re
 
 import numpy as np
@@ -8,9 +9,8 @@ import pytest
 import airflock
 from airflock.display import assignment, fly_show, points_of
 from airflock.errors import AirflockError, FlightError, ScenarioError
-from airflock.scenarios.places import in_mesh
 from airflock.scenes import meshes
-from airflock.scenes.build import scene_of
+from airflock.scenes.build import in_mesh, scene_of
 from airflock.world.scenery import Parameters
 
 trimesh = pytest.importorskip("trimesh")
@@ -65,13 +65,57 @@ def test_a_start_region_full_of_obstacles_is_noted():
     assert any("agents start in the rest" in note for note in found.notes)
 
 
-def test_a_goal_inside_a_closed_mesh_is_found_by_parity(hall):
+def test_a_goal_inside_a_closed_mesh_is_refused(hall):
     with pytest.raises(ScenarioError, match=r"goals.points\[0\]"):
         fly_in(hall, **{"goals.kind": "points", "goals.points": [[20.0, 10.0, 5.0]]})
     place = scene_of(Parameters(kind="mesh", file=str(hall)), 3)
     spots = np.random.default_rng(5).uniform((-10.0, -10.0, 0.5), (50.0, 30.0, 20.0), (300, 3))
     truth = ((spots > 0.0) & (spots < (40.0, 20.0, 10.0))).all(axis=1)
     assert [in_mesh(place, spot) for spot in spots] == truth.tolist()
+
+
+def test_inside_means_closed_all_around(tmp_path, seed):
+    """Two balls that overlap, one of them inside out; a hollow ball's cavity, a roof and a bowl have nothing inside."""
+    balls = [trimesh.creation.icosphere(subdivisions=3, radius=10.0) for _ in range(5)]
+    balls[1].apply_translation((12.0, 0.0, 0.0))
+    balls[2].apply_translation((60.0, 0.0, 0.0))
+    balls[2].invert()
+    balls[3].apply_translation((0.0, 60.0, 0.0))
+    cavity = trimesh.creation.icosphere(subdivisions=3, radius=6.0)
+    cavity.apply_translation((0.0, 60.0, 0.0))
+    cavity.invert()
+    balls[4].apply_translation((60.0, 60.0, 0.0))
+    bowl = balls[4].slice_plane((60.0, 60.0, 2.0), (0.0, 0.0, -1.0))
+    trimesh.util.concatenate([*balls[:4], cavity, bowl]).export(tmp_path / "bodies.stl")
+    place = scene_of(Parameters(kind="mesh", file=str(tmp_path / "bodies.stl"), ground="no"), 3)
+    spots = np.random.default_rng(seed).uniform((-12.0, -12.0, -12.0), (72.0, 72.0, 12.0), (3000, 3))
+    distances = np.linalg.norm(spots - np.array([[[0.0, 0, 0]], [[12, 0, 0]], [[60, 0, 0]], [[0, 60, 0]]]), axis=2)
+    truth = (distances < 10.0).any(axis=0) & (distances[3] > 6.0)
+    clear = (np.abs(distances - 10.0) > 0.2).all(axis=0) & (np.abs(distances[3] - 6.0) > 0.2)  # balls with facets
+    assert truth.sum() > 100
+    assert [in_mesh(place, spot) for spot in spots[clear]] == truth[clear].tolist()
+
+
+def test_free_goals_and_starts_lie_outside_a_closed_mesh(tmp_path, seed):
+    """A ball around the middle of the start region, deeper than any clearance; once in space, once cut by the plane."""
+    trimesh.creation.icosphere(subdivisions=2, radius=24.0).export(tmp_path / "ball.stl")
+    for dims in ("3", "2"):
+        keys = {"start.side": 50.0, "world.dimensions": dims, "goals.high": 20.0, "goals.apart": 1.0, "agents": 8}
+        found = fly_in(tmp_path / "ball.stl", **keys, **{"scene.ground": "no", "goals.count": 8, "duration": 0.02})
+        assert np.linalg.norm(found.waypoints(), axis=1).min() > 23.0
+        for number in range(seed, seed + 3):
+            for device in ("python", "cpu"):
+                start = airflock.simulate(found, number, device=device)["position"].values[0, :, 0]
+                assert np.linalg.norm(start, axis=0).min() > 23.0
+
+
+def test_a_start_region_inside_a_closed_mesh_is_refused(tmp_path):
+    trimesh.creation.icosphere(subdivisions=2, radius=60.0).export(tmp_path / "dome.stl")
+    with pytest.raises(ScenarioError, match="the whole region in which agents start"):
+        fly_in(tmp_path / "dome.stl", **{"scene.ground": "no", "goals.kind": "none"})
+    found = fly_in(tmp_path / "dome.stl", **{"scene.ground": "no", "goals.kind": "none", "start.side": 100.0})
+    with pytest.raises(FlightError, match="start: agent 0 lies"):
+        airflock.simulate(found, start=np.zeros((6, 10)))
 
 
 def test_open_and_inverted_meshes_are_noted(tmp_path):
@@ -112,6 +156,32 @@ def test_damaged_and_strange_mesh_files_are_refused(tmp_path, hall, monkeypatch)
     monkeypatch.setattr(meshes, "MOST_BYTES", 100)
     with pytest.raises(ScenarioError, match="simplify the mesh"):
         fly_in(hall, **{"start.speed": 1.0})  # a scene of its own: the one above is kept
+
+
+def gltf(points=3, places=1):
+    """A glTF document of one triangle whose arrays announce so many corners, at so many places."""
+    corners = {"componentType": 5126, "count": points, "type": "VEC3", "min": [0, 0, 0], "max": [50, 50, 0]}
+    numbers = {"componentType": 5125, "count": points, "type": "SCALAR"}
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(places))}],
+        "nodes": [{"mesh": 0}] * places, "accessors": [corners, numbers],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    }  # fmt: skip
+
+
+def test_what_a_gltf_file_announces_is_checked_before_room_is_made_for_it(tmp_path):
+    """Arrays without data, which would be zeros of any size, and one mesh at ever so many places."""
+    path = tmp_path / "mesh.gltf"
+    cases = ((gltf(1_500_000_000), "more than 2000000"), (gltf(30_000, 1000), "10000000 triangles"), ([], "damaged"))
+    for document, words in (*cases, ({"accessors": [{}]}, "damaged"), ({"nodes": [{"mesh": 9}]}, "damaged")):
+        path.write_text(json.dumps(document))
+        with pytest.raises(ScenarioError, match=words):
+            fly_in(path, **{"start.speed": 1.0})
+    trimesh.creation.box(extents=[30.0] * 3).export(tmp_path / "box.glb")
+    sound = (tmp_path / "box.glb").read_bytes()
+    (tmp_path / "box.glb").write_bytes(sound[:8] + (len(sound) + 64).to_bytes(4, "little") + sound[12:])
+    with pytest.raises(ScenarioError, match=f"cut short: {len(sound)} of {len(sound) + 64} bytes"):
+        fly_in(tmp_path / "box.glb")
 
 
 def test_a_mesh_beside_its_scenario_file_is_found(hall):

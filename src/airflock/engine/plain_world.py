@@ -13,6 +13,7 @@ from airflock.engine.tables import faces, polygon_edges, unbuilt
 from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.scenario import Scenario
 from airflock.world import arena, bvh, edges, goals, rays
+from airflock.world.inside import inside
 
 
 class Place:
@@ -30,7 +31,11 @@ class Place:
         stands = scenario.stands()
         shapes, later = unbuilt(stands)
         self.scene = shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()
-        self.later, self.clearance = later.tolist(), scenario.start.clearance
+        self.later, self.clearance, self.meshed = (
+            later.tolist(),
+            scenario.start.clearance,
+            scenario.scene.kind == "mesh",
+        )
         self.casts = scenario.model.sight is not None  # polygons are part of the scene then
         rule = scenario.model.wall_reach
         self.look = FAR if rule is None else answer(rule, "wall_reach", {"p": scenario.parameters})
@@ -57,6 +62,8 @@ class Place:
     def roomy(self, x: float, y: float, z: float) -> bool:
         """Whether an agent may start here: inside the arena, at start.clearance from what stands in the scene."""
         if self.scene[0] and bvh.nearest(x, y, z, self.clearance, *self.scene).distance < self.clearance:
+            return False
+        if self.meshed and inside(x, y, z, *self.scene) > 0.5:
             return False
         return self.excursion(x, y, z) <= 0.0
 

@@ -70,6 +70,7 @@ class Plan:
     edge: Callable[..., Any] | None = None
     start: str = "arena"
     scene: bool = False
+    meshed: bool = False
     goals: bool = False
     stop: bool = False
     wing_choices: tuple[tuple[str, str], ...] = ()

@@ -48,6 +48,7 @@ def plan_of(
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
         scene=scenario.scene.draw == "flight" or bool(len(scenario.stands().shapes)),
+        meshed=scenario.scene.kind == "mesh",
         goals=scenario.goals.kind in ("points", "scene"),
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",

@@ -45,21 +45,12 @@ class Parameters(Record):
     r_ray: float = quantity(20.0, "m", low=0.01, high=1000.0, source=INSPECTOR, meaning="length of a ray")
     speed: float = quantity(60.0, "m/s", low=0.01, high=1000.0, source=f"{FINAL}: 1 per frame", meaning="drone speed")
     accel: float = quantity(1.01, "1", low=1.0, high=10.0, source=FINAL, meaning="growth of the speed per frame")
-    gravity: float = quantity(
-        0.0,
-        "m/s",
-        low=0.0,
-        high=1000.0,
-        source="Kidger, section 4.7; none in the final set",
-        meaning="constant sinking",
-    )
+    gravity: float = quantity(0.0, "m/s", low=0.0, high=1000.0, source=f"{FINAL}: none", meaning="constant sinking")
     s_obst: float = quantity(1.0, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of obstacle avoidance")
     s_sep: float = quantity(0.25, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of separation")
     s_cohes: float = quantity(0.25, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of cohesion")
     s_align: float = quantity(0.125, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of alignment")
-    s_goal: float = quantity(
-        0.25, "1", low=-100.0, high=100.0, source=FINAL, meaning="scale of the goal; negative: a shepherd"
-    )
+    s_goal: float = quantity(0.25, "1", low=-100.0, high=100.0, source=FINAL, meaning="scale of the goal; < 0: repels")
     s_prev: float = quantity(1.0, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of the previous movement")
     rays: float = quantity(1000.0, "1", low=1.0, high=1e6, source=INSPECTOR, meaning="rays that may be cast at most")
     most: float = quantity(3.0, "1", low=1.0, high=6.0, source="our choice", meaning="oracles heard in scheme 4")
@@ -68,15 +59,9 @@ class Parameters(Record):
     scheme: str = choice("5", ("1", "2", "3", "4", "5"), source="Kidger, section 4.3", meaning="recombination scheme")
     method: str = choice("away", ("away", "turn"), source="Kidger, section 4.1.1", meaning="separation 2 or 1")
     cast: str = choice("swept", ("swept", "thin"), source="ours; the thesis", meaning="cast spheres or thin rays")
-    ahead: str = choice(
-        "suggested", ("suggested", "movement"), source="listings of 4.6.2; 4.2", meaning="where rays start"
-    )
-    first: str = choice(
-        "axis", ("axis", "point"), source="ours; the thesis", meaning="part of the spiral that lies ahead"
-    )
-    fan: str = choice(
-        "space", ("space", "plane"), source="Kidger, sections 4.6 and 4.2", meaning="spiral of rays, or left and right"
-    )
+    ahead: str = choice("suggested", ("suggested", "movement"), source="4.6.2; 4.2", meaning="where rays start")
+    first: str = choice("axis", ("axis", "point"), source="ours; the thesis", meaning="what of the spiral lies ahead")
+    fan: str = choice("space", ("space", "plane"), source="4.6; 4.2", meaning="spiral of rays, or left and right")
 
 
 class Sums(NamedTuple):

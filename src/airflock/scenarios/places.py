@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 
 from airflock.errors import SceneError
 from airflock.scenarios.scenario import Scenario
-from airflock.scenes.build import Scene, clearance, scene_of
+from airflock.scenes.build import Scene, clearance, in_mesh, scene_of
 from airflock.world import scenery, start
-from airflock.world.shapes import TRIANGLE
 
 CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
 DRAWN = 64  # positions at which a start region is looked at
 MOST = 2000  # the same where none is free
-DIRECTIONS = ((0.31, 0.17, 0.935), (-0.23, 0.41, 0.882), (0.12, -0.37, 0.921))
 
 
 def place_faults(scenario: Scenario) -> list[str]:
@@ -84,24 +82,6 @@ def _depth(place: Scene, point: NDArray[np.float64]) -> float:
     return gap if in_mesh(place, point) else 0.0
 
 
-def in_mesh(place: Scene, point: NDArray[np.float64]) -> bool:
-    """Whether a position lies inside a closed mesh: straight lines from it cross an odd number of triangles."""
-    rows = place.shapes[place.shapes[:, 6] == TRIANGLE]
-    if not len(rows):
-        return False
-    a, b, c = (rows[:, 7 + 3 * k : 10 + 3 * k] for k in range(3))
-    odd = 0
-    for direction in DIRECTIONS:
-        across = np.cross(direction, c - a)
-        size = (across * (b - a)).sum(axis=1)
-        size = np.where(np.abs(size) < 1e-30, 1e-30, size)
-        off = point - a
-        s, w = (off * across).sum(axis=1) / size, np.cross(off, b - a)
-        r, t = w @ np.array(direction) / size, (w * (c - a)).sum(axis=1) / size
-        odd += int(((s >= 0.0) & (r >= 0.0) & (s + r <= 1.0) & (t > 0.0)).sum()) % 2
-    return odd >= 2
-
-
 def _blocked(scenario: Scenario) -> float:
     """Share of the region of starts in which nobody can start."""
     if scenario.scene.kind == "none" or scenario.start.kind == "arena":
@@ -119,7 +99,8 @@ def _share(scene: scenery.Parameters, begin: start.Parameters, dims: int) -> flo
         spot = rng.uniform(-1.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
         if begin.kind == "ball":
             spot *= min(1.0, 1.0 / max(float(np.linalg.norm(spot)), 1e-9))
-        shut += clearance(place, reach * spot) < begin.clearance
+        spot *= reach
+        shut += clearance(place, spot) < begin.clearance or in_mesh(place, spot)
         if number >= DRAWN and shut < number:  # only a region that looks shut is looked at for longer
             break
     return shut / number

@@ -11,9 +11,10 @@ from airflock.scenes.city import buildings, half_side
 from airflock.scenes.forest import trees
 from airflock.scenes.tree import TALL, Scene, boxes, ground, scene, segments
 from airflock.world import bvh, goals, scenery
+from airflock.world.inside import inside
 from airflock.world.shapes import APPEARS, BOX, CYLINDER
 
-__all__ = ["Scene", "clearance", "scene_of", "waypoints"]
+__all__ = ["Scene", "clearance", "in_mesh", "scene_of", "waypoints"]
 
 Polygons = tuple[tuple[tuple[float, ...], ...], ...]
 MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
@@ -60,8 +61,18 @@ def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
 def clearance(found: Scene, position: Any) -> float:
     """Distance (m) from a position to what stands in a scene; negative inside a solid, 1e30 if nothing stands there."""
     x, y, z = (float(c) for c in position)
-    rows = found.lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
-    return float(bvh.nearest(x, y, z, 1e6, *rows).distance)
+    return float(bvh.nearest(x, y, z, 1e6, *_tables(found)).distance)
+
+
+def in_mesh(found: Scene, position: Any) -> bool:
+    """Whether a position lies inside a closed mesh, in a plane inside its cut at height 0."""
+    x, y, z = (float(c) for c in position)
+    return found.closed and bool(inside(x, y, z, *_tables(found)) > 0.5)
+
+
+def _tables(found: Scene) -> Any:
+    """Shapes, nodes and links for plain Python: lists, or the arrays where there are too many."""
+    return found.lists if len(found.shapes) < MANY else (found.shapes, found.nodes, found.links)
 
 
 @lru_cache(maxsize=32)
@@ -89,7 +100,8 @@ def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> ND
         spot = np.array(
             [*rng.uniform(-half, half, 2), rng.uniform(g.low, max(g.high, g.low)) if dimensions == 3 else 0.0]
         )
-        if np.linalg.norm(spot - last) >= g.apart and clearance(place, spot) >= g.clearance:
+        free = np.linalg.norm(spot - last) >= g.apart and clearance(place, spot) >= g.clearance
+        if free and not in_mesh(place, spot):
             chosen.append(spot)
             last = spot
             if len(chosen) == int(g.count):

@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import SceneError
+from airflock.scenes.headers import check_header
 from airflock.scenes.tree import segments, triangles
 from airflock.world import scenery
+from airflock.world.shapes import CLOSED
 
 MOST_BYTES = 200_000_000  # a larger file is refused before it is opened
 MOST_TRIANGLES = 2_000_000
@@ -27,27 +29,58 @@ def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float6
     if faults:
         raise SceneError("\n".join(faults))
     mesh.vertices = corners
-    if not mesh.is_watertight:
+    closed = in_closed(mesh)
+    if not closed.all():
         notes.append(
-            f"scene.file = {p.file}: the mesh is open; its surfaces stop agents from both sides, but nothing is inside"
+            f"scene.file = {p.file}: the mesh is open, {int((~closed).sum())} of {len(closed)} triangles; these "
+            "surfaces stop agents from both sides, but nothing is inside them"
         )
-    elif not mesh.is_winding_consistent or mesh.volume < 0.0:
+    if closed.any() and (not mesh.is_winding_consistent or mesh.submesh([closed], append=True).volume < 0.0):
         notes.append(
             f"scene.file = {p.file}: the mesh is inverted (its faces look inwards); "
             "its surfaces are taken from both sides"
         )
     found = triangles(corners[np.asarray(mesh.faces)])
+    found[:, CLOSED] = closed
     sound = mesh.area_faces > 1e-12
     if not sound.all():
         notes.append(f"scene.file = {p.file}: {int((~sound).sum())} triangles without area were left out")
         found = found[sound]
     if dimensions == 2:
-        cut = mesh.section(plane_origin=(0.0, 0.0, 1e-6), plane_normal=(0.0, 0.0, 1.0))
-        if cut is None:
+        found = cut(mesh, closed)
+        if not len(found):
             raise SceneError(f"scene.file = {p.file}: in a plane the mesh is cut at height 0, but nothing stands there")
-        ends = [np.hstack([line[:-1, :2], line[1:, :2]]) for line in cut.discrete]
-        found = segments(np.concatenate(ends))
     return found, tuple(notes)
+
+
+def in_closed(mesh: Any) -> NDArray[np.bool_]:
+    """Which faces (face,) of a mesh belong to a closed surface: to a connected part without a free edge."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces = np.asarray(mesh.faces)
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    ends, uses = np.unique(sides, axis=0, return_counts=True)
+    size = len(mesh.vertices)
+    parts = connected_components(coo_array((np.ones(len(ends)), ends.T), (size, size)), directed=False)[1]
+    closed = np.ones(size, bool)
+    closed[parts[ends[uses % 2 == 1, 0]]] = False
+    found: NDArray[np.bool_] = closed[parts[faces[:, 0]]]
+    return found
+
+
+def cut(mesh: Any, closed: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Walls where a mesh crosses height 0, as segments that have its outside on their right."""
+    from trimesh import intersections
+
+    crossings: Any = intersections.mesh_plane
+    lines, faces = crossings(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, 1e-6), return_faces=True)
+    a, b = np.asarray(lines).reshape(-1, 2, 3)[:, :, :2].transpose(1, 0, 2)
+    out = mesh.face_normals[faces]
+    turned = (b - a)[:, 1] * out[:, 0] - (b - a)[:, 0] * out[:, 1] < 0.0
+    found = segments(np.where(turned[:, None], np.hstack([b, a]), np.hstack([a, b])))
+    found[:, CLOSED] = closed[faces]
+    return found
 
 
 def read(path: Path) -> Any:
@@ -67,8 +100,7 @@ def read(path: Path) -> Any:
         raise SceneError(
             f"scene.file = {path}: {size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB; simplify the mesh"
         )
-    if kind == "stl":
-        _whole_stl(path, size)
+    check_header(path, kind, size, MOST_TRIANGLES)
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)
         faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, float)
@@ -85,20 +117,6 @@ def read(path: Path) -> Any:
             f"scene.file = {path}: some corners are no numbers or missing; the file is damaged or cut short"
         )
     return mesh
-
-
-def _whole_stl(path: Path, size: int) -> None:
-    """Refuse an STL file that ends before what it announces; trimesh reads what is there."""
-    with path.open("rb") as file:
-        head = file.read(84)
-        if head[:5].lower() == b"solid" and b"\n" in head:
-            file.seek(max(0, size - 512))
-            if b"endsolid" not in file.read():
-                raise SceneError(f"scene.file = {path}: the file is cut short: it does not end with endsolid")
-            return
-    announced = 84 + 50 * int.from_bytes(head[80:84], "little")
-    if size < announced:
-        raise SceneError(f"scene.file = {path}: the file is cut short: {size} of {announced} bytes")
 
 
 def check(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:

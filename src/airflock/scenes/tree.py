@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.world.shapes import APPEARS, BOX, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
+from airflock.world.shapes import APPEARS, BOX, CLOSED, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
 
 LEAF = 4  # shapes of a leaf
 TALL = 1e6  # m; half height of what has no end in height
@@ -18,7 +18,7 @@ TALL = 1e6  # m; half height of what has no end in height
 class Scene:
     """What stands in a world.
 
-    shapes : (shape, 17) rows as in `world.shapes`, in the order of the tree's leaves
+    shapes : (shape, 18) rows as in `world.shapes`, in the order of the tree's leaves
     nodes  : (node, 6) bounds, m; links : (node, 3) skip, first, last as in `world.bvh`
     notes  : what was adjusted while it was made, for a person to read
     """
@@ -32,6 +32,11 @@ class Scene:
     def lists(self) -> tuple[list[list[float]], list[list[float]], list[list[int]]]:
         """Shapes, nodes and links as plain lists, for plain Python."""
         return self.shapes.tolist(), self.nodes.tolist(), self.links.tolist()
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether any surface closes around a position."""
+        return bool((self.shapes[:, CLOSED] > 0.0).any())
 
     @property
     def later(self) -> NDArray[np.int64]:

@@ -9,6 +9,7 @@ A shape that is not there yet has its bounds far away, so that nothing meets it.
 from airflock.core.contract import Model
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.world import bvh, goals, rays
+from airflock.world.inside import inside
 
 PARTS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
 CAST = ("shapes", "nodes", "links", "near", "counts", "gathered")  # what a percept carries for its casts
@@ -74,12 +75,16 @@ def excursion(build: Builder) -> list[str]:
 
 
 def room(build: Builder) -> list[str]:
-    """Lines that ask for start.clearance around a start at sx sy sz."""
-    if not build.plan.scene:
+    """Lines that ask for start.clearance around a start at sx sy sz, and that no mesh closes around it."""
+    plan = build.plan
+    if not plan.scene:
         return []
     nearest = build.source.name(bvh.nearest)
     call = f"{nearest}(sx, sy, sz, w.clearance, shapes, nodes, links)"
-    return branch("free", [*parts("shapes", "nodes", "links"), f"free = {call}.distance >= w.clearance"])
+    lines = branch("free", [*parts("shapes", "nodes", "links"), f"free = {call}.distance >= w.clearance"])
+    if plan.meshed:
+        lines += branch("free", [f"free = {build.source.name(inside)}(sx, sy, sz, shapes, nodes, links) < HALF"])
+    return lines
 
 
 def contacts(build: Builder) -> list[str]:
