@@ -58,10 +58,10 @@ def _triangles(document: Any) -> int:
     meshes = [
         sum(_of_primitive(primitive, counts) for primitive in mesh["primitives"]) for mesh in document.get("meshes", ())
     ]
-    placed = sum(meshes[node["mesh"]] for node in document.get("nodes", ()) if "mesh" in node)
+    placed: int = sum(meshes[node["mesh"]] for node in document.get("nodes", ()) if "mesh" in node)
     return max(placed, *(count // 3 for count in counts), 0) if counts else placed
 
 
 def _of_primitive(primitive: Mapping[str, Any], counts: list[int]) -> int:
-    corners = counts[primitive["indices"] if "indices" in primitive else primitive["attributes"]["POSITION"]]
+    corners: int = counts[primitive["indices"] if "indices" in primitive else primitive["attributes"]["POSITION"]]
     return corners if primitive.get("mode", 0) >= STRIP else corners // 3
