@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from airflock.papers.vasarhelyi_2018 import table_s1
+from airflock.papers.vasarhelyi_2018 import evolved, table_s1
 from airflock.papers.vasarhelyi_2018.published import optimum
+from airflock.scenarios.files import load, presets
 
 
 def flights(fitness):
@@ -50,3 +51,20 @@ def test_independent_runs_are_alike_or_not():
     assert table_s1.alike(6, [best, close]).verdict == "reproduced"
     assert table_s1.alike(6, [best, far]).verdict == "not reproduced"
     assert table_s1.working(6, best).ours == 3000
+
+
+def test_a_preset_of_an_optimum_is_that_of_table_s1_with_other_parameters(tmp_path):
+    keys = {f"model.{name}": 1.0 + 0.125 * i for i, name in enumerate(table_s1.COLUMNS)}
+    data = table_s1.Data(
+        {6: [SimpleNamespace(parameters=keys)]}, {6: flights(np.array([0.8, 0.9]))}, {6: flights(np.array([0.7, 0.8]))}
+    )
+    path = tmp_path / "ours.toml"
+    path.write_text(
+        evolved.preset(6, data, presets()["vasarhelyi_2018/6ms"].read_text(encoding="utf-8")), encoding="utf-8"
+    )
+    ours, printed = load(path), optimum(6)
+    assert {f"model.{name}": getattr(ours.parameters, name) for name in table_s1.COLUMNS} == keys
+    assert (ours.body, ours.radio, ours.sensors, ours.world) == (
+        printed.body, printed.radio, printed.sensors, printed.world,
+    )  # fmt: skip
+    assert not ours.published and "0.100" in path.read_text(encoding="utf-8")
