@@ -64,6 +64,7 @@ def _formation(build: Builder, lines: list[str]) -> None:
         f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 512}, world, seed_low, seed_high)",
         f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
         *[f"{a}[i] = s{a} + w.jitter * g{a}" for a in axes],
+        "vx[i] = w.speed",
     ]
     build.function(
         "begin(n, m, row, whole, work, edges, spans, start, scene)", lines, loop("i in range(n)", body), "return 0"

@@ -8,7 +8,7 @@ from typing import Any
 
 from airflock.errors import AirflockError
 from airflock.papers.claims import Claim
-from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, static
+from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, robust_claims, static
 from airflock.papers.dimock_2003.flights import Birds
 from airflock.papers.flights import Progress, progress_bar
 
@@ -25,7 +25,7 @@ def run(
 ) -> list[Claim]:
     """Recompute the paper's numbers.
 
-    only    : one of PARTS (robust takes the winner of ga and runs it too); quick : a short GA, few starts, no robust
+    only    : one of PARTS (robust takes the winners of ga and runs it too); quick : a short GA, few starts, no robust
     seeds   : held-out starts per controller; threads : flights side by side
     progress : called with (title, done, in all), by default a bar
     """
@@ -56,5 +56,5 @@ def recompute(
         claims += ga_claims.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
         found["robust"] = robust.compare(birds, found["ga"].winners, seeds or (12 if quick else 240), quick)
-        claims += robust.claims(found["robust"])
+        claims += robust_claims.claims(found["robust"])
     return claims, found
