@@ -8,6 +8,7 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -22,6 +23,7 @@ from airflock.evolve.run import Interrupted, on_device, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
+from airflock.papers.dimock_2003.units import gains
 from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
 
 
@@ -287,6 +289,22 @@ def test_every_shipped_study_can_be_begun(name):
     parameters = study.space.parameters([0.5] * len(study.space.axes))
     assert with_parameters(study.scenario, parameters).parameters is not None
     assert all(axis.low < axis.high for axis in study.space.axes) and study.title
+
+
+@pytest.mark.parametrize(("search", "odd"), [({"population": 7}, 7), ({"restarts": 1, "growth": 1.5}, 75)])
+def test_pairs_of_parents_are_asked_for_before_a_study_begins(search, odd):
+    with pytest.raises(ScenarioError, match=f"search.population = {odd}.* is odd"):
+        load_study("dimock_2003/published", search=search)
+
+
+def test_the_study_of_dimock_2003_searches_the_bounds_of_the_paper_with_cohesion_reaching_farther():
+    study = load_study("dimock_2003/published")
+    assert study.scenario.parameters.gradient == "cells_frozen"
+    for unit in (np.zeros(5), np.full(5, 0.3), np.full(5, 0.9)):
+        ours, theirs = study.space.parameters(unit), gains(unit)
+        assert ours["model.r_c"] >= ours["model.r_a"]
+        for key in ("k_c", "k_a", "k_d", "r_a"):
+            assert ours[f"model.{key}"] == pytest.approx(theirs.si()[key], rel=1e-5)
 
 
 def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monkeypatch):

@@ -57,6 +57,7 @@ def decide(
     percept: Percept | None = None,
     shared: Any = None,
     wing: Any = None,
+    aero: Any = None,
 ) -> Decision:
     """Decision of one agent.
 
@@ -67,7 +68,7 @@ def decide(
     memory     : Memory from the last decision; None before the first
     time       : since the start of the flight, s; period : between two decisions, s
     index      : own index in the flock; centre : of the arena, m
-    shared     : what the model's `flock` found for this agent; wing : parameters of the wing
+    shared     : what the model's `flock` found for this agent; wing, aero : parameters of the wing and of drag descent
     percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
 
     Raises RuleError where a rule asks for what the model does not provide.
@@ -83,6 +84,7 @@ def decide(
         "period": period,
         "shared": shared,
         "wing": wing,
+        "aero": aero,
         "p": p,
     }
     result = answer(model.decide, "decide", given, model.name)

@@ -24,7 +24,7 @@ class Model:
     neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
     boundary     : surface rule → Walls
     flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
-    workspace    : `workspace(n, p, wing)` → NamedTuple of (rows, columns), the scratch arrays that `flock` works in
+    workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
     wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
@@ -134,7 +134,7 @@ class Metric:
               while no two agents are nearer than that. A driver may then skip the pair loop.
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
     survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
-              `workspace(n, q, wing)` gives its scratch
+              `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
     total   : from the combined values of a whole flight to named order parameters; by default they are these
     """

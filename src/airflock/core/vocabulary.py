@@ -50,6 +50,7 @@ FLOCK = {
     "vy": "the same, north, m/s",
     "vz": "the same, up, m/s",
     "wing": "parameters of the wing (aero.wing)",
+    "aero": "parameters of the drag descent (aero.descent)",
     "work": "scratch arrays in the shapes that `workspace` gives, kept from call to call; work.name[row][column]",
     "shared": "columns of Shared to fill: shared.name[i] for every agent i",
 }
@@ -63,6 +64,7 @@ AGENT = {
     "period": "time between two decisions, s",
     "shared": "what `flock` found for this agent",
     "wing": "parameters of the wing (aero.wing)",
+    "aero": "parameters of the drag descent (aero.descent)",
 }
 BODY = {
     "vx": "true velocity, east, m/s",

@@ -143,6 +143,7 @@ def decisions(
         made = decide(
             scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
             time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
+            aero=scenario.aero,
         )  # fmt: skip
         agent.rays = float(senses.rays)
         x, y, z = made.command

@@ -5,6 +5,7 @@ from typing import Any
 
 from airflock.core.agent import State, answer
 from airflock.core.contract import Metric
+from airflock.engine.passes.flock import shapes_of
 from airflock.scenarios.scenario import Scenario
 
 Survey = Callable[[Sequence[State]], list[Any]]  # states of all agents → what the rule found for each
@@ -15,8 +16,8 @@ def of_model(scenario: Scenario) -> Survey | None:
     model = scenario.model
     if model.flock is None or model.workspace is None:
         return None
-    given = {"p": scenario.parameters, "wing": scenario.wing}
-    shapes = model.workspace(scenario.agents, scenario.parameters, scenario.wing)
+    given = {"p": scenario.parameters, "wing": scenario.wing, "aero": scenario.aero}
+    shapes = shapes_of(model.workspace, scenario.agents, given)
     return _solver(model.flock, "flock", model.Shared, shapes, given, model.name)
 
 
@@ -24,7 +25,7 @@ def of_metric(metric: Metric, agents: int, q: Any, wing: Any) -> Survey | None:
     """The survey of a metric, likewise."""
     if metric.survey is None or metric.workspace is None:
         return None
-    shapes = metric.workspace(agents, q, wing)
+    shapes = shapes_of(metric.workspace, agents, {"q": q, "wing": wing})
     return _solver(metric.survey, "survey", metric.Shared, shapes, {"q": q, "wing": wing}, metric.name)
 
 

@@ -45,7 +45,7 @@ def in_formation(scenario: Scenario, seed: int, i: int) -> State:
     place = FORMATIONS[s.kind](i, s.spacing_x, s.spacing_y, s.spacing_z)
     gx, gy, gz, _ = normals(seed, random.START, 0, i, draw=2)
     z = place[2] + s.jitter * gz if scenario.dimensions == 3 else 0.0
-    return State(place[0] + s.jitter * gx, place[1] + s.jitter * gy, z, *ZERO)
+    return State(place[0] + s.jitter * gx, place[1] + s.jitter * gy, z, s.speed, 0.0, 0.0)
 
 
 def find_room(scenario: Scenario, seed: int, place: Place, i: int, flock: Sequence[State]) -> Vector | None:

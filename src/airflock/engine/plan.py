@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
@@ -54,6 +55,7 @@ class Plan:
     own       : each agent has a goal of its own
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
+    aero_choices : those of drag descent, where it is added to the model
     sequential: one agent after another perceives, decides and moves
     record    : keep every sample (position, velocity, command) besides the running sums
     """
@@ -74,6 +76,7 @@ class Plan:
     goals: bool = False
     stop: bool = False
     wing_choices: tuple[tuple[str, str], ...] = ()
+    aero_choices: tuple[tuple[str, str], ...] = ()
     herd: bool = False
     own: bool = False
     sequential: bool = False
@@ -97,7 +100,9 @@ class Plan:
     @property
     def constants(self) -> dict[str, dict[str, str | float]]:
         """Choices and usual numbers by record name, inlined as constants."""
-        return {"p": dict(self.model_choices), "b": dict(self.body_choices), "wing": dict(self.wing_choices)}
+        wing: dict[str, str | float] = dict(self.wing_choices)
+        aero: dict[str, str | float] = dict(self.aero_choices)
+        return {"p": dict(self.model_choices), "b": dict(self.body_choices), "wing": wing, "aero": aero}
 
     @property
     def periodic(self) -> bool:
@@ -122,6 +127,7 @@ class Plan:
             "q": number_names(metric_parameters.Parameters),
             "c": CLOCK,
             "wing": number_names(wings.Parameters),
+            "aero": number_names(descent.Parameters),
         }
 
 

@@ -5,10 +5,12 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.contract import Model
 from airflock.core.vocabulary import PAIR, SURFACE, Own, Percept, asks
 from airflock.engine import law
+from airflock.engine.passes.flock import shapes_of
 from airflock.errors import RuleError
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
@@ -20,7 +22,7 @@ VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
 def probe(model: Model, parameters: Any) -> None:
     """Raise a RuleError that names file, line and fault, if a rule fails or returns something else than it declares."""
     given: dict[str, Any] = {**VALUES, "p": parameters, "period": 0.2, "percept": Percept(1.0, 10.0, 20.0, 0.0)}
-    given["wing"] = wings.Parameters(segments="5")
+    given["wing"], given["aero"] = wings.Parameters(segments="5"), descent.Parameters()
     given["own"] = Own(1.0, 2.0, 0.0, 0.4472, 0.8944, 0.0)
     for kind, rule in (("reach", model.reach), ("neighbour", model.neighbour), ("boundary", model.boundary)):
         if rule is not None:
@@ -53,7 +55,7 @@ def probe(model: Model, parameters: Any) -> None:
 def _shared(model: Model, given: dict[str, Any]) -> Any:
     """What the rule of the whole flock finds for the first of three agents."""
     assert model.flock is not None and model.workspace is not None and model.Shared is not None
-    shapes = model.workspace(3, given["p"], given["wing"])
+    shapes = shapes_of(model.workspace, 3, given)
     work = type(shapes)(*[[[0.0] * columns for _ in range(rows)] for rows, columns in shapes])
     fields = model.Shared._fields  # type: ignore[attr-defined]
     shared = model.Shared(*[[0.0] * 3 for _ in fields])

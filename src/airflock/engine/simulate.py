@@ -59,6 +59,7 @@ def plan_of(
         lossy=scenario.radio.loss > 0.0,
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
+        aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
         record=record,

@@ -139,7 +139,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     numbers = [
         *row(scenario.parameters), *row(scenario.body), *row(scenario.sensors), *row(scenario.radio),
         *row(scenario.wind), *(arena[name] for name in ARENA), *row(scenario.measured_by()),
-        *(timing[name] for name in CLOCK), *row(scenario.wing),
+        *(timing[name] for name in CLOCK), *row(scenario.wing), *row(scenario.aero),
     ]  # fmt: skip
     counts = families + [0] * (2 - len(families))
     whole = times | {

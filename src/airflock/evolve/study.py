@@ -226,6 +226,11 @@ def _search_faults(search: Search, objectives: int) -> list[str]:
             f"search.algorithm = '{search.algorithm}' takes one objective, but there are {objectives}; "
             f"give one, or search.algorithm = 'nsga2'"
         )
+    populations = [round(search.population * search.growth**run) for run in range(min(int(search.restarts), 20) + 1)]
+    odd = [population for population in populations if population % 2]
+    if search.algorithm == "ga" and odd:
+        grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
+        faults.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
     flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
     if flights * search.seeds >= 2 ** (SEED_BITS - 4):
         faults.append(f"search: {flights * search.seeds:g} flights are more than a study can number")

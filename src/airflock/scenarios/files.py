@@ -72,6 +72,10 @@ def make(
             found = find_model(table.get("kind"), folder)
         except AirflockError as fault:
             faults += str(fault).splitlines()
+    if found is not None and "aero" in merged:
+        more = wings.descent_faults(found)
+        faults += more
+        found = found if more else wings.descending(found)
     parts, more = _parts(merged, table, found)
     faults += more + _faults_between(parts, found)
     if faults or found is None:

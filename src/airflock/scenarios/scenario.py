@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
@@ -22,7 +23,7 @@ class Scenario:
     """Everything about a flight but the seed.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, wind, world, scene, goals, start, wing, metrics : records of parameters, SI units
+    body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
@@ -41,6 +42,7 @@ class Scenario:
     goals: goals.Parameters
     start: start.Parameters
     wing: wings.Parameters
+    aero: descent.Parameters
     metrics: metric_parameters.Parameters
     flight: Flight
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
@@ -56,6 +58,11 @@ class Scenario:
     def dimensions(self) -> int:
         """2 or 3."""
         return int(self.world.dimensions)
+
+    @property
+    def descends(self) -> bool:
+        """Whether drag descent is added to the model (the section [aero])."""
+        return self.model.flock is descent.flock
 
     @property
     def vehicle(self) -> Body:

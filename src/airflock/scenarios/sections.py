@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from airflock.aero import wing
+from airflock.aero import descent, wing
 from airflock.body import motion, radio, sensors, wind
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
@@ -38,5 +38,6 @@ SECTIONS: dict[str, type[Record]] = {
     "goals": goals.Parameters,
     "start": start.Parameters,
     "wing": wing.Parameters,
+    "aero": descent.Parameters,
     "metrics": metrics.Parameters,
 }

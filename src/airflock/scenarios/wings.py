@@ -3,8 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from airflock.aero import descent
 from airflock.aero import wing as wings
-from airflock.core.contract import Model
+from airflock.core.composition import added
+from airflock.core.composition import faults as misfits
+from airflock.core.contract import Model, model
 from airflock.core.vocabulary import asks
 from airflock.metrics.registry import metrics_of
 from airflock.world import start
@@ -12,6 +15,21 @@ from airflock.world import start
 Place = Callable[[int, float, float, float], tuple[float, float, float]]
 FORMATIONS: dict[str, Place] = {"vee": start.in_vee, "echelon": start.in_echelon}  # by the key start.kind
 THIN = 0.1  # of a span: wings farther apart in height do not meet
+
+
+DESCENT = model(descent, "drag_descent")
+
+
+def descending(found: Model) -> Model:
+    """A model with drag descent added to what it commands."""
+    return added(found, DESCENT)
+
+
+def descent_faults(found: Model) -> list[str]:
+    """Why drag descent cannot be added to a model, one line."""
+    if found.flock is not None:
+        return [f"aero: model {found.name} goes down the gradient of the drag by itself; leave the section [aero] out"]
+    return [f"aero: {fault}" for fault in misfits(found, DESCENT)]
 
 
 def flies_on_wings(found: Model | None, q: Any) -> bool:
@@ -33,9 +51,10 @@ def faults(parts: Mapping[str, Any], found: Model | None) -> list[str]:
         return lines
     lines += _stalled(wing) if wing.stall == "refused" else []
     lines += _overlapping(parts)
-    gradient = getattr(parts.get("parameters"), "gradient", "none")
+    place = "aero" if found is not None and found.flock is descent.flock else "model"
+    gradient = getattr(parts["aero"] if place == "aero" else parts.get("parameters"), "gradient", "none")
     if gradient in ("analytic", "frozen") and wing.positions == "grid":
-        lines.append(f"model.gradient = {gradient!r} is a derivative; it needs wing.positions = 'free', not 'grid'")
+        lines.append(f"{place}.gradient = {gradient!r} is a derivative; it needs wing.positions = 'free', not 'grid'")
     flight = parts["flight"]
     if found is not None and found.flock is not None and flight is not None and flight.update == "sequential":
         lines.append(f"update = 'sequential': model {found.name} solves for the whole flock at once")

@@ -43,7 +43,12 @@ class Parameters(Record):
         1.0, "m", low=0.0, high=1e3, source="our choice", meaning="free distance to what stands in the scene"
     )
     speed: float = quantity(
-        0.0, "m/s", low=0.0, high=200.0, source="authors' program", meaning="speed at the start, in random directions"
+        0.0,
+        "m/s",
+        low=0.0,
+        high=200.0,
+        source="authors' program",
+        meaning="speed at the start, in random directions; in a formation straight ahead",
     )
 
 

@@ -40,7 +40,7 @@ def begin(build: CudaBuilder) -> list[str]:
         return [*lines, *agents(build, given), "cuda.syncthreads()", *_heard_at_start(build)]
     if plan.start in FORMATIONS:
         placed = in_formation(build, "s_{}", "row_w")
-        placed += [f"{own(build, a)} = s_{a}" for a in axes]
+        placed += [*(f"{own(build, a)} = s_{a}" for a in axes), f"{own(build, 'vx')} = row_w.speed"]
         return [*lines, *agents(build, placed), "cuda.syncthreads()", *_heard_at_start(build)]
     philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
     spread = build.source.name(start_rules.spread)

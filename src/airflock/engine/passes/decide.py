@@ -126,7 +126,7 @@ def decide(build: Builder) -> None:
     plan, axes, model = build.plan, build.plan.axes, build.plan.model
     used = set(asks(model.decide, "decide", model.name))
     memory = getattr(model.Memory, "_fields", ()) if "memory" in used else ()
-    lines = build.records("p c wing" if "wing" in used else "p c")
+    lines = build.records(" ".join(["p c", *(name for name in ("wing", "aero") if name in used)]))
     lines += build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
     lines += build.bind([f"c{a}" for a in axes])
     body = [f"v{a} = mv{a}[i]" for a in axes] + ([] if plan.dimensions == 3 else ["vz = ZERO"])

@@ -1,6 +1,7 @@
 """Flock: rules that see all agents at once, a model's `flock` and a metric's `survey`, and the scratch they work in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from inspect import signature
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -47,7 +48,8 @@ def flock(build: Builder) -> None:
     if build.plan.model.flock is None:
         return
     owner = owners(build.plan)[0]
-    build.function("flock(n, row, work, scratch)", build.records("p wing"), _call(build, owner), "return 0")
+    records = "p wing aero" if "aero" in asks(owner.rule, owner.kind, owner.name) else "p wing"
+    build.function("flock(n, row, work, scratch)", build.records(records), _call(build, owner), "return 0")
 
 
 def survey(build: Builder, metric: Metric) -> list[str]:
@@ -90,22 +92,28 @@ def shared(build: Builder, record: Any, name: str, bound: bool = False) -> list[
     return [f"shared = {build.source.name(record)}({', '.join(values)})"]
 
 
+def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:
+    """Shapes of the scratch for so many agents: what `workspace` returns for those of n and the records it asks for."""
+    given = {**records, "n": agents}
+    return workspace(*(given[name] for name in signature(workspace).parameters))
+
+
 def _record(owner: Owner, plan: Plan) -> Any:
     """NamedTuple class of the scratch: what `workspace` returns, whatever its shapes."""
-    return type(owner.workspace(1, *_parameters(plan, owner, None)))
+    return type(shapes_of(owner.workspace, 1, _parameters(plan, owner, None)))
 
 
-def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> tuple[Any, Any]:
-    """Parameters of an owner and of the wing as plain records, from a row of numbers."""
-    found = []
-    for letter in (owner.letter, "wing"):
+def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str, Any]:
+    """Parameters of an owner, of the wing and of drag descent as plain records by name, from a row of numbers."""
+    found = {}
+    for letter in (owner.letter, "wing", "aero"):
         start = 0
         for other, names in plan.records.items():
             if other == letter:
                 numbers = {name: 0.0 if row is None else float(row[start + c]) for c, name in enumerate(names)}
-                found.append(SimpleNamespace(**{**numbers, **plan.constants.get(letter, {})}))
+                found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {})})
             start += len(names)
-    return found[0], found[1]
+    return found
 
 
 def scratch(plan: Plan, row: NDArray[Any], agents: int) -> tuple[tuple[tuple[NDArray[Any], ...], ...], ...]:
@@ -120,4 +128,4 @@ def scratch(plan: Plan, row: NDArray[Any], agents: int) -> tuple[tuple[tuple[NDA
 
 def scratch_sizes(plan: Plan, row: NDArray[Any] | None, agents: int) -> list[list[tuple[int, int]]]:
     """Rows and columns of the scratch arrays of every rule of the whole flock; without a row of numbers, with zeros."""
-    return [list(owner.workspace(agents, *_parameters(plan, owner, row))) for owner in owners(plan)]
+    return [list(shapes_of(owner.workspace, agents, _parameters(plan, owner, row))) for owner in owners(plan)]

@@ -25,7 +25,7 @@ def begin(build: Builder) -> None:
         build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
         return
     if plan.start in FORMATIONS:
-        body = loop("i in range(n)", in_formation(build))
+        body = loop("i in range(n)", [*in_formation(build), "vx[i] = w.speed"])
         build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, body, "return 0")
         return
     philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
@@ -56,7 +56,7 @@ def begin(build: Builder) -> None:
 
 
 def in_formation(build: Builder, put: str = "{}[i]", w: str = "w") -> list[str]:
-    """Lines that place agent i in a formation, off its place by start.jitter.
+    """Lines that place agent i in a formation, off its place by start.jitter. Its velocity is straight ahead.
 
     put : where a coordinate goes, with the axis for its braces; w : name of the arena's record
     """

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from airflock.papers.claims import Claim
-from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, static
+from airflock.papers.dimock_2003 import controller, ga, ga_claims, robust, robust_claims, static
 from airflock.papers.dimock_2003.flights import Birds
 from airflock.papers.flights import Flights
 from airflock.papers.paper import Found, Paper
@@ -33,7 +33,7 @@ def fly(wanted: Sequence[str], flights: Flights) -> Found:
         claims += ga_claims.claims(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
         found["robust"] = robust.compare(birds, found["ga"].winners, flights.count(240, 12), quick)
-        claims += robust.claims(found["robust"])
+        claims += robust_claims.claims(found["robust"])
     return claims, found
 
 

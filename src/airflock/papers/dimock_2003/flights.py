@@ -15,15 +15,18 @@ from airflock.papers.flights import Progress
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
+V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
+
 
 class Start(NamedTuple):
-    """How birds start: kind, spacings (ft), and the jitter of their places (ft)."""
+    """How birds start: kind, spacings (ft), and the jitter of their places (ft); flat: they stay in a plane."""
 
     kind: str = "vee"
     sx: float = 5.0
     sy: float = 6.5
     sz: float = 0.0
     jitter: float = 0.0
+    flat: bool = False
 
 
 class Task(NamedTuple):
@@ -58,11 +61,17 @@ class Birds:
     threads: int | None = None
     progress: Progress | None = None
 
-    def fly(self, title: str, tasks: Sequence[Task], duration: float = 20.0, **readings: str) -> list[Flight]:
-        """Fly tasks in the paper's air; `readings` are choices of the model, for instance gradient="cells"."""
-        base = _base(tuple(sorted(({"gradient": "cells_frozen"} | readings).items())))
-        base = replace(base, flight=replace(base.flight, duration=duration))
-        cpu.flight_driver(plan_of(base, record=True))  # compiled once, before threads ask for it
+    def fly(
+        self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str | float
+    ) -> list[Flight]:
+        """Fly tasks in the paper's air; `readings` are keys of the model, for instance gradient="cells".
+
+        noise : diffusion constant of the birds' positions in flight, m²/s
+        """
+        chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
+        bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
+        for base in bases.values():
+            cpu.flight_driver(plan_of(base, record=True))  # compiled once, before threads ask for it
         count = 0
 
         def done() -> None:
@@ -72,14 +81,18 @@ class Birds:
                 self.progress(title, count, len(tasks))
 
         def job(task: Task) -> Callable[[], Flight]:
-            return lambda: _flown(base, task)
+            return lambda: _flown(bases[task.start.flat], task)
 
         return list(cpu.in_threads([job(task) for task in tasks], self.threads, done))
 
 
 @cache
-def _base(readings: tuple[tuple[str, str], ...]) -> Scenario:
-    return load("dimock_2003/published", {f"model.{key}": value for key, value in readings})
+def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, flat: bool) -> Scenario:
+    jostled = {"body.kind": "jostled", "body.noise": noise} if noise > 0.0 else {}
+    settled = {"metrics.t_settle": 0.5 * duration, "metrics.v_settle": V_SETTLE}
+    model = {f"model.{key}": value for key, value in readings}
+    plane = {"world.dimensions": "2"} if flat else {}
+    return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **model})
 
 
 def _flown(base: Scenario, task: Task) -> Flight:
