@@ -109,11 +109,41 @@ def test_a_window_without_frames_is_refused_in_one_line():
         exposure(flight(), start=30.0, stop=20.0)
 
 
-def test_missing_positions_leave_gaps_and_nothing_else():
+def with_a_gap():
+    """Agent 1 has no positions at frames 150 to 159, so that nothing joins frames 149 and 160 (74.5 to 80 s)."""
     recording = flight(document=SQUARE)
     recording["position"].values[150:160, :, :, 1] = np.nan
-    save_to_nowhere(trajectories(recording))
-    save_to_nowhere(exposure(recording, start=70.0))
+    return recording
+
+
+def test_missing_positions_leave_gaps_and_nothing_else():
+    whole, gapped = (coloured_paths(trajectories(r, agent=2)) for r in (flight(document=SQUARE), with_a_gap()))
+    missing = np.arange(80, 200)  # first frame of each segment: the window is the last 60 s
+    missing = (missing >= 149) & (missing < 160)
+    for agent, (one, other) in enumerate(zip(whole, gapped, strict=True)):
+        full, drawn = (np.array([path.vertices for path in lines.get_paths()]) for lines in (one, other))
+        lost = missing if agent == 1 else np.zeros_like(missing)
+        assert (np.isnan(drawn).any(axis=(1, 2)) == lost).all()
+        assert (drawn[~lost] == full[~lost]).all()
+        assert (other.get_array()[~lost] == one.get_array()[~lost]).all()
+    save_to_nowhere(trajectories(with_a_gap()))
+
+
+def test_missing_positions_shed_no_light_and_take_none_away_elsewhere():
+    films = []
+    for recording in (flight(document=SQUARE), with_a_gap()):
+        shown = scene.paths_of(recording)
+        films.append(light(shown, shown.position[:, 0], shown.position[:, 1], (-60.0, 60.0, -60.0, 60.0), 20.0))
+    lost = films[0] - films[1]
+    assert np.isfinite(films[1]).all()
+    assert lost.min() > -1e-9
+    expected = 20.0 * (math.exp(-(100.0 - 80.0) / 20.0) - math.exp(-(100.0 - 74.5) / 20.0))
+    assert lost.sum(axis=(0, 1)) == pytest.approx(expected * exposure_colour(scene.paths_of(flight())), rel=1e-4)
+    rows, columns = np.nonzero(lost.sum(axis=2) > 1e-9)
+    angle = np.arctan2(rows + 0.5 - lost.shape[0] / 2, columns + 0.5 - lost.shape[1] / 2)
+    begin, end = ((t * PACE / RADIUS + 2.0 * math.pi / 3.0) % (2.0 * math.pi) for t in (74.5, 80.0))
+    assert begin - 0.01 < angle.min() and angle.max() < end + 0.01
+    save_to_nowhere(exposure(with_a_gap(), start=70.0))
 
 
 def save_to_nowhere(figure):

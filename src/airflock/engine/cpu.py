@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.passes import grid
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.driver import flight, replay
 from airflock.engine.passes.flock import scratch
@@ -73,6 +74,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
         np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
         work, words, past, store, gust, mem, memory, labels, values, sums,
         np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
+        *grid.memory(plan, n),
     )  # fmt: skip
     if frames is not None and plan.stop:
         frames = frames[: int(sums[len(columns(plan.metrics))])]

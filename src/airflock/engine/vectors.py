@@ -3,7 +3,8 @@
 `least` and `most` stand for min and max of two numbers: LLVM vectorises a reduction by its own minimum instruction, but
 not one by the comparison that Numba makes of min (2.4 times on the nearest-neighbour loop). `choose` is a conditional
 expression without a branch: of two branches on one test LLVM makes two ways through a loop, and the extremes at their
-ends are then no reductions any more (9 times on the same loop). `wide_vectors` asks for 512-bit vectors in the function
+ends are then no reductions any more (9 times on the same loop). `copy_block` copies a few neighbours in a row of one
+contiguous table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the function
 that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones.
 """
 
@@ -37,6 +38,30 @@ def wide_vectors(typing_context):
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')  # llvmlite knows names without values only
         return context.get_dummy_value()
     return types.void(), emit
+"""
+
+# Only in drivers that sort agents into cells: a short loop that copies the few agents of a cell costs more than they.
+BLOCKS = """
+@intrinsic
+def copy_block(typing_context, to, row, at, source, first, shift):
+    def emit(context, builder, signature, arguments):
+        kind = context.get_data_type(signature.args[0].dtype)
+        block = ir.VectorType(kind, {block})
+
+        def place(number, row, column):
+            array = context.make_array(signature.args[number])(context, builder, arguments[number])
+            width = builder.extract_value(array.shape, 1)
+            begin = builder.gep(array.data, [builder.add(builder.mul(row, width), column)])
+            return builder.bitcast(begin, block.as_pointer())
+
+        number, none = ir.IntType(32), ir.Constant(block, ir.Undefined)
+        one = builder.insert_element(none, arguments[5], number(0))
+        more = builder.shuffle_vector(one, none, ir.Constant(ir.VectorType(number, {block}), [0] * {block}))
+        align = signature.args[0].dtype.bitwidth // 8
+        read = builder.load(place(3, arguments[1], arguments[4]), align=align)
+        builder.store(builder.fadd(read, more), place(0, arguments[1], arguments[2]), align=align)
+        return context.get_dummy_value()
+    return types.void(to, types.int64, types.int64, source, types.int64, to.dtype), emit
 """
 
 

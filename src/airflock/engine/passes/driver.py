@@ -1,6 +1,7 @@
 """Drivers: whole flights, and whole recordings, as the order in which the passes run."""
 
-from airflock.engine.passes import decide, flock, measure, move, perceive, scene
+from airflock.engine import vectors
+from airflock.engine.passes import decide, flock, grid, measure, move, perceive, scene
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import primitives
@@ -67,7 +68,7 @@ def flight(plan: Plan) -> str:
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     if plan.model.neighbour is not None:
-        choose += ["neighbours(k, n, m, time, late, row, whole, work, store)"]
+        choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
@@ -99,7 +100,9 @@ def flight(plan: Plan) -> str:
     step += branch("step < steps", advance)
     lines += loop("step in range(steps + 1)", step)
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
-    arguments += ", values, sums, frames" + (", scratch" if flock.owners(plan) else "")
+    arguments += (
+        ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
+    )
     build.function(f"fly({arguments})", lines, "return 0")
     return _text(build, plan.model.name)
 
@@ -191,7 +194,8 @@ def _clocks(plan: Plan) -> list[str]:
 
 
 def _text(build: Builder, label: str) -> str:
-    head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits))
+    blocks = vectors.BLOCKS.replace("{block}", str(grid.BLOCK)) if build.plan.grid else ""
+    head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits) + blocks)
     if not build.plan.grid:  # which sorts cells into arrays of its own
         head = head.replace("COUNTED = True", "COUNTED = False")
     last = build.functions[-1].replace("@njit(**JIT)", "@njit(cache=True, **JIT)", 1)

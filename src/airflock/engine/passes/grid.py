@@ -2,17 +2,52 @@
 
 A line is a row of cells along x. The agents in the cells around a line are copied side by side once, slab by slab (the
 cells of one x), so that the candidates of a cell are three slabs, one piece of memory, and the loop over them runs in
-whole vectors. In a periodic box they are copied at the image that they are met at. Whatever lies at random in memory
-(the agents of a cell, their sums) is kept in rows of one agent, so that it costs one cache line and not one per number.
-Candidates come in the order of slabs and within a cell by index, whatever the number of threads. Only for perception
-without noise, delay and loss; there it equals all pairs but for rounding and the order of sums.
+whole vectors; so does the copying, which may write past the agents of a cell where the next ones overwrite it. In a
+periodic box they are copied at the image that they are met at. Whatever lies at random in memory (the agents of a cell,
+their sums) is kept in rows of one agent, so that it costs one cache line and not one per number; all that is kept from
+stage to stage lies in memory that lasts for a flight. Candidates come in the order of slabs and within a cell by index,
+whatever the number of threads. Only for perception without noise, delay and loss; there it equals all pairs but for
+rounding and the order of sums.
 """
 
-from airflock.engine.passes.build import Builder, loop
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.passes.build import Builder, branch, loop
+from airflock.engine.plan import Plan
 
 CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
 CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
 BLOCK = 8  # candidates taken at once
+SPARE = 8  # cells of the smallest periodic box
+KEPT = "starts, tally, cell_of, place, ident, packed, flat, totals_"
+
+
+def memory(plan: Plan, agents: int) -> tuple[tuple[NDArray[Any], ...], ...]:
+    """What the grid keeps of n agents during a flight, as one argument or none; pages count when they are written.
+
+    starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of, place : of each agent
+    ident : agent at each place; packed : (place, component) states; flat : (component, place), the same
+    """
+    if not plan.grid:
+        return ()
+    real, components = (np.float32 if plan.bits == 32 else np.float64), 2 * plan.dimensions
+    most, fields = CELLS * agents + SPARE, len(getattr(plan.model.Sums, "_fields", ()))
+    # not made anew at each step: the pages of what is given back must be zeroed again before they are used
+    return (
+        (
+            np.empty(most + 1, np.int64),
+            np.empty(CHUNKS * most, np.int32),
+            np.empty(agents, np.int32),
+            np.empty(agents, np.int32),
+            np.empty(agents, np.int32 if plan.bits == 32 else np.int64),
+            np.empty((agents, components), real),
+            np.zeros((components, agents + BLOCK), real),
+            np.empty(agents * max(1, fields), real),
+        ),
+    )
 
 
 def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int]) -> None:
@@ -38,14 +73,15 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
         *loop("e in range(starts[here], starts[here + 1])", meet),
     ]
     body = [*_slabs(build, who), *loop("ox in range(count[0])", cell)]
-    lines = [*lines, *_sorted(build, who), f"totals = np.empty((n, {max(1, len(sums))}), work.dtype)"]
+    wide = max(1, len(sums))
+    lines = [*lines, f"{KEPT} = cells", f"totals = totals_[: n * {wide}].reshape(n, {wide})", *_sorted(build, who)]
     lines += loop("line in prange(count[1] * count[2])", body)
     back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
         "e = place[i]", *[f"sum{c}[i] = totals[e, {k}]" for k, c in enumerate(sums)]
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = [line.replace("CHUNKS", str(CHUNKS)) for line in lines]
-    build.function("neighbours(k_, n, m, time, late, row, whole, work, store)", lines, "return 0", parallel=True)
+    build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
 
 
 def _box(build: Builder) -> list[str]:
@@ -65,9 +101,11 @@ def _box(build: Builder) -> list[str]:
     coarse = f"(volume / real({CELLS} * n)) ** real({1.0 / len(axes)})"
     lines += [f"side = near * most(ONE, {coarse})"]
     fewest = 2 if periodic else 1  # an agent is met at two images of which at most one is in reach
-    for c in range(len(axes)):
-        lines += [f"count[{c}] = max({fewest}, int(width[{c}] / side))", f"size[{c}] = width[{c}] / real(count[{c}])"]
-    return lines
+    fit = [f"count[{c}] = max({fewest}, int(width[{c}] / side))" for c in range(len(axes))]
+    # a flock that has dispersed along a line or in a plane still has too many
+    fit += branch(f"count[0] * count[1] * count[2] <= {CELLS} * n + {SPARE}", ["break"]) + ["side *= real(1.25)"]
+    lines += loop("attempt in range(1000)", fit)
+    return lines + [f"size[{c}] = width[{c}] / real(count[{c}])" for c in range(len(axes))]
 
 
 def _sorted(build: Builder, who: bool) -> list[str]:
@@ -78,30 +116,30 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     axes = build.plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
     lines = [*build.bind(names), "low, size, count = cells_of(n, near, row, work)"]
-    lines += ["cells = count[0] * count[1] * count[2]", "starts = np.empty(cells + 1, np.int64)"]
-    lines += [f"fill = np.zeros((CHUNKS, cells), np.int32); packed = np.empty((n, {len(names)}), work.dtype)"]
-    lines += ["cell_of = np.empty(n, np.int32); place = np.empty(n, np.int32)"]
-    lines += [f"ident = np.empty(n, np.int{build.plan.bits})"] if who else []
+    lines += ["total = count[0] * count[1] * count[2]"]
     inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
     part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
     at = {a: f"min(max(int(({a}[i] - low_{a}) * per_{a}), 0), top_{a})" for a in axes}
     index = f"({at['z']} * count[1] + {at['y']})" if "z" in axes else at["y"]
-    count = [f"cell = {index} * count[0] + {at['x']}", "cell_of[i] = cell; fill[chunk, cell] += 1"]
-    lines += loop("chunk in prange(CHUNKS)", [*inside, *loop(part, count)])
-    add = ["held = fill[share, cell]; fill[share, cell] = total; total += held"]
-    lines += ["total = 0"]
-    lines += loop("cell in range(cells)", ["starts[cell] = total", *loop("share in range(CHUNKS)", add)])
-    lines += ["starts[cells] = total"]
-    put = ["cell = cell_of[i]; d = fill[chunk, cell]; fill[chunk, cell] = d + 1; place[i] = d"] + ["ident[d] = i"] * who
+    count = [f"cell = {index} * count[0] + {at['x']}", "cell_of[i] = cell; tally[head + cell] += 1"]
+    none = ["head = chunk * total", *loop("cell in range(total)", ["tally[head + cell] = 0"])]
+    lines += loop("chunk in prange(CHUNKS)", [*none, *inside, *loop(part, count)])
+    add = ["held = tally[share * total + cell]; tally[share * total + cell] = before; before += held"]
+    lines += ["before = 0"]
+    lines += loop("cell in range(total)", ["starts[cell] = before", *loop("share in range(CHUNKS)", add)])
+    lines += ["starts[total] = before"]
+    put = ["d = tally[head + cell_of[i]]; tally[head + cell_of[i]] = d + 1; place[i] = d"] + ["ident[d] = i"] * who
     put += [f"packed[d, {c}] = {name}[i]" for c, name in enumerate(names)]
-    return lines + loop("chunk in prange(CHUNKS)", loop(part, put))
+    lines += loop("chunk in prange(CHUNKS)", ["head = chunk * total", *loop(part, put)])
+    each = loop(part.replace("i in", "e in"), [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))])
+    return lines + loop("chunk in prange(CHUNKS)", each)
 
 
 def _slabs(build: Builder, who: bool) -> list[str]:
     """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins)."""
     axes, periodic = build.plan.axes, build.plan.periodic
     names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
-    shifts = {f"h{a}": f" + shift_{a}" for a in axes} if periodic else {}
+    shifts = {f"h{a}": f"shift_{a}" for a in axes} if periodic else {}
     across = axes[1:]
     lines = ["oy = line % count[1]; oz = line // count[1]", "room = 0"]
     rows = ["base = " + ("(cz * count[1] + cy)" if "z" in axes else "cy") + " * count[0]"]
@@ -113,11 +151,14 @@ def _slabs(build: Builder, who: bool) -> list[str]:
     lines += [f"who = np.empty(room + {2 * BLOCK}, np.int{build.plan.bits})"] if who else []
     lines += [f"{name} = box[{c}]" for c, name in enumerate(names)]
     lines += ["slab = np.zeros(count[0] + 3, np.int64); middle = np.zeros(count[0] + 1, np.int64); found = 0"]
-    copy = [f"{name}[found] = packed[s, {c}]{shifts.get(name, '')}" for c, name in enumerate(names)]
-    copy += ["who[found] = ident[s]"] * who + ["found += 1"]
+    copy = [
+        f"copy_block(box, {c}, found + s, flat, origin + s, {shifts.get(name, 'ZERO')})" for c, name in enumerate(names)
+    ]
+    ids = loop("s in range(inside)", ["who[found + s] = ident[origin + s]"]) * who
     own = "(qy == oy) & (qz == oz)" if "z" in axes else "qy == oy"
     each = [*rows, f"if {own}:", "    middle[min(max(qx, 0), count[0])] = found"]
-    each += loop("s in range(starts[base + cx], starts[base + cx + 1])", copy)
+    each += ["origin = starts[base + cx]; inside = starts[base + cx + 1] - origin"]
+    each += [*loop(f"s in range(0, inside, {BLOCK})", copy), *ids, "found += inside"]
     first, last = ("-1", "count[0] + 1") if periodic else ("0", "count[0]")
     wrap = ["cx = qx"]
     if periodic:
