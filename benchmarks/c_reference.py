@@ -85,6 +85,23 @@ def build(source: Path, library: Path, options: Sequence[str]) -> Path:
     return library
 
 
+def parameters_of(scenario: Scenario, bits: int = 32) -> Any:
+    """Numbers of a scenario as the struct of vasarhelyi.h."""
+    body, sensors, measured = scenario.body, scenario.sensors, scenario.measured_by()
+    numbers = {name: getattr(scenario.parameters, name) for name in PARAMETERS if hasattr(scenario.parameters, name)}
+    numbers |= {
+        "tau": body.tau, "a_max": body.a_max, "outer_noise": body.noise,
+        "sensor_noise": sensors.noise, "damping": sensors.damping,
+        "spring": (2.0 * sensors.damping * sensors.noise) ** 0.5 / sensors.scale,
+        "range": scenario.radio.range, "half_side": 0.5 * scenario.world.side,
+        "separation": scenario.separation(), "r_coll": measured.r_coll, "r_cluster": measured.r_cluster,
+        "dt": scenario.flight.dt, "period": sensors.period,
+    }  # fmt: skip
+    real = ctypes.c_float if bits == 32 else ctypes.c_double
+    kind = type("Parameters", (ctypes.Structure,), {"_fields_": [(name, real) for name in PARAMETERS]})
+    return kind(*(numbers[name] for name in PARAMETERS))
+
+
 class Reference:
     """One build of vasarhelyi.c for one scenario: a square arena whose nearer walls act, the multirotor of Table S5."""
 
@@ -100,27 +117,10 @@ class Reference:
         if self.library.vector_bytes() * 8 != self.vector_bits or self.library.real_bytes() * 8 != bits:
             raise RuntimeError(f"{name} was built with another width of vectors or reals")
         self.scenario = scenario
-        self.parameters = self._parameters(scenario)
+        self.parameters = parameters_of(scenario, bits)
         times = clock(scenario)
         self.times = {name: times[name] for name in TIMES if name in times} | {"agents": scenario.agents}
         self.times["delay"] = times["delay"] // times["decide_every"]
-
-    def _parameters(self, scenario: Scenario) -> Any:
-        body, sensors, measured = scenario.body, scenario.sensors, scenario.measured_by()
-        numbers = {
-            name: getattr(scenario.parameters, name) for name in PARAMETERS if hasattr(scenario.parameters, name)
-        }
-        numbers |= {
-            "tau": body.tau, "a_max": body.a_max, "outer_noise": body.noise,
-            "sensor_noise": sensors.noise, "damping": sensors.damping,
-            "spring": (2.0 * sensors.damping * sensors.noise) ** 0.5 / sensors.scale,
-            "range": scenario.radio.range, "half_side": 0.5 * scenario.world.side,
-            "separation": scenario.separation(), "r_coll": measured.r_coll, "r_cluster": measured.r_cluster,
-            "dt": scenario.flight.dt, "period": sensors.period,
-        }  # fmt: skip
-        real = ctypes.c_float if self.bits == 32 else ctypes.c_double
-        kind = type("Parameters", (ctypes.Structure,), {"_fields_": [(name, real) for name in PARAMETERS]})
-        return kind(*(numbers[name] for name in PARAMETERS))
 
     def _schedule(self, seed: int, skip: bool) -> Schedule:
         numbers = self.times | {"skip": int(skip)}

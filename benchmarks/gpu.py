@@ -1,10 +1,13 @@
-"""Airflock on a GPU against hand-written CUDA C, interleaved: builds, checks and times everything in one call.
+"""Airflock on a GPU against hand-written CUDA C and JAX: builds, checks and times everything, and judges it.
 
-    python benchmarks/gpu.py [--quick] [--json FILE] [--trial flock.cu]
+    python benchmarks/gpu.py [--quick] [--json FILE] [--trial flock.cu] [--rehearse]
 
-Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; takes about six minutes, --quick one. The reference is built
-with NVRTC, which comes with numba-cuda; --trial also builds and runs a program of its own with nvcc. Only ratios of
-interleaved runs mean anything: the least time of each side is shown.
+Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; JAX with its CUDA plugin for the ratio of the big flock. About
+four minutes, --quick one. CUDA C is built with NVRTC, which comes with numba-cuda; --trial also builds and runs a
+program of its own with nvcc. Only ratios of interleaved runs mean anything: the least time of each side is shown.
+--rehearse goes through every part without a GPU (Numba's simulator, tiny sizes); its figures mean nothing.
+
+Exit status 1 if CPU and GPU disagree or a part failed; a time is never an error.
 """
 
 import argparse
@@ -15,16 +18,19 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import boids_jax
+import cuda_c
 import numpy as np
-from c_reference import PARAMETERS, SCORES, Reference
+from c_reference import SCORES
 
+from airflock.engine import cpu
 from airflock.engine.cuda import device, launch
 from airflock.engine.cuda.kernel import ARGUMENTS
-from airflock.engine.cuda.shape import shape_of
+from airflock.engine.cuda.memory import layout_of
 from airflock.engine.simulate import plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.scenarios.files import load
@@ -34,68 +40,37 @@ PRESET = "vasarhelyi_2018/4ms"
 COMPARED = ("phi_vel", "phi_corr", "n_min", "r_min_mean", "n_disc", "phi_wall", "phi_lap_abs", "polarisation")
 
 
-class CudaC:
-    """vasarhelyi.cu for one number of threads per agent."""
+@dataclass
+class Sizes:
+    """How much is flown.
 
-    def __init__(self, scenario: Any, per_agent: int):
-        from cuda.core import Device, Program, ProgramOptions
+    duration, apart : of a flight, and of those that are compared number by number, s
+    saturated       : flocks that fill a GPU
+    generations     : of `generation` flights each, dependent on each other
+    flights         : compared with the CPU in distribution
+    boids, steps    : of the big flock
+    """
 
-        self.device = Device()
-        self.device.set_current()
-        capability = "".join(map(str, self.device.compute_capability))
-        options = ProgramOptions(
-            std="c++17", arch=f"sm_{capability}", use_fast_math=True, define_macro=[("PER_AGENT", str(per_agent))]
-        )
-        text = (HERE / "vasarhelyi.cu").read_text()
-        self.kernel = Program(text, "c++", options).compile("cubin").get_kernel("fly")
-        self.per_agent, self.scenario = per_agent, scenario
-        self.times = _times(scenario)
-
-    def ready(self, flocks: int) -> Callable[[], Any]:
-        """A function that flies this many flocks, seeds from 1 on, and returns the scores (flock, order parameter)."""
-        from cuda.core import LaunchConfig
-        from cuda.core import launch as run
-
-        cuda, t = device.runtime(), self.times
-        rows = cuda.to_device(np.tile(_numbers(self.scenario), (flocks, 1)))
-        scores = cuda.to_device(np.zeros((flocks, len(SCORES)), np.float32))
-        threads = -(-t["agents"] // 32) * 32 * self.per_agent
-        whole = [np.int32(t[name]) for name in ("agents", "steps", "decide_every", "sample_every", "delay")]
-        given = (_address(rows), *whole, np.uint32(1), _address(scores))
-        stream = self.device.default_stream
-
-        def go() -> Any:
-            run(stream, LaunchConfig(grid=flocks, block=threads), self.kernel, *given)
-            stream.sync()
-            return scores
-
-        return go
+    agents: int = 100
+    duration: float = 600.0
+    apart: float = 10.0
+    saturated: int = 15_000
+    generations: int = 150
+    generation: int = 100
+    flights: int = 1000
+    boids: int = 1_000_000
+    steps: int = 100
 
 
-def _address(array: Any) -> int:
-    return int(array.__cuda_array_interface__["data"][0])
-
-
-def _times(scenario: Any) -> dict[str, int]:
-    from airflock.engine.tables import clock
-
-    found = clock(scenario) | {"agents": scenario.agents}
-    return found | {"delay": found["delay"] // found["decide_every"]}
-
-
-def _numbers(scenario: Any) -> Any:
-    """Parameters of vasarhelyi.h in their order."""
-    with tempfile.TemporaryDirectory() as folder:
-        known = Reference(scenario, Path(folder)).parameters
-    return np.array([getattr(known, name) for name in PARAMETERS], np.float32)
+QUICK = Sizes(duration=60.0, saturated=1000, generations=15, flights=100, boids=100_000)
 
 
 def ours(scenario: Any, flocks: int, per_agent: int) -> Callable[[], Any]:
     """A function that flies this many flocks with the generated kernel; memory is there already."""
     cuda = device.runtime()
     plan = replace(plan_of(scenario), grid=False)
-    shape = shape_of(scenario.agents, flocks, device.multiprocessors())
-    shape = replace(shape, per_agent=per_agent, threads=shape.lanes * per_agent)
+    shape = layout_of(plan, scenario.agents, flocks, device.multiprocessors())
+    shape = replace(shape, per_agent=per_agent, threads=shape.threads // shape.per_agent * per_agent)
     driver = launch.flight_driver(plan, shape)
     jobs = [tables(scenario, plan, 1 + flock) for flock in range(flocks)]
     own = launch.arrays(plan, driver, shape, jobs, None)
@@ -107,7 +82,6 @@ def ours(scenario: Any, flocks: int, per_agent: int) -> Callable[[], Any]:
         cuda.synchronize()
         return own
 
-    go.values = lambda: launch.results(plan, jobs, own)  # type: ignore[attr-defined]
     go.registers = lambda: list(driver.fly.get_regs_per_thread().values())  # type: ignore[attr-defined]
     return go
 
@@ -126,11 +100,11 @@ def least(sides: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
     return {name: min(taken) for name, taken in times.items()}
 
 
-def evaluations(scenario: Any, quick: bool) -> list[dict[str, Any]]:
+def evaluations(scenario: Any, sizes: Sizes) -> list[dict[str, Any]]:
     """Generated kernel against CUDA C over the number of flocks."""
     rows = []
-    reference = {per: CudaC(scenario, per) for per in (1, 2, 4)}
-    for flocks in (1, 100, 1000) if quick else (1, 100, 1000, 15_000):
+    reference = {per: cuda_c.CudaC(scenario, per) for per in (1, 2, 4)}
+    for flocks in sorted({1, sizes.generation, min(1000, sizes.saturated), sizes.saturated}):
         most = (1,) if flocks > 5000 else (1, 2, 4)
         sides: dict[str, Callable[[], Any]] = {}
         for per in most:
@@ -145,33 +119,57 @@ def evaluations(scenario: Any, quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
+def registers(scenario: Any) -> dict[int, Any]:
+    """Registers per thread of the generated kernels, and how long it took to compile or load them."""
+    found = {}
+    for per in (1, 2, 4):
+        begin = time.perf_counter()
+        go = ours(scenario, 1, per)
+        go()
+        taken = round(time.perf_counter() - begin, 2)
+        found[per] = {"registers": go.registers(), "compiled or loaded in s": taken}  # type: ignore[attr-defined]
+    return found
+
+
 def agreement(scenario: Any, flocks: int) -> dict[str, Any]:
     """Means over flights: CPU, GPU and CUDA C; z: difference of CPU and GPU in standard errors."""
     seeds = list(range(1, flocks + 1))
     begin = time.perf_counter()
     gpu = score_flights([scenario] * flocks, seeds, device="cuda")
     taken = time.perf_counter() - begin
-    cpu = score_flights([scenario] * flocks, [s + 10**6 for s in seeds])
-    c = CudaC(scenario, 1).ready(flocks)().copy_to_host()
+    cpus = score_flights([scenario] * flocks, [s + 10**6 for s in seeds])
+    c = cuda_c.CudaC(scenario, 1).ready(flocks)().copy_to_host()
     rows = {}
     for key in COMPARED:
-        a, b = (np.array([row[key] for row in flights]) for flights in (cpu, gpu))
+        a, b = (np.array([row[key] for row in flights]) for flights in (cpus, gpu))
         error = np.hypot(a.std(ddof=1), b.std(ddof=1)) / flocks**0.5
-        rows[key] = {"cpu": a.mean(), "gpu": b.mean(), "CUDA C": float(c[:, SCORES.index(key)].mean()),
+        rows[key] = {"cpu": float(a.mean()), "gpu": float(b.mean()), "CUDA C": float(c[:, SCORES.index(key)].mean()),
                      "z": float((b.mean() - a.mean()) / max(error, 1e-12))}  # fmt: skip
     return {"flights": flocks, "seconds with tables and scores": round(taken, 2), "order parameters": rows}
 
 
-def evolution(scenario: Any, generations: int) -> dict[str, Any]:
-    """CMA-ES over four parameters: dependent generations of 100 flights, the optimiser and all bookkeeping included."""
+def apart(scenario: Any) -> dict[str, float]:
+    """Largest difference of any position (m) or velocity (m/s) of CPU and GPU in double precision, three seeds."""
+    plan = replace(plan_of(scenario, precision=64, record=True), grid=False)
+    jobs = [tables(scenario, plan, seed) for seed in (1, 2, 3)]
+    pairs = zip([cpu.fly(plan, job) for job in jobs], launch.fly_many(plan, jobs), strict=True)
+    return {
+        "seconds flown": scenario.flight.duration,
+        "largest difference": max(float(np.abs(a.frames - b.frames).max()) for a, b in pairs),  # type: ignore[operator]
+    }
+
+
+def evolution(scenario: Any, sizes: Sizes) -> dict[str, Any]:
+    """CMA-ES over four parameters: dependent generations, the optimiser and all bookkeeping included."""
     import cma
 
     keys = ("p_rep", "r0_frict", "c_frict", "v_frict")
     start = [getattr(scenario.parameters, key) for key in keys]
-    search = cma.CMAEvolutionStrategy([1.0] * len(keys), 0.2, {"popsize": 100, "verbose": -9, "seed": 1})
-    score_flights([scenario] * 100, list(range(100)), device="cuda")
+    options = {"popsize": sizes.generation, "verbose": -9, "seed": 1}
+    search = cma.CMAEvolutionStrategy([1.0] * len(keys), 0.2, options)
+    score_flights([scenario] * sizes.generation, list(range(sizes.generation)), device="cuda")
     begin, flown = time.perf_counter(), 0.0
-    for generation in range(generations):
+    for generation in range(sizes.generations):
         asked = search.ask()
         candidates = []
         for point in asked:
@@ -182,20 +180,67 @@ def evolution(scenario: Any, generations: int) -> dict[str, Any]:
         flown += time.perf_counter() - t
         search.tell(asked, [-row["fitness"] for row in rows])
     taken = time.perf_counter() - begin
-    return {"evaluations": 100 * generations, "seconds": round(taken, 2), "of them in score_flights": round(flown, 2)}
+    count = sizes.generation * sizes.generations
+    return {"evaluations": count, "seconds": round(taken, 2), "of them in score_flights": round(flown, 2)}
 
 
-def second_start() -> dict[str, float]:
-    """From a fresh process to the end of the first launch, twice; the second finds the compiled kernel on disk."""
+def second_start(sizes: Sizes) -> dict[str, float]:
+    """Seconds from the start of a process to the end of its first launch; later ones find the kernel on disk."""
+    n = sizes.generation
     code = (
-        "import time; b = time.perf_counter()\n"
         "from airflock.engine.simulate import score_flights\nfrom airflock.scenarios.files import load\n"
-        f"s = load({PRESET!r}, {{'duration': 1.0}})\nscore_flights([s] * 100, list(range(100)), device='cuda')\n"
-        "print(time.perf_counter() - b)"
+        f"s = load({PRESET!r}, {{'duration': {min(1.0, sizes.duration)}, 'agents': {sizes.agents}}})\n"
+        f"score_flights([s] * {n}, list(range({n})), device='cuda')\nimport time; print(time.time())"
     )
-    times = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
-             for _ in range(3)]  # fmt: skip
+    code = "import rehearsal; rehearsal.begin()\n" + code if rehearsing() else code
+    times = []
+    for _ in range(2 if rehearsing() else 4):
+        begin = time.time()
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=HERE)
+        if done.returncode:
+            raise RuntimeError(done.stderr[-1000:])
+        times.append(float(done.stdout.split()[-1]) - begin)
     return {"first": round(times[0], 2), "second": round(statistics.median(times[1:]), 2)}
+
+
+def rehearsing() -> bool:
+    """Whether stand-ins are in place."""
+    return "rehearsal" in sys.modules
+
+
+def big_flock(sizes: Sizes) -> dict[str, Any]:
+    """Steps per second of one flock by cells, beside the same boids in JAX from the same kind of start, in turn."""
+    from airflock.engine.cuda.crowd import Crowd
+
+    scenario = load("zapotecatl_2016/literal", crowd_settings(sizes.boids))
+    crowd = Crowd(scenario, plan_of(scenario), seed=1)
+    sides = {"airflock": lambda: (crowd.advance(sizes.steps), device.runtime().synchronize())}
+    fault = boids_jax.missing()
+    if fault is None and "gpu" not in boids_jax.devices() and not rehearsing():
+        fault = "JAX sees no GPU; it needs its CUDA plugin"
+    found: dict[str, Any] = {"boids": sizes.boids}
+    if fault is None:
+        start = boids_jax.random_start(scenario, 1)
+        found["apart in float64"] = boids_jax.difference(crowd_settings, min(2000, sizes.boids), 10)
+        flock = boids_jax.Boids(scenario, start[:3].T, start[3:].T)
+        sides["JAX"] = lambda: flock.advance(sizes.steps)
+    taken = least(sides, 5)
+    found["neighbours"] = round(crowd.neighbours(), 2)
+    found |= {f"{name} steps per second": round(sizes.steps / t, 1) for name, t in taken.items()}
+    if fault is None:
+        return found | {"speed against JAX": round(taken["JAX"] / taken["airflock"], 2)}
+    return found | {"without JAX": fault}
+
+
+def crowd_settings(agents: int) -> dict[str, Any]:
+    """A periodic box in which each boid has about 16 neighbours within its reach of 0.5 m."""
+    volume = agents * 4.0 / 3.0 * np.pi * 0.5**3 / 16.0
+    side = round(float(volume ** (1.0 / 3.0)), 3)
+    return {
+        "agents": agents, "world.edges": "periodic", "world.arena": "square", "world.side": side, "world.height": side,
+        "start.kind": "arena", "start.separation": 0.0, "start.speed": 0.2, "metrics.kind": "order", "dt": 0.02,
+        "metrics.period": 1.0, "duration": 600.0, "update": "synchronous",
+    }  # fmt: skip
 
 
 def trial(source: Path) -> str:
@@ -217,19 +262,27 @@ def main() -> None:
     """Measure everything."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--rehearse", action="store_true")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--trial", type=Path)
     given = parser.parse_args()
+    sizes = QUICK if given.quick else Sizes()
+    if given.rehearse:
+        import rehearsal
+
+        sizes = rehearsal.begin(Sizes)
     device.required()
-    scenario = load(PRESET, {"duration": 60.0} if given.quick else {})
+    scenario = load(PRESET, {"duration": sizes.duration, "agents": sizes.agents})
     found: dict[str, Any] = {"devices": device.describe()}
+    say(found)
     parts: dict[str, Callable[[], Any]] = {
-        "second start": second_start,
-        "registers": lambda: {per: _registers(scenario, per) for per in (1, 2, 4)},
-        "evaluations": lambda: evaluations(scenario, given.quick),
-        "evolution": lambda: evolution(scenario, 15 if given.quick else 150),
-        "agreement": lambda: agreement(scenario, 100 if given.quick else 1000),
-        "big flock": lambda: big_flock(100_000 if given.quick else 1_000_000),
+        "second start": lambda: second_start(sizes),
+        "registers": lambda: registers(scenario),
+        "evaluations": lambda: evaluations(scenario, sizes),
+        "evolution": lambda: evolution(scenario, sizes),
+        "agreement": lambda: agreement(scenario, sizes.flights),
+        "apart": lambda: apart(load(PRESET, {"duration": sizes.apart, "agents": sizes.agents})),
+        "big flock": lambda: big_flock(sizes),
     }
     if given.trial:
         parts["trial"] = lambda: trial(given.trial)
@@ -242,45 +295,11 @@ def main() -> None:
         say({name: found[name], "took_s": round(time.perf_counter() - begin, 1)})
         if given.json:
             given.json.write_text(json.dumps(found, indent=1))
+    from verdicts import table
 
-
-def _registers(scenario: Any, per_agent: int) -> Any:
-    go = ours(scenario, 1, per_agent)
-    begin = time.perf_counter()
-    go()
-    return {"registers": go.registers(), "compiled or loaded in s": round(time.perf_counter() - begin, 2)}  # type: ignore[attr-defined]
-
-
-def big_flock(agents: int) -> dict[str, Any]:
-    """Steps per second of one flock whose neighbours are found by cells."""
-    from airflock.engine.cuda.crowd import Crowd
-
-    scenario = load("zapotecatl_2016/literal", crowd_settings(agents))
-    crowd = Crowd(scenario, plan_of(scenario), seed=1)
-    crowd.advance(5)
-    device.runtime().synchronize()
-    times = []
-    for _ in range(5):
-        begin = time.perf_counter()
-        crowd.advance(100)
-        device.runtime().synchronize()
-        times.append((time.perf_counter() - begin) / 100)
-    return {
-        "agents": agents,
-        "neighbours": round(crowd.neighbours(), 2),
-        "steps_per_second": round(1.0 / min(times), 1),
-    }
-
-
-def crowd_settings(agents: int) -> dict[str, Any]:
-    """A periodic box in which each boid has about 16 neighbours within its reach of 0.5 m."""
-    volume = agents * 4.0 / 3.0 * np.pi * 0.5**3 / 16.0
-    side = round(float(volume ** (1.0 / 3.0)), 3)
-    return {
-        "agents": agents, "world.edges": "periodic", "world.arena": "square", "world.side": side, "world.height": side,
-        "start.kind": "arena", "start.separation": 0.0, "start.speed": 0.2, "metrics.kind": "order", "dt": 0.02,
-        "metrics.period": 1.0, "duration": 600.0, "update": "synchronous",
-    }  # fmt: skip
+    text, wrong = table(found, sizes)
+    say(text)
+    sys.exit(1 if wrong else 0)
 
 
 if __name__ == "__main__":

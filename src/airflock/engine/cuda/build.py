@@ -11,6 +11,7 @@ from airflock.core.contract import Metric
 from airflock.engine.cuda.clusters import clusters
 from airflock.engine.cuda.lower import lowered, used
 from airflock.engine.cuda.primitives import head
+from airflock.engine.cuda.reciprocals import Forms, spelled, with_reciprocals
 from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder, branch
@@ -52,6 +53,8 @@ class CudaBuilder(Builder):
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
         self.receive: tuple[list[ast.stmt], list[ast.stmt]] | None = None
+        self.forms = Forms(self.source.blocks, JIT)
+        self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
         self.head = head(plan.model.name, plan.bits, shape)
         self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)}
 
@@ -141,6 +144,8 @@ class CudaBuilder(Builder):
         """Text of a stage before it is lowered."""
         if name in ("snapshot", "perceive"):
             return [line.replace("ring[", "past[") for line in lines]
+        if name.startswith("measure_"):  # whose pair loops end with the last agent
+            return [line.replace(" & (integer(j) < nn)", "") for line in lines]
         shared = self.shape.registers and self.shape.per_agent > 1
         return shared_noise(lines) if name == "move" and shared else lines
 
@@ -151,10 +156,17 @@ class CudaBuilder(Builder):
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
-        context.cells = self.cells()
+        context.cells, context.exact = self.cells(), name.startswith("measure_")
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self, name).visit(s) for s in body]
+        body, numbers = with_reciprocals(self.forms, body, {f"row_{letter}" for letter in self.plan.records})
+        self.source.blocks += self.forms.made
+        self.forms.made.clear()
+        if name == "move":  # which runs at every step: the kernel takes the reciprocals once
+            self.reciprocals |= dict.fromkeys(numbers)
+        else:
+            body = [*parse(reciprocal_lines(numbers)), *body]
         self._add(name, body, context.rows)
 
     def _add(self, name: str, body: list[ast.stmt], rows: set[str]) -> None:
@@ -202,6 +214,11 @@ def shared_noise(lines: list[str]) -> list[str]:
         else:
             found += [line.replace("(i, step // 2,", "(i, step // 2 + sub,")]
     return found
+
+
+def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
+    """Lines that take the reciprocals of numbers (record, field)."""
+    return [f"{spelled(f'{record}.{field}')} = ONE / {record}.{field}" for record, field in numbers]
 
 
 class _Renamed(ast.NodeTransformer):

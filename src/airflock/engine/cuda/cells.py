@@ -10,7 +10,7 @@ from typing import Any
 
 from airflock.core import random
 from airflock.core.maths import norm
-from airflock.engine.cuda.build import CudaBuilder
+from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import SORT
 from airflock.engine.passes import decide, move, scene
@@ -86,6 +86,7 @@ def _common(build: CellBuilder) -> list[str]:
         kind = build.source.record(letter.upper() * 2, fields)
         lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
         offset += len(fields)
+    lines += reciprocal_lines(build.reciprocals)
     local = f"np.float{build.plan.bits}"
     lines += ["n = agents; sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
     lines += [f"gust = cuda.local.array(3, {local})", f"aim = cuda.local.array(4, {local})"]

@@ -37,7 +37,7 @@ def flight(plan: Plan, shape: Shape) -> str:
         measure.measure(build, clock)
     body = _time(build)  # first: it may still name rules
     lines = [*memory(build), *begin(build), *body, *_end(build)]
-    options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.threads}, cache=True")
+    options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.bounds}, cache=True")
     text = [f"@cuda.jit({options})", f"def fly({', '.join(ARGUMENTS)}):", *(f"    {line}" for line in lines)]
     parts = [build.head, *build.source.blocks, *build.functions, "\n".join(text)]
     parts += [f"ROWS = {len(build.rows)}", f"COLUMNS = {len(columns(plan.metrics))}"]
@@ -90,7 +90,9 @@ def _time(build: CudaBuilder) -> list[str]:
         step += branch(f"value{found} > HALF", ["break"])
     step += [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
     step += branch("step < steps", _advance(build))
-    return [*lines, *loop("step in range(steps + 1)", step)]
+    # counted by hand in 32 bits: a range counts in 64, twice
+    turn = [f"    {line}" for text in [*step, "step = integer(step + 1)"] for line in text.splitlines()]
+    return [*lines, "step = integer(0)", "while step <= steps:", *turn]
 
 
 def _world(build: CudaBuilder) -> list[str]:

@@ -78,10 +78,10 @@ def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables])
         return len(jobs)
     free = free_memory()
     largest = _largest(jobs)
-    fault = lacking(plan, driver, largest, free)
+    fault = lacking(plan, driver.ROWS, largest, free)
     if fault is not None:
         raise DeviceError(f"device = cuda: {fault}")
-    return max(1, min(AT_ONCE, int(SHARE * free) // needed(plan, driver, shape, largest), len(jobs)))
+    return max(1, min(AT_ONCE, int(SHARE * free) // needed(plan, driver.ROWS, shape, largest), len(jobs)))
 
 
 def _largest(jobs: Sequence[Tables]) -> Tables:
@@ -91,8 +91,9 @@ def _largest(jobs: Sequence[Tables]) -> Tables:
 
 def too_large(plan: Plan, tables: Tables) -> str | None:
     """Why one such flock does not fit into the GPU's free memory; None if it does."""
-    layout = layout_of(plan, int(tables.whole[WHOLE.index("agents")]), 1, multiprocessors())
-    return lacking(plan, flight_driver(plan, layout), tables, free_memory())
+    layout = layout_of(plan, int(tables.whole[WHOLE.index("agents")]), 1)
+    rows = 0 if layout.registers else flight_driver(plan, layout).ROWS  # making a driver's text takes a while
+    return lacking(plan, rows, tables, free_memory())
 
 
 def _fly(
@@ -109,7 +110,7 @@ def arrays(
 ) -> dict[str, Any]:
     """All arguments of a kernel, in the GPU's memory, by name."""
     cuda, real = runtime(), jobs[0].row.dtype
-    size = sizes(plan, driver, shape, _largest(jobs))
+    size = sizes(plan, driver.ROWS, shape, _largest(jobs))
     written = ("pasts", "works", "states", "all_sums", "all_frames", "scratches")
     own: dict[str, Any] = {name: cuda.device_array((len(jobs), *size[name]), real) for name in written}
     own["all_words"] = cuda.device_array((len(jobs), *size["all_words"]), np.uint32)

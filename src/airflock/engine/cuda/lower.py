@@ -12,7 +12,7 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 import ast
 from collections.abc import Iterable
 
-from airflock.engine.cuda.rows import Bound, Context, Everyone, Others, Registers, parse
+from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, Registers, parse
 from airflock.engine.cuda.shape import UNROLL
 
 NEUTRAL = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
@@ -21,7 +21,7 @@ TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most
 
 def lowered(statements: list[ast.stmt], context: Context) -> list[ast.stmt]:
     """Statements of a stage as one thread runs them."""
-    kept = [Bound(context).visit(s) for s in statements]
+    kept = [Bound(context).visit(Halves().visit(s)) for s in statements]
     return _Totals(context).run([s for s in kept if s is not None])
 
 
@@ -141,7 +141,12 @@ class _Pairs:
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
         once = [f"    {line}" for line in [*text.splitlines(), step]]
-        return [*parse(["j = np.uint32(sub)", "while j < np.uint32(n):", *(once * turns)]), *after]
+        loops = ["j = np.uint32(sub)", "while j < np.uint32(n):", *(once * turns)]
+        if context.exact and turns > 1:
+            ahead = (turns - 1) * shape.per_agent
+            loops[1] = f"while np.uint32(j + np.uint32({ahead})) < np.uint32(n):"
+            loops += ["while j < np.uint32(n):", *once]
+        return [*parse(loops), *after]
 
 
 def carried_totals(body: list[ast.stmt]) -> dict[str, str]:

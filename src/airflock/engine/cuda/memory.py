@@ -1,12 +1,12 @@
 """Memory: how much of a GPU's memory the flocks of one launch need, and how many agents fit."""
 
 from dataclasses import replace
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from airflock.engine.cuda.shape import Shape, shape_of
+from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners, scratch_sizes
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.tables import Tables
@@ -24,8 +24,8 @@ def integers(tables: Tables) -> dict[str, int]:
     return dict(zip(WHOLE, tables.whole.tolist(), strict=True))
 
 
-def sizes(plan: Plan, driver: ModuleType, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays that a launch works on, for one flock, by argument name."""
+def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays that a launch works on, for one flock, by argument name; rows: of the table of states."""
     whole, dims, lanes = integers(tables), plan.dimensions, shape.lanes
     n, table = whole["agents"], not shape.registers
     model = len(getattr(plan.model.Memory, "_fields", ()))
@@ -35,12 +35,12 @@ def sizes(plan: Plan, driver: ModuleType, shape: Shape, tables: Tables) -> dict[
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
         "pasts": (whole["ring"], 2 * dims, lanes) if heard else (1, 1, 1),
         "stores": (lanes, 2 * dims + 1, lanes) if plan.links else (1, 2 * dims + 1, 1),
-        "works": (driver.ROWS, lanes) if table else (1, 1),
+        "works": (rows, lanes) if table else (1, 1),
         "all_words": (4, lanes) if table else (1, 1),
         "all_mem": (max(model, 1), lanes) if table else (1, 1),
         "all_memory": (max(kept, 1), lanes) if table else (1, 1),
         "states": (2 * dims, n),
-        "all_sums": (driver.COLUMNS + 2, 2),
+        "all_sums": (len(columns(plan.metrics)) + 2, 2),
         "all_reached": (max(len(tables.goals), 1),),
         "all_frames": (whole["steps"] // whole["sample_every"] + 1, 3 * dims, n) if plan.record else (1, 1, 1),
         "scratches": scratch_of(plan, tables)[0],
@@ -51,28 +51,28 @@ def scratch_of(plan: Plan, tables: Tables) -> tuple[tuple[int, int], list[int]]:
     """One table that holds all scratch arrays of a flock below each other: its shape, and the first row of each."""
     found = scratch_sizes(plan, tables.row, integers(tables)["agents"])
     first, width = [0], 1
-    for rows, columns in (size for sizes in found for size in sizes):
-        first.append(first[-1] + rows)
-        width = max(width, columns)
+    for height, breadth in (size for sizes in found for size in sizes):
+        first.append(first[-1] + height)
+        width = max(width, breadth)
     return (max(first[-1], 1), width), first
 
 
-def needed(plan: Plan, driver: ModuleType, shape: Shape, tables: Tables) -> int:
+def needed(plan: Plan, rows: int, shape: Shape, tables: Tables) -> int:
     """Bytes in the GPU's memory that one such flock needs, its share of the scene included."""
-    numbers = sum(int(np.prod(size)) for size in sizes(plan, driver, shape, tables).values())
+    numbers = sum(int(np.prod(size)) for size in sizes(plan, rows, shape, tables).values())
     given: list[Any] = [tables.row, tables.whole, tables.faces, tables.edges, tables.spans, tables.goals, tables.later]
     given += [tables.shapes] if len(tables.later) else []
     return numbers * plan.bits // 8 + sum(int(array.nbytes) for array in given) + 256
 
 
-def lacking(plan: Plan, driver: ModuleType, tables: Tables, free: int) -> str | None:
+def lacking(plan: Plan, rows: int, tables: Tables, free: int) -> str | None:
     """Why one such flock does not fit into this many free bytes: what it needs and how many agents fit; or None."""
     agents, room = integers(tables)["agents"], int(SHARE * free)
 
     def bytes_of(n: int) -> int:
         whole = tables.whole.copy()
         whole[WHOLE.index("agents")] = n
-        return needed(plan, driver, layout_of(plan, n, 1), replace(tables, whole=whole))
+        return needed(plan, rows, layout_of(plan, n, 1), replace(tables, whole=whole))
 
     if bytes_of(agents) <= room:
         return None

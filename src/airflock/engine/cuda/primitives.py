@@ -12,7 +12,7 @@ import math
 from collections import namedtuple
 
 import numpy as np
-from numba import cuda
+from numba import cuda{library}
 
 real = np.float{bits}
 integer = np.int32
@@ -50,6 +50,11 @@ def most(a, b):
 @njit()
 def choose(test, a, b):
     return a if test else b
+
+
+@njit()
+def inverse_root(a):
+    return {root}
 
 
 @njit(fastmath=False)
@@ -118,6 +123,8 @@ def head(label: str, bits: int, shape: Shape) -> str:
     text = HEAD.format(
         label=label, bits=bits, lanes=shape.lanes, per_agent=shape.per_agent, threads=shape.threads,
         warps=shape.warps, words=shape.words,
+        root="libdevice.rsqrtf(a)" if bits == 32 and not shape.simulated else "ONE / math.sqrt(a)",
+        library="" if shape.simulated else "\nfrom numba.cuda import libdevice",
         njit="lambda function: function" if shape.simulated else "cuda.jit(device=True, fastmath=fastmath)",
     )  # fmt: skip
     parts = [text, INTEGERS, NORMAL, SIMULATED_LANE if shape.simulated else LANE]

@@ -21,6 +21,7 @@ class Context:
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
     cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
+    exact    : an unrolled pair loop meets nobody beyond the last agent (who would be far away)
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
     """
 
@@ -32,6 +33,7 @@ class Context:
     turn: bool = False
     carried: bool = False
     alone: bool = False
+    exact: bool = False
     cells: tuple[str, ...] = ()
 
 
@@ -50,6 +52,21 @@ class Bound(ast.NodeTransformer):
         """An assignment."""
         source = node.value.value if isinstance(node.value, ast.Subscript) else None
         return None if isinstance(source, ast.Name) and source.id in self.known else node
+
+
+class Halves(ast.NodeTransformer):
+    """Remainders and quotients of the step by two, which is never negative: a bit and a shift."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """A sum, product and so on."""
+        self.generic_visit(node)
+        counted = isinstance(node.left, ast.Name) and node.left.id == "step"
+        if counted and isinstance(node.right, ast.Constant) and node.right.value == 2:
+            if isinstance(node.op, ast.Mod):
+                return ast.BinOp(node.left, ast.BitAnd(), ast.Constant(1))
+            if isinstance(node.op, ast.FloorDiv):
+                return ast.BinOp(node.left, ast.RShift(), ast.Constant(1))
+        return node
 
 
 class Others(ast.NodeTransformer):

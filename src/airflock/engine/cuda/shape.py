@@ -5,6 +5,8 @@ from dataclasses import dataclass
 WARP = 32
 MOST_THREADS = 1024  # of one block, on every GPU so far
 MOST_REGISTERED = 1024  # agents whose state stays in registers; more are kept in a table in the GPU's memory
+REGISTERS = 65_536  # of a multiprocessor, on every GPU so far
+SATURATED = 96  # of a thread where flocks fill a GPU: 52 bytes are spilled, none in a pair loop (counted for sm_90)
 UNROLL = 2  # pairs per turn of a pair loop: 4 cost registers and were slower (trial, H200)
 
 
@@ -29,6 +31,17 @@ class Shape:
     def warps(self) -> int:
         """Groups of threads that reduce by shuffles; in the simulator every thread is its own."""
         return self.threads if self.simulated else self.threads // WARP
+
+    @property
+    def bounds(self) -> tuple[int, int]:
+        """Threads of a block, and blocks that a multiprocessor shall hold at least: so many registers a thread gets.
+
+        Where one thread serves an agent flocks fill the GPU, and warps that wait for each other's results hide it: left
+        alone a thread takes 159 registers, and 12 warps fit where 20 do with 96. Otherwise each flock has a
+        multiprocessor to itself, and all the registers it can use.
+        """
+        crowded = self.registers and self.per_agent == 1
+        return self.threads, max(1, REGISTERS // (SATURATED * self.threads)) if crowded else 1
 
     @property
     def words(self) -> int:

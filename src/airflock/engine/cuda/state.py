@@ -2,7 +2,7 @@
 
 import re
 
-from airflock.engine.cuda.build import REDUCED, CudaBuilder
+from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.start import tables
 from airflock.engine.passes import flock, scene
 from airflock.engine.passes.build import columns, loop
@@ -64,7 +64,7 @@ def _records(build: CudaBuilder) -> list[str]:
         kind = build.source.record(letter.upper() * 2, fields)
         lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
         offset += len(fields)
-    return lines
+    return [*lines, *reciprocal_lines(build.reciprocals)]
 
 
 def _registers(build: CudaBuilder) -> list[str]:

@@ -1,0 +1,70 @@
+"""The hand-written CUDA C evaluation from Python: built with NVRTC, fed with a scenario's numbers."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from c_reference import PARAMETERS, SCORES, parameters_of
+
+from airflock.engine.cuda import device
+from airflock.engine.tables import clock
+
+HERE = Path(__file__).parent
+
+
+def built(per_agent: int, arch: str) -> Any:
+    """Machine code of vasarhelyi.cu for one number of threads per agent; needs no GPU."""
+    from cuda.core import Program, ProgramOptions
+
+    options = ProgramOptions(std="c++17", arch=arch, use_fast_math=True, define_macro=[("PER_AGENT", str(per_agent))])
+    return Program((HERE / "vasarhelyi.cu").read_text(), "c++", options).compile("cubin")
+
+
+class CudaC:
+    """vasarhelyi.cu for one number of threads per agent."""
+
+    def __init__(self, scenario: Any, per_agent: int):
+        from cuda.core import Device
+
+        self.device = Device()
+        self.device.set_current()
+        self.kernel = built(per_agent, f"sm_{''.join(map(str, self.device.compute_capability))}").get_kernel("fly")
+        self.per_agent, self.scenario = per_agent, scenario
+        self.times = times_of(scenario)
+
+    def ready(self, flocks: int) -> Callable[[], Any]:
+        """A function that flies this many flocks, seeds from 1 on, and returns the scores (flock, order parameter)."""
+        from cuda.core import LaunchConfig
+        from cuda.core import launch as run
+
+        cuda, t = device.runtime(), self.times
+        rows = cuda.to_device(np.tile(numbers_of(self.scenario), (flocks, 1)))
+        scores = cuda.to_device(np.zeros((flocks, len(SCORES)), np.float32))
+        threads = -(-t["agents"] // 32) * 32 * self.per_agent
+        whole = [np.int32(t[name]) for name in ("agents", "steps", "decide_every", "sample_every", "delay")]
+        given = (_address(rows), *whole, np.uint32(1), _address(scores))
+        stream = self.device.default_stream
+
+        def go() -> Any:
+            run(stream, LaunchConfig(grid=flocks, block=threads), self.kernel, *given)
+            stream.sync()
+            return scores
+
+        return go
+
+
+def _address(array: Any) -> int:
+    return int(array.__cuda_array_interface__["data"][0])
+
+
+def times_of(scenario: Any) -> dict[str, int]:
+    """Numbers of events in steps, and of agents."""
+    found = clock(scenario) | {"agents": scenario.agents}
+    return found | {"delay": found["delay"] // found["decide_every"]}
+
+
+def numbers_of(scenario: Any) -> Any:
+    """Parameters of vasarhelyi.h in their order."""
+    known = parameters_of(scenario)
+    return np.array([getattr(known, name) for name in PARAMETERS], np.float32)
