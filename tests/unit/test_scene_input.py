@@ -1,5 +1,6 @@
 """Scenes, goals, starts and displays that cannot be meant end with a clear line, or a note of what was done."""
 
+import json
 import re
 
 import numpy as np
@@ -155,6 +156,32 @@ def test_damaged_and_strange_mesh_files_are_refused(tmp_path, hall, monkeypatch)
     monkeypatch.setattr(meshes, "MOST_BYTES", 100)
     with pytest.raises(ScenarioError, match="simplify the mesh"):
         fly_in(hall, **{"start.speed": 1.0})  # a scene of its own: the one above is kept
+
+
+def gltf(points=3, places=1):
+    """A glTF document of one triangle whose arrays announce so many corners, at so many places."""
+    corners = {"componentType": 5126, "count": points, "type": "VEC3", "min": [0, 0, 0], "max": [50, 50, 0]}
+    numbers = {"componentType": 5125, "count": points, "type": "SCALAR"}
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(places))}],
+        "nodes": [{"mesh": 0}] * places, "accessors": [corners, numbers],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    }  # fmt: skip
+
+
+def test_what_a_gltf_file_announces_is_checked_before_room_is_made_for_it(tmp_path):
+    """Arrays without data, which would be zeros of any size, and one mesh at ever so many places."""
+    path = tmp_path / "mesh.gltf"
+    cases = ((gltf(1_500_000_000), "more than 2000000"), (gltf(30_000, 1000), "10000000 triangles"), ([], "damaged"))
+    for document, words in (*cases, ({"accessors": [{}]}, "damaged"), ({"nodes": [{"mesh": 9}]}, "damaged")):
+        path.write_text(json.dumps(document))
+        with pytest.raises(ScenarioError, match=words):
+            fly_in(path, **{"start.speed": 1.0})
+    trimesh.creation.box(extents=[30.0] * 3).export(tmp_path / "box.glb")
+    sound = (tmp_path / "box.glb").read_bytes()
+    (tmp_path / "box.glb").write_bytes(sound[:8] + (len(sound) + 64).to_bytes(4, "little") + sound[12:])
+    with pytest.raises(ScenarioError, match=f"cut short: {len(sound)} of {len(sound) + 64} bytes"):
+        fly_in(tmp_path / "box.glb")
 
 
 def test_a_mesh_beside_its_scenario_file_is_found(hall):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import SceneError
+from airflock.scenes.headers import check_header
 from airflock.scenes.tree import segments, triangles
 from airflock.world import scenery
 from airflock.world.shapes import CLOSED
@@ -99,8 +100,7 @@ def read(path: Path) -> Any:
         raise SceneError(
             f"scene.file = {path}: {size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB; simplify the mesh"
         )
-    if kind == "stl":
-        _whole_stl(path, size)
+    check_header(path, kind, size, MOST_TRIANGLES)
     try:
         mesh: Any = trimesh.load(path, force="mesh", process=True, skip_materials=True)
         faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, float)
@@ -117,20 +117,6 @@ def read(path: Path) -> Any:
             f"scene.file = {path}: some corners are no numbers or missing; the file is damaged or cut short"
         )
     return mesh
-
-
-def _whole_stl(path: Path, size: int) -> None:
-    """Refuse an STL file that ends before what it announces; trimesh reads what is there."""
-    with path.open("rb") as file:
-        head = file.read(84)
-        if head[:5].lower() == b"solid" and b"\n" in head:
-            file.seek(max(0, size - 512))
-            if b"endsolid" not in file.read():
-                raise SceneError(f"scene.file = {path}: the file is cut short: it does not end with endsolid")
-            return
-    announced = 84 + 50 * int.from_bytes(head[80:84], "little")
-    if size < announced:
-        raise SceneError(f"scene.file = {path}: the file is cut short: {size} of {announced} bytes")
 
 
 def check(p: scenery.Parameters, corners: NDArray[np.float64]) -> list[str]:
