@@ -52,6 +52,17 @@ STATEMENTS = (
     ("s_goal", 4.0, 0.25, "flocked", -1, "a very high goal scale flocks less"),
 )
 
+CONTACT = "boids that stay in contact meet once, so that fewer meetings are no fewer collisions; phi_coll says how long"
+WHY = {  # what stands against a statement that does not show
+    ("r_align", "polarisation", "open air"): "in open air almost half of all pairs are in contact in the final set "
+    "(tuning.s_sep.phi_coll.open_air): the flock is hardly larger than the smaller radius, and all align with all",
+    ("r_cohes", "n_clusters", "open air"): "swarms are told apart at 40 m, and nothing but buildings parts this flock",
+    ("s_sep", "n_coll", "open air"): CONTACT,
+    ("s_goal", "n_coll", "open air"): CONTACT,
+    ("s_goal", "flocked", "city"): "a goal that outweighs separation draws all into one heap, which buildings do not "
+    "part (tuning.s_goal.phi_coll.city); flocked is a share within 20 m of the centre and asks for no distance",
+}  # fmt: skip
+
 
 def fly(flights: Flights) -> pd.DataFrame:
     """Order parameters by (place, parameter, value, seed)."""
@@ -83,6 +94,8 @@ def _claim(
     if column == "n_coll":  # it counts how often two meet, not how long they stay
         stay = [_values(table, place, name, v, "phi_coll").mean() for v in (value, other)]
         means += f"; share of pairs in contact {stay[0]:.2g} against {stay[1]:.2g}"
+    if not more and (name, column, place) in WHY:
+        means += f"; {WHY[name, column, place]}"
     return Claim(
         id=f"tuning.{name}.{column}.{place.replace(' ', '_')}",
         statement=f"{words} ({place}): difference of {column}",
