@@ -205,6 +205,9 @@ def test_pictures_that_show_nothing_are_refused(tmp_path):
 
     iio.imwrite(tmp_path / "white.png", np.full((20, 20), 255, np.uint8))
     (tmp_path / "torn.png").write_bytes((tmp_path / "white.png").read_bytes()[:30])
-    for shape, words in (("white.png", "nothing in it"), ("torn.png", "damaged"), ("none.png", "no such file")):
-        with pytest.raises(AirflockError, match=re.escape(words)):
+    (tmp_path / "torn.stl").write_bytes(bytes(80) + (9).to_bytes(4, "little"))
+    cases = (("white.png", "nothing in it"), ("torn.png", "damaged"), ("none.png", "no such file"))
+    for shape, words in (*cases, ("torn.stl", f"{tmp_path / 'torn.stl'}: the file is cut short")):
+        with pytest.raises(AirflockError, match=re.escape(words)) as caught:
             points_of(str(tmp_path / shape), 10)
+        assert str(caught.value).startswith(str(tmp_path / shape))  # and names no key that a display lacks

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, SceneError
 
 Points = NDArray[np.float64]
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".gif")
@@ -110,7 +110,10 @@ def _spread_over_mesh(path: Path, count: int, rng: np.random.Generator) -> Point
     """Points on the surface, each as far as can be from those before."""
     from airflock.scenes.meshes import read
 
-    mesh: Any = read(path)
+    try:
+        mesh: Any = read(path)
+    except SceneError as fault:  # there is no scene.file here
+        raise AirflockError(str(fault).replace("scene.file = ", "")) from fault
     corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     if area.sum() <= 0.0:
