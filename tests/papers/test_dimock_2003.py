@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from airflock.metrics import fitness_dimock
-from airflock.papers.dimock_2003 import robust, static
+from airflock.papers.dimock_2003 import ga, robust, robust_claims, static
+from airflock.papers.dimock_2003.flights import Flight
 from airflock.papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 from airflock.scenarios.files import load
 
@@ -66,3 +67,59 @@ def test_a_rate_lies_in_its_interval():
     rate, low, high = robust.rates([Flight(k < 3) for k in range(60)])
     assert rate == pytest.approx(0.05)
     assert (low, high) == pytest.approx((0.0171, 0.1370), abs=1e-3)  # Wilson
+
+
+class Birds:
+    """Flights that cost nothing: power is the sum of the gains, and bold birds collide."""
+
+    progress = None
+
+    def __init__(self):
+        self.tasks = []
+
+    def fly(self, title, tasks, duration=20.0, noise=0.0, **readings):
+        self.tasks += tasks
+        return [
+            Flight({"power": sum(t.gains), "n_coll": float(t.gains.k_a > 80.0)}, np.zeros((1, 3, 5))) for t in tasks
+        ]
+
+
+def test_a_generation_flies_no_controller_twice_and_loses_those_that_collide_or_cannot_cohere():
+    birds = Birds()
+    run = ga.Run(ga.READINGS["mean"], 1)
+    losses = ga.losses_of(birds, run)
+    points = np.array([[0.1, 0.1, 0.1, 0.5, 0.1]] * 2 + [[0.1, 0.9, 0.1, 0.5, 0.1], [0.1, 0.1, 0.1, 0.0, 0.9]])
+    assert losses(points) == pytest.approx([sum(gains(points[0])), sum(gains(points[0])), ga.LOST, ga.LOST])
+    losses(points)
+    assert run.flown == len(birds.tasks) == 2
+    assert run.best == [run.best[0]] * 2 and run.champions[-1] == gains(points[0])
+    assert run.timid == [0.0, 0.0]
+
+
+def test_cmaes_takes_no_more_flights_than_it_is_given():
+    birds = Birds()
+    run = ga.with_cmaes(birds, ga.READINGS["mean"], 3, 200)
+    assert run.flown <= 200 and run.best[-1] < run.best[0]
+    assert len(birds.tasks) == run.flown + 4  # of the winner's: early, midway, final, and with the full gradient
+
+
+def test_nobody_on_the_front_is_beaten_and_everybody_else_is():
+    rng = np.random.default_rng(5)
+    tried = [robust.Candidate(None, *pair) for pair in rng.random((50, 2))]
+    kept = robust.nondominated(tried)
+    for c in tried:
+        beaten = any(k.power <= c.power and k.rate <= c.rate and k is not c for k in kept)
+        assert beaten != (c in kept)
+
+
+def test_held_out_flights_are_of_all_kinds_and_no_search_has_seen_their_seeds():
+    tasks = robust.held_out(BEST, 60)
+    assert [task.start for task in tasks[:6]] == list(robust.STARTS.values())
+    assert len({task.seed for task in tasks}) == 60 and min(task.seed for task in tasks) > 30 * 12 * 6
+
+
+def test_few_collisions_of_many_are_fewer_by_the_exact_test():
+    flights = [Flight({"n_coll": float(k < 8)}, None) for k in range(100)]
+    safe = [Flight({"n_coll": 0.0}, None) for _ in range(100)]
+    assert robust_claims.less(safe, flights) == pytest.approx(math.comb(192, 100) / math.comb(200, 100), rel=0.1)
+    assert robust_claims.less(flights, flights) > 0.5

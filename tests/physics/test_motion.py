@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from airflock.body import motion, sensors, wind
+from airflock.body import jostled, motion, sensors, wind
 from airflock.core import random
+from airflock.engine.plain_start import begin
+from airflock.engine.plain_world import Place
+from airflock.scenarios.files import load
 from flocks import flown, from_start, ideal, scenario
 
 
@@ -118,3 +121,22 @@ def test_halving_the_step_halves_the_error(tau):
     first, second = np.abs(ends[0] - ends[1]).max(), np.abs(ends[1] - ends[2]).max()
     assert 1e-4 < first < 0.2
     assert first / second == pytest.approx(2.0, rel=0.1)
+
+
+def test_turbulence_makes_a_jostled_body_walk_at_random_about_its_command(seed):
+    b, dt, steps = jostled.Parameters(noise=0.003), 0.1, 20_000
+    draws = np.random.default_rng(seed).standard_normal((steps, 3))
+    moved = np.array([jostled.move(1.0, -2.0, 0.5, *map(float, g), dt, b) for g in draws]) * dt
+    drift = moved - np.array([1.0, -2.0, 0.5]) * dt
+    assert np.abs(drift.mean(axis=0)).max() < 5.0 * math.sqrt(2.0 * b.noise * dt / steps)
+    spread = drift.reshape(-1, 50, 3).sum(axis=1)  # over 5 s
+    np.testing.assert_allclose(spread.var(axis=0), 2.0 * b.noise * 50 * dt, rtol=0.35)
+    still = jostled.Parameters(noise=0.0, speed_max=1.0)
+    command = jostled.move(3.0, 4.0, 0.0, 1.0, 1.0, 1.0, dt, still)
+    assert command == pytest.approx((0.6, 0.8, 0.0))
+
+
+def test_a_formation_starts_straight_ahead_at_the_speed_of_the_start():
+    found = load("vasarhelyi_2018/fixed_wing", {"duration": 0.0, "start.speed": 7.0})
+    states = begin(found, 0, Place(found))
+    assert [(s.vx, s.vy, s.vz) for s in states] == [(7.0, 0.0, 0.0)] * 7
