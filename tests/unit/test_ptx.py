@@ -27,7 +27,8 @@ def driver_of(name, bits=32, **layout):
     from airflock.engine.cuda.launch import flight_driver, layout_of
 
     found = load(name)
-    plan = replace(plan_of(found, precision=bits), grid=False)
+    plan = plan_of(found, precision=bits)
+    plan = replace(plan, grid=False, meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
     return flight_driver(plan, replace(layout_of(plan, found.agents, 1000), **layout)), plan
 
 

@@ -47,6 +47,16 @@ def test_points_are_asked_for_where_they_are_missing():
     refused("1 goals.points are not one for each of 10 agents", goals__kind="own", goals__points=[[0.0, 0.0, 9.0]])
 
 
+def test_a_mesh_without_a_file_says_what_is_missing():
+    refused("scene.kind = 'mesh' needs scene.file", scene__kind="mesh")
+
+
+def test_boxes_that_are_none_are_refused():
+    refused("scene.boxes is not a list of rows of 7 numbers", "when it appears", scene__boxes=[[5.0, 5.0, 0.0, 9.0]])
+    boxes = [[5.0, 5.0, 0.0, 9.0, 9.0, 9.0, 0.0], [5.0, 5.0, 0.0, -5.0, 9.0, 10.0, 0.0]]
+    refused("scene.boxes[1]: its first corner does not lie below", scene__kind="boxes", scene__boxes=boxes)
+
+
 def test_only_cities_and_forests_are_drawn_anew():
     refused("scene.draw = 'flight' with scene.kind = 'none'", scene__kind="none", scene__draw="flight")
 

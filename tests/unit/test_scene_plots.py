@@ -64,7 +64,14 @@ def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
     monkeypatch.setattr(flocked, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
     upper, lower = flocked.flocked(recording()).axes
     assert len(upper.lines) == 3  # share, polarisation, and the goal that was reached
-    assert lower.lines[1].get_ydata()[-1] == 40.0
+    assert lower.lines[1].get_ydata()[-1] == 40.0 and lower.get_yscale() == "symlog"
+    few = course.assign(n_coll=[1.0] * 4 + [0.0] * 36)
+    monkeypatch.setattr(flocked, "measure", lambda *_: ({}, few))
+    lower = flocked.flocked(recording()).axes[1]
+    lower.figure.canvas.draw()
+    low, high = lower.get_ylim()
+    assert sum(low <= tick <= high and bool(text.get_text()) for tick, text in
+               zip(lower.get_yticks(), lower.get_yticklabels(), strict=True)) >= 3  # fmt: skip
     monkeypatch.setattr(flocked, "measure", lambda *_: ({}, course.drop(columns="flocked")))
     with pytest.raises(RecordingError, match="metrics.kind = 'kidger'"):
         flocked.flocked(recording())

@@ -11,6 +11,8 @@ from airflock.plots import style
 from airflock.plots.scene import details_of, name_of, window
 from airflock.recordings.scores import measure
 
+FEW = 10.0  # sub-swarms or collisions up to which their axis is linear
+
 
 def flocked(
     recording: xr.Dataset,
@@ -41,7 +43,9 @@ def flocked(
     style.legend(upper, handles, columns=2, above=True)
     lower.plot(course.index, course["n_clusters"], color=style.PURPLE, linewidth=0.9, label="sub-swarms")
     lower.plot(course.index, course["n_coll"].cumsum(), color=style.RED, linewidth=0.9, label="collisions so far")
-    lower.set_yscale("symlog", linthresh=10.0)
+    if max(course["n_clusters"].max(), course["n_coll"].sum()) > 2.0 * FEW:  # else one tick would be all
+        lower.set_yscale("symlog", linthresh=FEW)
+    lower.yaxis.set_major_formatter("{x:g}")
     lower.set_ylim(bottom=0.0)
     style.dress(lower, "time (s)", "number")
     style.legend(lower, lower.get_lines(), columns=2)

@@ -27,6 +27,11 @@ def place_faults(scenario: Scenario) -> list[str]:
         return ["goals.kind = 'points' needs goals.points, [[east, north, up], ...] in m"]
     if scenario.scene.draw == "flight" and scenario.scene.kind not in ("city", "forest"):
         return [f"scene.draw = 'flight' with scene.kind = {scenario.scene.kind!r}: only a city or a forest is drawn"]
+    if scenario.scene.kind == "mesh" and not scenario.scene.file:
+        return ["scene.kind = 'mesh' needs scene.file, a glTF, OBJ or STL file"]
+    turned = [k for k, row in enumerate(scenario.scene.boxes) if any(row[c] >= row[c + 3] for c in range(3))]
+    if turned:
+        return [f"scene.boxes[{k}]: its first corner does not lie below its second in x, y and z" for k in turned]
     try:
         place = scenario.stands()
         points = scenario.waypoints()

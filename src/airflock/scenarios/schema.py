@@ -95,6 +95,10 @@ def _line(section: str, item: Any, record: type) -> str:
     if isinstance(declared, Text):
         return f"{name} = {value!r} is no text"
     assert isinstance(declared, Points)
+    if declared.axes > 3:
+        return (
+            f"{name} is not a list of rows of {declared.axes} numbers in {declared.unit}; it holds {declared.meaning}"
+        )
     what = (
         f"a list of points [east, north{', up' if declared.axes == 3 else ''}]"
         if declared.depth == 2
