@@ -1,5 +1,7 @@
 """The hand-written CUDA C evaluation from Python: built with NVRTC, fed with a scenario's numbers."""
 
+import subprocess
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -68,3 +70,13 @@ def numbers_of(scenario: Any) -> Any:
     """Parameters of vasarhelyi.h in their order."""
     known = parameters_of(scenario)
     return np.array([getattr(known, name) for name in PARAMETERS], np.float32)
+
+
+def trial(source: Path) -> str:
+    """Output of another CUDA C program that prints its own times."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "trial"
+        capability = "".join(map(str, device.runtime().get_current_device().compute_capability))
+        command = ["nvcc", "-O3", f"-arch=sm_{capability}", "-use_fast_math", str(source), "-o", str(program)]
+        subprocess.run(command, check=True)
+        return subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout

@@ -1,6 +1,6 @@
 """Airflock on a GPU against hand-written CUDA C and JAX: builds, checks and times everything, and judges it.
 
-    python benchmarks/gpu.py [--quick] [--json FILE] [--trial flock.cu] [--rehearse]
+    python benchmarks/gpu.py [--quick] [--json FILE] [--only PART] [--trial flock.cu] [--rehearse]
 
 Needs an NVIDIA GPU and `pip install 'airflock[cuda]'`; JAX with its CUDA plugin for the ratio of the big flock. About
 four minutes, --quick one. CUDA C is built with NVRTC, which comes with numba-cuda; --trial also builds and runs a
@@ -15,7 +15,6 @@ import json
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -243,16 +242,6 @@ def crowd_settings(agents: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def trial(source: Path) -> str:
-    """Output of another CUDA C program that prints its own times."""
-    with tempfile.TemporaryDirectory() as folder:
-        program = Path(folder) / "trial"
-        capability = "".join(map(str, device.runtime().get_current_device().compute_capability))
-        command = ["nvcc", "-O3", f"-arch=sm_{capability}", "-use_fast_math", str(source), "-o", str(program)]
-        subprocess.run(command, check=True)
-        return subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
-
-
 def say(value: Any) -> None:
     """Print at once."""
     print(value if isinstance(value, str) else json.dumps(value), flush=True)
@@ -265,6 +254,7 @@ def main() -> None:
     parser.add_argument("--rehearse", action="store_true")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--trial", type=Path)
+    parser.add_argument("--only", action="append", metavar="PART", help="one of the parts, by its printed name")
     given = parser.parse_args()
     sizes = QUICK if given.quick else Sizes()
     if given.rehearse:
@@ -285,8 +275,10 @@ def main() -> None:
         "big flock": lambda: big_flock(sizes),
     }
     if given.trial:
-        parts["trial"] = lambda: trial(given.trial)
+        parts["trial"] = lambda: cuda_c.trial(given.trial)
     for name, part in parts.items():
+        if given.only and name not in given.only:
+            continue
         begin = time.perf_counter()
         try:
             found[name] = part()

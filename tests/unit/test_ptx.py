@@ -71,3 +71,5 @@ def test_ptx_of_one_big_flock():
         for (major, minor), text in ptx(driver, types, CAPABILITIES, kernel).items():
             assert f".target sm_{major}{minor}" in text
             assert doubles(text) == []
+            if kernel == "advance":
+                assert "ld.global.nc.v4.f32" in text  # a candidate is two loads of four numbers

@@ -56,7 +56,10 @@ class CudaBuilder(Builder):
         self.forms = Forms(self.source.blocks, JIT)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
         self.head = head(plan.model.name, plan.bits, shape)
-        self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)}
+        self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)} | {
+            "four_low",
+            "four_high",
+        }
 
     # -------------------------------------------------------------------------------- what the passes call
 

@@ -6,13 +6,14 @@ So the order of every sum, and with it every bit, is the same in each run. Only 
 loss.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 from airflock.core import random
 from airflock.core.maths import norm
 from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.shape import Shape
-from airflock.engine.cuda.sorting import SORT
+from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.passes import decide, move, scene
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.move import ATTEMPTS, beyond
@@ -24,9 +25,24 @@ COMMON = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links",
 AROUND = (
     "for qz in range(low_z, high_z):",
     "for qy in range(low_y, high_y):",
-    "for part in range(2):",
-    "line = ((qz % count[2]) * count[1] + qy % count[1]) * count[0]; first = low_x if part == 0 else again_low; "
-    "last = high_x if part == 0 else again_high",
+    "line = ((qz % count[2]) * count[1] + qy % count[1]) * count[0]",
+    "{image}",
+    "for part in range(parts):",
+    "first = low_x; last = high_x; base_x = own_x",
+    "{across}",
+)
+# Across a face of a periodic box neighbours are met at their image: where the agent would be, seen from there.
+IMAGE = (
+    "base_{a} = own_{a} + (row_w.half_{a} * real(2.0) if q{a} < count[{c}] else "
+    "(row_w.half_{a} * real(-2.0) if q{a} >= 2 * count[{c}] else ZERO))"
+)
+ACROSS = (
+    "if part == 1:",
+    "    base_x = own_x + row_w.half_x * real(2.0)",
+    "    first = count[0] - 1; last = count[0] if ox == 0 else first",
+    "if part == 2:",
+    "    base_x = own_x - row_w.half_x * real(2.0)",
+    "    first = 0; last = 1 if ox == count[0] - 1 else 0",
 )
 
 
@@ -43,7 +59,8 @@ def crowd(plan: Plan, simulated: bool = False) -> str:
     kernels += ["\n".join(_kernel(options, "begin", "near", "rest", *COMMON, body=_begin(build)))]
     given = ("near", "rest", "sorted_", "rest_sorted", "starts", "meet", "step", *COMMON)
     kernels += ["\n".join(_kernel(options, "advance", *given, body=_advance(build)))]
-    parts = [build.head, *build.source.blocks, *build.functions, *kernels]
+    fours = FOURS if plan.bits == 32 and not simulated else PLAIN_FOURS
+    parts = [build.head, fours, *build.source.blocks, *build.functions, *kernels]
     constants = [f"REST = {rest_columns(plan)}", f"SCAN = {8 if simulated else 1024}"]
     return "\n\n".join([*parts, *constants]) + "\n"
 
@@ -63,13 +80,25 @@ class CellBuilder(CudaBuilder):
 
     def cells(self) -> tuple[str, ...]:
         """Lines around a pair loop."""
-        return AROUND
+        periodic, axes = self.plan.periodic, self.plan.axes[1:]
+        image = [IMAGE.format(a=a, c="xyz".index(a)) if periodic else f"base_{a} = own_{a}" for a in axes]
+        found: list[str] = []
+        for line in AROUND:
+            found += image if line == "{image}" else ACROSS if line == "{across}" and periodic else [line]
+        return tuple(line for line in found if line != "{across}")
+
+    def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
+        """Nothing: candidates come at their image."""
+        return []
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Numbers of agents instead of places in the table; noise of an odd step is drawn again."""
         lines = [
             line.replace("integer(j)", "sorted_[j, 3]").replace("ii = integer(i)", "ii = real(i)") for line in lines
         ]
+        if name == "neighbours":
+            for a in self.plan.axes:
+                lines = [line.replace(f"[j] - own_{a};", f"[j] - base_{a};") for line in lines]
         return [line.replace("if step % 2 == 0:", "if step >= 0:") for line in lines]
 
 
@@ -145,22 +174,21 @@ def _advance(build: CellBuilder) -> list[str]:
 
 
 def _edges(build: CellBuilder) -> list[str]:
-    """Cells around the own one: along z and y from low to high, along x in one or, across an edge, two runs."""
-    lines = []
+    """Cells around the own one: along z and y from low to high, along x in one run and, across a face, two more.
+
+    In a periodic box cells are counted from one box before the first, so that the count says at which image they lie.
+    In a box of one or two cells a cell comes more than once, each time at another image; one of them is in reach.
+    """
+    lines = ["parts = 1"]
     for c, a in enumerate("xyz"):
-        own = f"{a}_i" if a in build.plan.axes else "ZERO"
-        lines += [f"o{a} = cell_along({own}, box[{c}], box[{3 + c}], count[{c}])", f"many = count[{c}]"]
-        if not build.plan.periodic:
-            lines += [f"low_{a} = max(o{a} - 1, 0); high_{a} = min(o{a} + 2, many)"]
-        elif a == "x":
-            lines += ["low_x = max(ox - 1, 0) if many > 2 else 0; high_x = min(ox + 2, many) if many > 2 else many"]
+        flown = a in build.plan.axes
+        own = f"{a}_i" if flown else "ZERO"
+        lines += [f"o{a} = cell_along({own}, box[{c}], box[{3 + c}], count[{c}]); many = count[{c}]"]
+        if build.plan.periodic and flown and a != "x":
+            lines += [f"low_{a} = o{a} - 1 + many; high_{a} = low_{a} + 3"]
         else:
-            lines += [f"low_{a} = o{a} - 1 + many if many > 2 else 0; high_{a} = low_{a} + 3 if many > 2 else many"]
-    lines += ["again_low = 0; again_high = 0"]
-    if build.plan.periodic:
-        lines += branch("count[0] > 2 and ox == 0", ["again_low = count[0] - 1; again_high = count[0]"])
-        lines += branch("count[0] > 2 and ox == count[0] - 1", ["again_high = 1"])
-    return lines
+            lines += [f"low_{a} = max(o{a} - 1, 0); high_{a} = min(o{a} + 2, many)"]
+    return [*lines, "parts = 3 if ox == 0 or ox == count[0] - 1 else 1"] if build.plan.periodic else lines
 
 
 def signatures(bits: int) -> dict[str, tuple[Any, ...]]:

@@ -10,6 +10,7 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 """
 
 import ast
+import re
 from collections.abc import Iterable
 
 from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, Registers, parse
@@ -133,10 +134,12 @@ class _Pairs:
             return [loop, *after]
         text = "\n".join(ast.unparse(ast.fix_missing_locations(s)) for s in body)
         if context.cells:
-            depth = "    " * sum(line.endswith(":") for line in context.cells)
-            around = [f"{'    ' * k}{line}" for k, line in enumerate(context.cells)]
+            depth, around = "", []
+            for line in context.cells:
+                around.append(depth + line)
+                depth += "    " if line.startswith("for ") else ""
             inner = ["j = starts[line + first]", "stop = starts[line + last]", "while j < stop:"]
-            inner += [*(f"    {line}" for line in text.splitlines()), "    j = np.uint32(j + np.uint32(1))"]
+            inner += [*(f"    {line}" for line in _by_fours(text)), "    j = np.uint32(j + np.uint32(1))"]
             return parse([*around, *(f"{depth}{line}" for line in inner)])
         step = "j = np.uint32(j + np.uint32(PER_AGENT))"
         turns = max(1, min(UNROLL, shape.lanes // shape.per_agent))
@@ -147,6 +150,17 @@ class _Pairs:
             loops[1] = f"while np.uint32(j + np.uint32({ahead})) < np.uint32(n):"
             loops += ["while j < np.uint32(n):", *once]
         return [*parse(loops), *after]
+
+
+def _by_fours(text: str) -> list[str]:
+    """Lines that read the columns of a candidate four at a time."""
+    read = set(re.findall(r"sorted_\[j, (\d)\]", text))
+    first = [
+        f"{', '.join(f'near_{c}' for c in columns)} = {load}(sorted_, j)"
+        for load, columns in (("four_low", "0123"), ("four_high", "4567"))
+        if read & set(columns)
+    ]
+    return [*first, *re.sub(r"sorted_\[j, (\d)\]", r"near_\1", text).splitlines()]
 
 
 def carried_totals(body: list[ast.stmt]) -> dict[str, str]:
