@@ -70,7 +70,8 @@ def page(claims: list[Claim]) -> str:
         f"# {PAPER.title}",
         "",
         f"`{COMMAND}` flies all this again; `python papers/vasarhelyi_2018/reproduce.py` also rewrites this folder. "
-        f"Airflock {__version__}. Tests and sources of each claim stand in [claims.toml](claims.toml).",
+        f"Airflock {__version__}. Tests and sources of each claim stand in [claims.toml](claims.toml). "
+        "The evolution of Table S1 stands on [a page of its own](EVOLVED.md).",
         "",
         f"**{count['reproduced']} reproduced, {count['not reproduced']} not reproduced, {count['finding']} findings.** "
         "A finding has nothing printed to agree with.",

@@ -13,7 +13,7 @@ from airflock.papers.zapotecatl_2016 import PAPER, RADII
 COMMAND = "airflock paper zapotecatl_2016"
 COUNTED = (
     "The figures were measured by the authors' program; sequential and synchronous flights are counted as it counts, "
-    'with `metrics.count = "program"`, printed ones by Eq. 18.'
+    'with `metrics.count = "program"`, printed ones by Eq. 18. Boids evolved for quality: [EVOLVED.md](EVOLVED.md).'
 )
 SURFACES = {
     "extension_cm": ("Fig. 4", "extension, cm"),
