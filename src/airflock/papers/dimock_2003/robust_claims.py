@@ -82,6 +82,7 @@ def _stable(found: Comparison) -> Claim:
 
 def _front(found: Comparison) -> Claim:
     points = ", ".join(f"{c.rate:.0%} at {c.power / FT_LBF:.3g}" for c in found.front)
+    points += "; one candidate was cheapest and safest at once, there is no trade-off" if len(found.front) == 1 else ""
     return Claim(
         id="robust.front", statement="Pareto front of power and collisions", source="computed here",
         test="no published value; candidates that nobody beat in training, flown again on held-out starts",
