@@ -1,6 +1,7 @@
 """Boids, particles and schools: what the models must do, whatever the drivers; grid against all pairs."""
 
 import math
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -90,6 +91,33 @@ def test_grid_is_all_pairs(world, side, seed):
     one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
     assert np.abs(one[3:]).max() > 0.0
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
+
+
+def test_grid_is_all_pairs_in_a_plane_of_many_lines(seed):
+    found = load("vicsek_1995/transition", {"agents": 500, "world.side": 21.0, "duration": 4.0})
+    pairs, cells = (plan_of(found, precision=64, grid=grid) for grid in (False, True))
+    one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
+    np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-10)
+
+
+STRETCHED = {"line": (400.0, 1.2, 1.2), "plane": (60.0, 60.0, 1.2), "plane of many lines": (1.2, 30.0, 30.0)}
+
+
+@pytest.mark.parametrize("shape", STRETCHED)
+def test_a_flock_along_a_line_or_in_a_plane_is_met_in_full(shape, seed):
+    """Its box has far more room for cells than agents; the cells grow, and nobody is missed."""
+    found = load("zapotecatl_2016/best", {
+        "agents": 300, "update": "synchronous", "dt": 0.02, "duration": 0.2, "world.arena": "none",
+        "world.edges": "open", "start.kind": "ball", "start.radius": 1.0, "metrics.kind": "order",
+    })  # fmt: skip
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-0.5, 0.5, (300, 3)) * STRETCHED[shape]
+    place[1::2] = place[::2] + rng.normal(0.0, 0.1, (150, 3))  # everybody has company
+    start = np.concatenate([place.T, rng.normal(0.0, 0.1, (3, 300))])
+    plans = (replace(plan_of(found, precision=64, grid=grid), given_start=True) for grid in (False, True))
+    one, two = (cpu.fly(plan, tables(found, plan, seed), start).state for plan in plans)
+    assert np.abs(one[:3] - start[:3]).max() > 1e-3
+    np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12 * STRETCHED[shape][0])
 
 
 def test_the_number_of_threads_changes_no_bit_of_a_grid(seed):

@@ -74,7 +74,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
         np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
         work, words, past, store, gust, mem, memory, labels, values, sums,
         np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
-        *grid.memory(plan, n),
+        *grid.memory(plan, n, _rows),
     )  # fmt: skip
     if frames is not None and plan.stop:
         frames = frames[: int(sums[len(columns(plan.metrics))])]

@@ -10,6 +10,7 @@ whatever the number of threads. Only for perception without noise, delay and los
 rounding and the order of sums.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,33 +22,36 @@ from airflock.engine.plan import Plan
 CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
 CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
 BLOCK = 8  # candidates taken at once
+STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 SPARE = 8  # cells of the smallest periodic box
 KEPT = "starts, tally, cell_of, place, ident, packed, flat, totals_"
 
 
-def memory(plan: Plan, agents: int) -> tuple[tuple[NDArray[Any], ...], ...]:
-    """What the grid keeps of n agents during a flight, as one argument or none; pages count when they are written.
+def memory(
+    plan: Plan, agents: int, rows: Callable[[tuple[int, ...], Any], Any]
+) -> tuple[tuple[NDArray[Any], ...], ...]:
+    """What the grid keeps of n agents during a flight, as one argument or none; `rows` makes zeros on cache lines.
 
     starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of, place : of each agent
     ident : agent at each place; packed : (place, component) states; flat : (component, place), the same
     """
     if not plan.grid:
         return ()
-    real, components = (np.float32 if plan.bits == 32 else np.float64), 2 * plan.dimensions
-    most, fields = CELLS * agents + SPARE, len(getattr(plan.model.Sums, "_fields", ()))
+    real, whole = (np.float32, np.int32) if plan.bits == 32 else (np.float64, np.int64)
+    components, most = 2 * plan.dimensions, CELLS * agents + SPARE
+    fields = len(getattr(plan.model.Sums, "_fields", ()))
+    shapes = (
+        ((most + 1,), np.int64), ((CHUNKS * most,), np.int32), ((agents,), np.int32), ((agents,), np.int32),
+        ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
+        ((agents * max(1, fields),), real),
+    )  # fmt: skip
     # not made anew at each step: the pages of what is given back must be zeroed again before they are used
-    return (
-        (
-            np.empty(most + 1, np.int64),
-            np.empty(CHUNKS * most, np.int32),
-            np.empty(agents, np.int32),
-            np.empty(agents, np.int32),
-            np.empty(agents, np.int32 if plan.bits == 32 else np.int64),
-            np.empty((agents, components), real),
-            np.zeros((components, agents + BLOCK), real),
-            np.empty(agents * max(1, fields), real),
-        ),
-    )
+    return (tuple(rows(shape, kind) for shape, kind in shapes),)
+
+
+def _width(plan: Plan) -> int:
+    """Numbers in the row of one agent: a power of two, so that no row lies across two cache lines."""
+    return 1 << (2 * plan.dimensions - 1).bit_length()
 
 
 def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int]) -> None:
@@ -66,7 +70,7 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
     meet += [f"totals[e, {k}] = t{c}" for k, c in enumerate(sums)]
     cell = [
-        "here = line * count[0] + ox",
+        "here = (oz * count[1] + oy) * count[0] + ox",
         *["if starts[here] == starts[here + 1]:", "    continue"],
         "first = np.uint64(slab[ox]); many = integer(slab[ox + 3] - slab[ox])",
         f"padded = -(-(slab[ox + 3] - slab[ox]) // {BLOCK}) * {BLOCK}",
@@ -141,7 +145,8 @@ def _slabs(build: Builder, who: bool) -> list[str]:
     names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
     shifts = {f"h{a}": f"shift_{a}" for a in axes} if periodic else {}
     across = axes[1:]
-    lines = ["oy = line % count[1]; oz = line // count[1]", "room = 0"]
+    lines = [f"wide = {STRIP} * count[2]; strip = line // wide; high = min({STRIP}, count[1] - strip * {STRIP})"]
+    lines += [f"oz = (line - strip * wide) // high; oy = strip * {STRIP} + (line - strip * wide) % high", "room = 0"]
     rows = ["base = " + ("(cz * count[1] + cy)" if "z" in axes else "cy") + " * count[0]"]
     span = ["room += starts[base + count[0]] - starts[base]"]
     ends = "room += starts[base + 1] - starts[base] + starts[base + count[0]] - starts[base + count[0] - 1]"
