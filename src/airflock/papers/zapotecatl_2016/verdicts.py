@@ -171,8 +171,8 @@ def collision_mean(part: str, flown: pd.DataFrame, means: pd.DataFrame) -> Claim
         **found.fields(),
         **judged(
             FLOOR[0] <= found.ours <= FLOOR[1],
-            f"at (r_s, r_a) = {_cm(place)}; the flight with most, {values.max():.2g}, has a pair that sticks together, "
-            f"without it {values.sort_values().iloc[:-1].mean():.2g}",
+            f"at (r_s, r_a) = {_cm(place)}; the flight with most has {values.max():.2g}, the others "
+            f"{values.sort_values().iloc[:-1].mean():.2g}: where a pair sticks together it is 1e-2 and more",
         ),
     )
 
