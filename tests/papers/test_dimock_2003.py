@@ -108,7 +108,7 @@ def test_nobody_on_the_front_is_beaten_and_everybody_else_is():
     tried = [robust.Candidate(None, *pair) for pair in rng.random((50, 2))]
     kept = robust.nondominated(tried)
     for c in tried:
-        beaten = any(k.power <= c.power and k.rate <= c.rate and k is not c for k in kept)
+        beaten = any(k.power <= c.power and k.crowding <= c.crowding and k is not c for k in kept)
         assert beaten != (c in kept)
 
 

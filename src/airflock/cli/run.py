@@ -27,6 +27,7 @@ def run(
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
     from airflock.engine.simulate import picked, score_flights
+    from airflock.metrics.registry import reports
     from airflock.scenarios.files import load
 
     changed = options.settings(changes, agents, duration)
@@ -50,7 +51,7 @@ def run(
     count = f"{seeds} flights" if seeds > 1 else f"seed {first_seed}"
     title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
     published = {} if changed else found.published
-    tables.score_table(title, rows, published)
+    tables.score_table(title, rows, published, reports(found.metrics.kind))
 
 
 def _record(found, numbers, precision, device, save, plot) -> None:  # type: ignore[no-untyped-def]
@@ -89,15 +90,19 @@ def score(
 
     Example: airflock score flight.nc --set metrics.r_coll=2.0 --series course.csv
     """
+    from airflock.metrics.registry import reports
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import aero_settings, measure
+    from airflock.recordings.scores import aero_settings, measure, scenario_of
 
     options.writable(series)
     changed = options.settings(changes)
     rows, courses = [], []
+    about: dict[str, tuple[str, str]] = {}
     for path in files:
         recording = load_recording(path)
-        values, course = measure(recording, aero_settings(recording, changed) if aero else changed)
+        settings = aero_settings(recording, changed) if aero else changed
+        values, course = measure(recording, settings)
+        about |= reports(scenario_of(recording, settings).metrics.kind)
         rows.append(values)
         courses.append(course.assign(file=str(path)))
     if series is not None:
@@ -115,4 +120,4 @@ def score(
         runs = [{"file": str(path), **row} for path, row in zip(files, rows, strict=True)]
         tables.emit_json({"runs": runs, **tables.statistics(rows)})
         return
-    tables.score_table(", ".join(map(str, files)), rows, {})
+    tables.score_table(", ".join(map(str, files)), rows, {}, about)

@@ -42,14 +42,15 @@ def number(x: Any) -> str:
 
 
 def score_table(
-    title: str, rows: Sequence[Mapping[str, Any]], published: Mapping[str, tuple[float, float | None]]
+    title: str,
+    rows: Sequence[Mapping[str, Any]],
+    published: Mapping[str, tuple[float, float | None]],
+    about: Mapping[str, tuple[str, str]],
 ) -> None:
-    """Print order parameters beside what a paper reports."""
+    """Print order parameters beside what a paper reports; about: unit and meaning by name."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
-
-    from airflock.metrics.registry import REPORTS
 
     found = statistics(rows)
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
@@ -62,7 +63,7 @@ def score_table(
     table.add_column("unit")
     table.add_column("meaning", style="dim")
     for key in found["mean"]:
-        unit, meaning = REPORTS.get(key, ("", ""))
+        unit, meaning = about.get(key, ("", ""))
         mean = number(found["mean"][key])
         spread = found["std"][key]
         single = len(rows) == 1 or isinstance(spread, list) or spread != spread

@@ -59,11 +59,14 @@ GOALS = {
     "time_to_goal": ("s", "when each was reached"),
 }
 
-# of every order parameter that is reported: its unit and what it means, from the modules that define them
-REPORTS: dict[str, tuple[str, str]] = (
-    {name: about for found in SETS.values() for each in found for name, about in each.reports.items()}
-    | fitness_kidger.REPORTS
-    | fitness_dimock.REPORTS
-    | fitness_vasarhelyi.REPORTS
-    | GOALS
-)
+FITNESS: dict[str, dict[str, tuple[str, str]]] = {
+    "vasarhelyi": fitness_vasarhelyi.REPORTS,
+    "kidger": fitness_kidger.REPORTS,
+    "dimock": fitness_dimock.REPORTS,
+}
+
+
+def reports(kind: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of every order parameter that flights with a key metrics.kind report."""
+    found = {name: about for each in SETS[kind] for name, about in each.reports.items()}
+    return found | FITNESS.get(kind, {}) | GOALS

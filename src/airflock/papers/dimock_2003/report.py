@@ -134,16 +134,19 @@ def traces(path: Path, flight: Flight, title: str) -> None:
 
 
 def front(path: Path, found: Any) -> None:
-    """Power against collision rate: every candidate of the search, and controllers on held-out starts."""
-    figure, axes = _axes("Power and collisions over 60 s")
+    """Power against crowding: every candidate of the search, and controllers on held-out starts."""
+    figure, axes = _axes("Power and closeness over 60 s")
     tried = [c for c in found.tried if np.isfinite(c.power)]
-    axes.plot([c.power / FT_LBF for c in tried], [c.rate for c in tried], ".", color="0.8", label="tried, in training")
+    axes.plot(
+        [c.power / FT_LBF for c in tried], [c.crowding for c in tried], ".", color="0.8", label="tried, in training"
+    )
     kept = sorted(found.front, key=lambda c: c.power)
-    axes.plot([c.power / FT_LBF for c in kept], [c.rate for c in kept], "s-", color="0.3", label="front, held out")
+    axes.plot([c.power / FT_LBF for c in kept], [c.crowding for c in kept], "s-", color="0.3", label="front, held out")
     for name, flights in found.flights.items():
         alive = [f.power / FT_LBF for f in flights if not f.collided]
-        rate = 1.0 - len(alive) / len(flights)
-        axes.plot(np.mean(alive) if alive else np.nan, rate, "o", markersize=9, label=f"{name}, held out")
-    axes.set(xlabel="mean power of those that survive, ft lbf/s per bird", ylabel="share that collides")
+        crowding = np.mean([f.values["crowding"] for f in flights])
+        told = f"{name}, held out, {1.0 - len(alive) / len(flights):.0%} collide"
+        axes.plot(np.mean(alive) if alive else np.nan, crowding, "o", markersize=9, label=told)
+    axes.set(xlabel="mean power of those that survive, ft lbf/s per bird", ylabel="crowding")
     axes.legend(fontsize="small")
     _save(figure, path)

@@ -34,11 +34,12 @@ TEST = 1_000_000  # first seed of held-out flights; training uses seeds below
 
 @dataclass(frozen=True)
 class Candidate:
-    """Gains, mean power (W) of those flights that survive, and the share that collides."""
+    """Gains, mean power (W) of those flights that survive, mean crowding of all, and the share that collides."""
 
     gains: Gains
     power: float
-    rate: float
+    crowding: float
+    rate: float = 0.0
 
 
 @dataclass
@@ -103,14 +104,19 @@ def sound(values: dict[str, Any]) -> float:
 def candidate(found: Gains, flights: Sequence[Flight]) -> Candidate:
     """What some flights of one controller say."""
     alive = [flight.power for flight in flights if not flight.collided]
-    return Candidate(found, float(np.mean(alive)) if alive else float("inf"), 1.0 - len(alive) / len(flights))
+    power = float(np.mean(alive)) if alive else float("inf")
+    crowding = float(np.mean([flight.values["crowding"] for flight in flights]))
+    return Candidate(found, power, crowding, 1.0 - len(alive) / len(flights))
 
 
 def nondominated(tried: Sequence[Candidate]) -> list[Candidate]:
-    """Those than whom nobody is better in power and in collisions at once, from the cheapest to the safest."""
+    """Those than whom nobody is better in power and in crowding at once, from the cheapest to the safest.
+
+    Crowding, not collisions: with a barrier between birds hardly a candidate collides, but many fly close.
+    """
     kept: list[Candidate] = []
-    for c in sorted(tried, key=lambda c: (c.power, c.rate)):
-        if not kept or c.rate < kept[-1].rate:
+    for c in sorted(tried, key=lambda c: (c.power, c.crowding)):
+        if not kept or c.crowding < kept[-1].crowding:
             kept.append(c)
     return kept
 

@@ -81,10 +81,10 @@ def _stable(found: Comparison) -> Claim:
 
 
 def _front(found: Comparison) -> Claim:
-    points = ", ".join(f"{c.rate:.0%} at {c.power / FT_LBF:.3g}" for c in found.front)
+    points = ", ".join(f"{c.crowding:.3g} at {c.power / FT_LBF:.3g} ({c.rate:.0%} collide)" for c in found.front)
     points += "; one candidate was cheapest and safest at once, there is no trade-off" if len(found.front) == 1 else ""
     return Claim(
-        id="robust.front", statement="Pareto front of power and collisions", source="computed here",
+        id="robust.front", statement="Pareto front of power and crowding", source="computed here",
         test="no published value; candidates that nobody beat in training, flown again on held-out starts",
-        verdict="finding", runs=len(found.tried), reason=f"collisions at power in ft lbf/s: {points}",
+        verdict="finding", runs=len(found.tried), reason=f"crowding at power in ft lbf/s: {points}",
     )  # fmt: skip
