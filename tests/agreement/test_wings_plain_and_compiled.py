@@ -17,7 +17,7 @@ SMALL = {
 }
 FLIGHTS = {
     "paper": ("dimock_2003/published", SMALL),
-    "sound": ("dimock_2003/physical", SMALL | {"start.spacing_z": 0.1}),
+    "sound": ("dimock_2003/physical", SMALL | {"start.spacing_z": 0.1, "body.kind": "jostled", "body.noise": 0.01}),
 }
 
 
