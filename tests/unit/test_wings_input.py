@@ -2,9 +2,7 @@
 
 import pytest
 
-from airflock.engine.cuda.launch import fly_many
-from airflock.engine.simulate import plan_of
-from airflock.errors import DeviceError, ScenarioError
+from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
 
 BAD = {
@@ -34,12 +32,6 @@ def test_stall_of_the_paper_is_noted_not_refused():
     assert any("lift coefficient of 1.87" in note for note in load("dimock_2003/published").notes)
     with pytest.raises(ScenarioError, match=r"lift coefficient of 1\.87"):
         load("dimock_2003/published", {"wing.stall": "refused"})
-
-
-def test_a_gpu_refuses_what_only_a_processor_flies():
-    for settings in ({}, {"start.kind": "box", "start.side": 30.0}):
-        with pytest.raises(DeviceError, match="model.flock solves for the whole flock, which only the CPU does"):
-            fly_many(plan_of(load("dimock_2003/physical", settings)), [])
 
 
 def test_a_flight_without_collisions_to_count_cannot_stop_at_one():
