@@ -11,5 +11,5 @@ if __name__ == "__main__":
         "Boids evolved for the quality of Zapotecatl et al. 2016",
         "airflock paper zapotecatl_2016 --only evolved",
     )
-    write_page(Path(__file__).parent, title, command, found, ("evolved", "EVOLVED"))
+    write_page(Path(__file__).parent, title, command, found, ("evolved", "EVOLVED"), "study 0; paired flights 0 to 99")
     print_claims(found)

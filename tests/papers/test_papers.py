@@ -29,6 +29,7 @@ def test_the_committed_page_is_of_that_paper(name: str) -> None:
     assert (folder / "README.md").read_text(encoding="utf-8").startswith(f"# {paper.title}\n")
     header = tomllib.loads((folder / "claims.toml").read_text(encoding="utf-8"))
     assert header["command"].startswith(f"airflock paper {name}")
+    assert {"paper", "command", "seeds", "version", "precision"} <= set(header)
 
 
 @pytest.mark.parametrize("name", PAPERS)

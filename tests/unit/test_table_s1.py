@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from airflock.papers.claims import read_claims
 from airflock.papers.vasarhelyi_2018 import evolved, table_s1
 from airflock.papers.vasarhelyi_2018.published import optimum
 from airflock.scenarios.files import load, presets
@@ -68,3 +69,14 @@ def test_a_preset_of_an_optimum_is_that_of_table_s1_with_other_parameters(tmp_pa
         printed.body, printed.radio, printed.sensors, printed.world,
     )  # fmt: skip
     assert not ours.published and "0.100" in path.read_text(encoding="utf-8")
+
+
+def test_the_page_tells_how_it_is_made_and_sets_ours_beside_the_printed(tmp_path):
+    keys = {f"model.{name}": 2.0 for name in table_s1.COLUMNS}
+    best = SimpleNamespace(parameters=keys, ranges={key: (1.0, 3.0) for key in keys})
+    data = table_s1.Data({6: [best]}, {6: flights(np.full(4, 0.8))}, {6: flights(np.full(4, 0.7))})
+    evolved.write(tmp_path, [table_s1.against_published(6, data.ours[6], data.published[6])], data)
+    header, (claim,) = read_claims(tmp_path / "evolved.toml")
+    assert header["seeds"].endswith("paired flights 0 to 3") and header["runs"] == "1 at 6 m/s"
+    assert claim.ours == 0.1
+    assert "| `r0_rep` | 41.1 \\| 2 [1, 3] |" in (tmp_path / "EVOLVED.md").read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ from typing import Any
 from airflock import atomic
 from airflock.errors import AirflockError
 
+SEEDS = "0 to n - 1 of each scenario, n flights"  # as `Flights.score` counts them
 VERDICTS = ("reproduced", "not reproduced", "finding")
 
 
@@ -58,13 +59,24 @@ def judged(holds: bool, reason: str = "") -> dict[str, Any]:
     return {"verdict": "reproduced" if holds else "not reproduced", "reason": reason}
 
 
-def write_claims(path: Path, claims: Iterable[Claim], header: Mapping[str, Any]) -> None:
-    """Write claims.toml, complete or not at all; header: paper, command, seeds, version and what else made them."""
+def header(paper: str, command: str, seeds: int | None = None, told: str = SEEDS) -> dict[str, str]:
+    """What stands above committed claims: how they are made again.
+
+    seeds : flights per number, if others than the paper's; told : which seeds they are
+    """
+    from airflock import __version__
+
+    whole = command + (f" --seeds {seeds}" if seeds else "")
+    return {"paper": paper, "command": whole, "seeds": told, "version": __version__, "precision": "32 bits"}
+
+
+def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) -> None:
+    """Write claims.toml, complete or not at all; above: as of `header`, and what else made them."""
     import tomlkit
 
     document = tomlkit.document()
     document.add(tomlkit.comment("Written by the command below; numbers in SI units, intervals are 95 %."))
-    for key, value in header.items():
+    for key, value in above.items():
         document.add(key, value)
     table = tomlkit.aot()
     for claim in claims:
@@ -122,13 +134,15 @@ def markdown(claims: Sequence[Claim], reasons: bool = True) -> str:
 
 
 def write_page(
-    folder: Path, title: str, command: str, claims: Sequence[Claim], names: tuple[str, str] = ("claims", "README")
+    folder: Path,
+    title: str,
+    command: str,
+    claims: Sequence[Claim],
+    names: tuple[str, str] = ("claims", "README"),
+    told: str = SEEDS,
 ) -> None:
-    """Write claims.toml and README.md, or files of other names, for claims that need no figures."""
-    from airflock import __version__
-
-    header = {"paper": title, "command": command, "version": __version__}
-    write_claims(folder / f"{names[0]}.toml", claims, header)
+    """Write claims.toml and README.md, or files of other names, for claims without figures; told: as of `header`."""
+    write_claims(folder / f"{names[0]}.toml", claims, header(title, command, told=told))
     atomic.write(folder / f"{names[1]}.md", f"# {title}\n\n`{command}` recomputes this page.\n\n{markdown(claims)}")
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airflock import __version__, atomic
+from airflock import atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
 from airflock.papers.dimock_2003 import PAPER
@@ -13,6 +13,7 @@ from airflock.papers.dimock_2003.flights import Flight
 from airflock.papers.dimock_2003.ga import WEIGHTS
 from airflock.papers.dimock_2003.units import FOOT, FT_LBF
 
+SEEDS = "genetic algorithm and CMA-ES 1 to 3; robust search 7; its held-out flights from 1000000"
 COMMAND = "airflock paper dimock_2003"
 WORDS = (
     ("static.", "Formations that stand still", "The unit of the fitness, bounds, and what selfishness costs."),
@@ -56,7 +57,7 @@ def write(folder: Path, claims: list[Claim], found: dict[str, Any]) -> None:
             traces(figures / f"fig{number}.png", run.flights[flight], f"Fig. {number}: best-ever, {name}")
     if "robust" in found:
         front(figures / "pareto.png", found["robust"])
-    header = {"paper": PAPER.title, "command": COMMAND, "version": __version__, "precision": "32 bits"}
+    header = records.header(PAPER.title, COMMAND, told=SEEDS)
     records.write_claims(folder / "claims.toml", claims, header)
     atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1], sorted(figures.glob("*"))))
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock import __version__, atomic
+from airflock import atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import VERDICTS, Claim
 from airflock.papers.kidger import PAPER, figures
@@ -71,14 +71,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int |
     """Write the report into a folder."""
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     figures.draw(folder / "figures", flown["tuning"])
-    header = {
-        "paper": PAPER.title,
-        "command": COMMAND + (f" --seeds {seeds}" if seeds else ""),
-        "seeds": "0 to n - 1 of each scenario, n flights",
-        "version": __version__,
-        "precision": "32 bits",
-    }
-    records.write_claims(folder / "claims.toml", claims, header)
+    records.write_claims(folder / "claims.toml", claims, records.header(PAPER.title, COMMAND, seeds))
     read = records.read_claims(folder / "claims.toml")[1]  # so that both show the same rounded numbers
     atomic.write(folder / "README.md", page(read, flown["schemes"].table))
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from airflock import __version__, atomic
+from airflock import atomic
 from airflock.papers import claims as records
 from airflock.papers import statistics
 from airflock.papers.claims import Claim
@@ -38,14 +38,10 @@ def reproduce(
 def write(folder: Path, claims: list[Claim], data: Data) -> None:
     """Write evolved.toml and EVOLVED.md."""
     steps = ", ".join(f"{key} = {value:g}" for key, value in COARSE.items())
-    header = {
-        "paper": TITLE,
-        "command": COMMAND,
+    pairs = len(next(iter(data.ours.values())))
+    header = records.header(TITLE, COMMAND, told=f"studies 0, 1, ...; paired flights 0 to {pairs - 1}") | {
         "runs": ", ".join(f"{len(runs)} at {v} m/s" for v, runs in data.runs.items()),
-        "seeds": f"studies 0, 1, ...; paired flights 0 to {len(next(iter(data.ours.values()))) - 1}",
         "search": f"15,000 evaluations a run with {steps}; paired flights with the steps of the paper",
-        "version": __version__,
-        "precision": "32 bits",
     }
     records.write_claims(folder / "evolved.toml", claims, header)
     claims = records.read_claims(folder / "evolved.toml")[1]

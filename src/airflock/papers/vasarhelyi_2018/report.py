@@ -44,14 +44,7 @@ def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int |
 
     folder.mkdir(parents=True, exist_ok=True)
     draw(folder / "figures", flown)
-    header = {
-        "paper": PAPER.title,
-        "command": COMMAND + (f" --seeds {seeds}" if seeds else ""),
-        "seeds": "0 to n - 1 of each scenario, n flights",
-        "version": __version__,
-        "precision": "32 bits",
-    }
-    records.write_claims(folder / "claims.toml", claims, header)
+    records.write_claims(folder / "claims.toml", claims, records.header(PAPER.title, COMMAND, seeds))
     # from the file, so that both show the same rounded numbers
     atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1]))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from airflock import __version__, atomic
+from airflock import atomic
 from airflock.papers import claims as records
 from airflock.papers.claims import Claim
 from airflock.papers.zapotecatl_2016 import PAPER, RADII
@@ -33,7 +33,7 @@ def reproduce(folder: Path, seeds: int | None = None, threads: int | None = None
 def write(folder: Path, claims: list[Claim], flown: dict[str, pd.DataFrame], seeds: int | None = None) -> None:
     """Write the report into a folder."""
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    header = {"paper": PAPER.title, "command": COMMAND + (f" --seeds {seeds}" if seeds else ""), "version": __version__}
+    header = records.header(PAPER.title, COMMAND, seeds)
     records.write_claims(folder / "claims.toml", claims, header)
     means = {part: table.groupby(level=[0, 1]).mean() for part, table in flown.items()}
     for part, table in means.items():
