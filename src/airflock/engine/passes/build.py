@@ -18,9 +18,11 @@ class Builder:
     """Names rules, rows of the work table and records of the parameter row for one plan.
 
     clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    slots    : whether loops over agents run over slots, of which each holds agent order[i]
     """
 
     clusters: Callable[[Metric], list[str]] | None = None
+    slots = False
 
     def __init__(self, plan: Plan):
         self.plan = plan
@@ -41,6 +43,15 @@ class Builder:
         if not (plan.noisy or plan.delayed) and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
         return self.rows.setdefault(name, len(self.rows))
+
+    @property
+    def who(self) -> str:
+        """Number of the agent that a loop is at."""
+        return "order[i]" if self.slots else "i"
+
+    def order(self) -> list[str]:
+        """Lines that bind `order`: whole numbers in a row of the work table, so that they move with all other rows."""
+        return [f"order = work[{self.row('order')}].view(np.int{self.plan.bits})"] if self.slots else []
 
     def records(self, letters: str) -> list[str]:
         """Lines that read records of numbers (p, b, q, ...) from the parameter row."""

@@ -149,6 +149,7 @@ def decide(build: Builder) -> None:
         body += [f"memory = {build.source.name(model.Memory)}({', '.join(values)})"]
     if "percept" in used:
         lines += build.records("w") + build.whole("world", "seed_low", "seed_high", "corners", "obstacles")
+        lines += build.order()
         body += scene.parts("aim") if plan.goals else []
         lines += build.bind([f"goal_{a}" for a in axes]) if plan.own else []
         body += scene.look(build, model)

@@ -1,7 +1,7 @@
 """Drivers: whole flights, and whole recordings, as the order in which the passes run."""
 
 from airflock.engine import vectors
-from airflock.engine.passes import decide, flock, grid, measure, move, perceive, scene
+from airflock.engine.passes import decide, flock, grid, measure, move, perceive, scene, slots
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import primitives
@@ -39,6 +39,7 @@ SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
 def flight(plan: Plan) -> str:
     """Text of the driver that flies one world: function `fly`."""
     build = Builder(plan)
+    build.slots = slots.slotted(plan)
     axes = plan.axes
     perceive.snapshot(build)
     perceive.perceive(build)
@@ -56,6 +57,7 @@ def flight(plan: Plan) -> str:
     lines += [
         "status = begin(n, m, row, whole, work, edges, spans, start, scene)",
         *branch("status < 0", ["return status"]),
+        *slots.numbered(build),
     ]
     heard_late = plan.noisy or plan.delayed
     lines += loop("slot in range(ring)", ["snapshot(slot, m, work, past)"]) if heard_late else []
@@ -69,6 +71,7 @@ def flight(plan: Plan) -> str:
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     if plan.model.neighbour is not None:
         choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
+        choose += slots.rearrange(build, grid.opened(build))
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
@@ -86,7 +89,7 @@ def flight(plan: Plan) -> str:
         sample += ["frame = step // sample_every"]
         names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
         sample += loop(
-            "i in range(n)", [f"frames[frame, {c}, i] = work[{build.row(x)}, i]" for c, x in enumerate(names)]
+            "i in range(n)", [f"frames[frame, {c}, {build.who}] = work[{build.row(x)}, i]" for c, x in enumerate(names)]
         )
     step += branch("step % sample_every == 0", sample) if sample else []
     advance = [
@@ -99,6 +102,7 @@ def flight(plan: Plan) -> str:
         advance = [f"fastest = turns({given})", advance[1]]
     step += branch("step < steps", advance)
     lines += loop("step in range(steps + 1)", step)
+    lines += slots.restored(build, grid.opened(build))
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
     arguments += (
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")

@@ -4,10 +4,10 @@ A line is a row of cells along x. The agents in the cells around a line are copi
 cells of one x), so that the candidates of a cell are three slabs, one piece of memory, and the loop over them runs in
 whole vectors; so does the copying, which may write past the agents of a cell where the next ones overwrite it. In a
 periodic box they are copied at the image that they are met at. Whatever lies at random in memory (the agents of a cell,
-their sums) is kept in rows of one agent, so that it costs one cache line and not one per number; all that is kept from
-stage to stage lies in memory that lasts for a flight. Candidates come in the order of slabs and within a cell by index,
-whatever the number of threads. Only for perception without noise, delay and loss; there it equals all pairs but for
-rounding and the order of sums.
+their sums) is kept in rows of one agent, so that it costs one cache line and not one per number; `slots` keeps it from
+lying far apart. All that is kept from stage to stage lies in memory that lasts for a flight. Candidates come in the
+order of slabs and within a cell by slot, whatever the number of threads. Only for perception without noise, delay and
+loss; there it equals all pairs but for rounding and the order of sums.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ CHUNKS = 8  # parts of the flock that are counted side by side; their order is t
 BLOCK = 8  # candidates taken at once
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 SPARE = 8  # cells of the smallest periodic box
-KEPT = "starts, tally, cell_of, place, ident, packed, flat, totals_"
+KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
 
 def memory(
@@ -32,8 +32,8 @@ def memory(
 ) -> tuple[tuple[NDArray[Any], ...], ...]:
     """What the grid keeps of n agents during a flight, as one argument or none; `rows` makes zeros on cache lines.
 
-    starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of, place : of each agent
-    ident : agent at each place; packed : (place, component) states; flat : (component, place), the same
+    starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of each agent
+    packed : (place, component) states and, as an integer, the slot; flat : (component, place) states; ident : agents
     """
     if not plan.grid:
         return ()
@@ -41,7 +41,7 @@ def memory(
     components, most = 2 * plan.dimensions, CELLS * agents + SPARE
     fields = len(getattr(plan.model.Sums, "_fields", ()))
     shapes = (
-        ((most + 1,), np.int64), ((CHUNKS * most,), np.int32), ((agents,), np.int32), ((agents,), np.int32),
+        ((most + 1,), np.int64), ((CHUNKS * most,), np.int32), ((agents,), np.int32),
         ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
         ((agents * max(1, fields),), real),
     )  # fmt: skip
@@ -50,8 +50,13 @@ def memory(
 
 
 def _width(plan: Plan) -> int:
-    """Numbers in the row of one agent: a power of two, so that no row lies across two cache lines."""
-    return 1 << (2 * plan.dimensions - 1).bit_length()
+    """Numbers in the row of an agent, the last its slot: a power of two, so that none lies across two cache lines."""
+    return 1 << (2 * plan.dimensions).bit_length()
+
+
+def opened(build: Builder) -> list[str]:
+    """Lines that bind what lasts for a flight, and `whose`, the slot of the agent at each place."""
+    return [f"{KEPT} = cells", f"whose = packed.view(np.int{build.plan.bits})[:, {_width(build.plan) - 1}]"]
 
 
 def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int]) -> None:
@@ -68,7 +73,8 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
-    meet += [f"totals[e, {k}] = t{c}" for k, c in enumerate(sums)]
+    wide = max(1, len(sums))
+    meet += ["slot = whose[e]", *[f"totals[slot, {k}] = t{c}" for k, c in enumerate(sums)]]
     cell = [
         "here = (oz * count[1] + oy) * count[0] + ox",
         *["if starts[here] == starts[here + 1]:", "    continue"],
@@ -77,11 +83,10 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
         *loop("e in range(starts[here], starts[here + 1])", meet),
     ]
     body = [*_slabs(build, who), *loop("ox in range(count[0])", cell)]
-    wide = max(1, len(sums))
-    lines = [*lines, f"{KEPT} = cells", f"totals = totals_[: n * {wide}].reshape(n, {wide})", *_sorted(build, who)]
+    lines = [*lines, *opened(build), f"totals = totals_[: n * {wide}].reshape(n, {wide})", *_sorted(build, who)]
     lines += loop("line in prange(count[1] * count[2])", body)
     back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
-        "e = place[i]", *[f"sum{c}[i] = totals[e, {k}]" for k, c in enumerate(sums)]
+        f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = [line.replace("CHUNKS", str(CHUNKS)) for line in lines]
@@ -119,7 +124,7 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     """
     axes = build.plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
-    lines = [*build.bind(names), "low, size, count = cells_of(n, near, row, work)"]
+    lines = [*build.bind(names), *build.order(), "low, size, count = cells_of(n, near, row, work)"]
     lines += ["total = count[0] * count[1] * count[2]"]
     inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
     part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
@@ -132,11 +137,12 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     lines += ["before = 0"]
     lines += loop("cell in range(total)", ["starts[cell] = before", *loop("share in range(CHUNKS)", add)])
     lines += ["starts[total] = before"]
-    put = ["d = tally[head + cell_of[i]]; tally[head + cell_of[i]] = d + 1; place[i] = d"] + ["ident[d] = i"] * who
+    put = ["d = tally[head + cell_of[i]]; tally[head + cell_of[i]] = d + 1; whose[d] = i"]
     put += [f"packed[d, {c}] = {name}[i]" for c, name in enumerate(names)]
     lines += loop("chunk in prange(CHUNKS)", ["head = chunk * total", *loop(part, put)])
-    each = loop(part.replace("i in", "e in"), [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))])
-    return lines + loop("chunk in prange(CHUNKS)", each)
+    each = [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))]
+    each += ["ident[e] = " + ("order[whose[e]]" if build.slots else "whose[e]")] * who
+    return lines + loop("chunk in prange(CHUNKS)", loop(part.replace("i in", "e in"), each))
 
 
 def _slabs(build: Builder, who: bool) -> list[str]:

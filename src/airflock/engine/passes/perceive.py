@@ -51,10 +51,11 @@ def normals(build: Builder, step: str, stream: int, row: str = "g") -> list[str]
     philox, pair = build.source.name(random.philox), build.source.name(random.normal_pair)
     return [
         *build.bind([f"{row}{c}" for c in range(4)]),
+        *build.order(),
         "u0 = words[0]; u1 = words[1]; u2 = words[2]; u3 = words[3]",
         *loop(
             "i in range(m)",
-            [f"u0[i], u1[i], u2[i], u3[i] = {philox}(i, {step}, {stream}, world, seed_low, seed_high)"],
+            [f"u0[i], u1[i], u2[i], u3[i] = {philox}({build.who}, {step}, {stream}, world, seed_low, seed_high)"],
         ),
         *loop("i in range(m)", [f"{row}0[i], {row}1[i] = {pair}(u0[i], u1[i])"]),
         *loop("i in range(m)", [f"{row}2[i], {row}3[i] = {pair}(u2[i], u3[i])"]),

@@ -7,7 +7,7 @@ from airflock.engine.passes.build import Builder, loop
 from airflock.world import bvh, rays
 
 FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
-REST = "w.half_x, w.half_y, w.half_z, i, k_, world, seed_low, seed_high, corners, obstacles, edges, spans"
+REST = "w.half_x, w.half_y, w.half_z, {}, k_, world, seed_low, seed_high, corners, obstacles, edges, spans"
 
 
 def record(build: Builder) -> str:
@@ -24,7 +24,7 @@ def values(build: Builder) -> str:
     known = axes if plan.goals or plan.own else ()
     goal = ", ".join(f"{aim} - m{a}[i]" if a in known else "ZERO" for aim, a in zip(aims, "xyz", strict=True))
     casts = scene.carried(build)
-    return ", ".join(["time", position, goal, REST, *casts])
+    return ", ".join(["time", position, goal, REST.format(build.who), *casts])
 
 
 def bind(build: Builder) -> None:

@@ -150,15 +150,17 @@ def glide(build: Builder) -> None:
     aim[3] keeps how long all are under way, s: the longest way at goals.speed, which a smooth course exceeds by half.
     """
     axes = build.plan.axes
-    lines = [*build.records("w"), *parts("goals", "aim"), *build.bind(axes)]
+    lines = [*build.records("w"), *parts("goals", "aim"), *build.bind(axes), *build.order()]
     lines += build.bind([f"{word}_{a}" for word in ("goal", "from") for a in axes])
-    square = " + ".join(f"(goals[i, {c}] - {a}[i]) * (goals[i, {c}] - {a}[i])" for c, a in enumerate(axes))
+    square = " + ".join(
+        f"(goals[{build.who}, {c}] - {a}[i]) * (goals[{build.who}, {c}] - {a}[i])" for c, a in enumerate(axes)
+    )
     begin = [
         "far = ZERO",
         *loop("i in range(n)", [*[f"from_{a}[i] = {a}[i]" for a in axes], f"far = most(far, {square})"]),
     ]
     begin += ["aim[3] = real(1.5) * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO"]
     rule = build.source.name(goals.glide)
-    way = [f"goal_{a}[i] = {rule}(from_{a}[i], goals[i, {c}], time, aim[3])" for c, a in enumerate(axes)]
+    way = [f"goal_{a}[i] = {rule}(from_{a}[i], goals[{build.who}, {c}], time, aim[3])" for c, a in enumerate(axes)]
     lines += [*branch("time <= ZERO", begin), *loop("i in range(n)", way)]
     build.function("glide_(time, n, work, row, scene)", lines, "return 0")

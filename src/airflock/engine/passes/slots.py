@@ -1,0 +1,57 @@
+"""Slots: the agents of a large flock lie in memory beside those they meet, and are put there again from time to time.
+
+Slot i holds agent `order[i]`; loops over agents run over slots, and whatever depends on who an agent is (its random
+numbers, its place in a recording) asks `order`. Agents are numbered without regard to where they fly: by number, the
+sort into cells and the sums on their way back go at random over all memory, and a large flock costs more per agent than
+a small one. Of the numbers of an agent none depends on its slot; sums over the flock are taken in the order of slots.
+"""
+
+from airflock.engine.passes.build import Builder, branch, loop
+from airflock.engine.passes.flock import owners
+from airflock.engine.plan import Plan
+
+EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
+PARTS = 8  # of the flock, side by side
+
+
+def slotted(plan: Plan) -> bool:
+    """Whether agents have slots: not where rules of the whole flock know them by number."""
+    return plan.grid and not plan.sequential and not owners(plan)
+
+
+def numbered(build: Builder) -> list[str]:
+    """Lines that put each agent into the slot of its number."""
+    return [*build.order(), *loop("i in range(m)", ["order[i] = i"])] if build.slots else []
+
+
+def rearrange(build: Builder, sorted_: list[str]) -> list[str]:
+    """Lines that now and then move all agents to where they were just sorted to.
+
+    sorted_ : lines that bind `whose`, the slot now of the agent at each place, and free memory, `totals_`
+    """
+    if not build.slots:
+        return []
+    body = [*sorted_, "kept = totals_[:n]"]
+    for table in ("work", "mem", "memory"):
+        rows = [f"lane = {table}[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
+        body += loop(f"c in range({table}.shape[0])", rows)
+    build.function("rearrange(n, work, mem, memory, cells)", body, "return 0", parallel=True)
+    return branch(f"k % {EVERY} == 0", ["rearrange(n, work, mem, memory, cells)"])
+
+
+def restored(build: Builder, sorted_: list[str]) -> list[str]:
+    """Lines that bring positions and velocities back into the order of agents."""
+    if not build.slots:
+        return []
+    axes = build.plan.axes
+    lines = [*sorted_, "kept = totals_[:n]"]
+    for name in (*axes, *(f"v{a}" for a in axes)):
+        lines += [f"lane = work[{build.row(name)}]"]
+        lines += loop("i in range(n)", ["kept[order[i]] = lane[i]"]) + loop("i in range(n)", ["lane[i] = kept[i]"])
+    return lines
+
+
+def _spread(line: str) -> list[str]:
+    """A loop over all slots, in parts side by side."""
+    part = loop(f"i in range(n * part // {PARTS}, n * (part + 1) // {PARTS})", [line])
+    return loop(f"part in prange({PARTS})", part)

@@ -1,0 +1,47 @@
+"""Slots: agents change places in memory, and nothing that is theirs goes astray."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import airflock.display
+from airflock.engine import cpu
+from airflock.engine.passes.slots import EVERY, slotted
+from airflock.engine.simulate import plan_of
+from airflock.engine.tables import tables
+from airflock.scenarios.files import load
+
+DISPLAY = Path(airflock.display.__file__).parent / "display.toml"
+N = 90
+GOALS = [[16.0 * (i % 10) - 80.0, 16.0 * (i // 10) - 80.0, 30.0] for i in range(N)]
+FLOCKS = {
+    # noise of the body by agent, a goal of its own, contacts between where it was and is, collisions it remembers
+    "display": (DISPLAY, {
+        "agents": N, "dt": 0.05, "sensors.period": 0.1, "duration": 0.1 * (EVERY + 6), "world.dimensions": "3",
+        "world.arena": "none", "goals.kind": "own", "goals.points": GOALS, "goals.speed": 20.0, "scene.kind": "boxes",
+        "scene.boxes": [[6.0, 6.0, 12.0, 18.0, 16.0, 18.0, 0.0]], "start.kind": "box", "start.side": 160.0,
+        "body.noise": 0.2, "sensors.noise": 0.0, "radio.delay": 0.0, "metrics.kind": "kidger", "metrics.period": 0.1,
+    }),
+    # random numbers that a rule draws by agent
+    "particles": ("vicsek_1995/transition", {"agents": 300, "world.side": 12.0, "duration": 1.0 * (EVERY + 6)}),
+    # memory of the law by agent
+    "boids": ("zapotecatl_2016/best", {
+        "agents": 300, "update": "synchronous", "dt": 0.02, "duration": 0.02 * (EVERY + 6), "start.kind": "arena",
+        "start.separation": 0.0, "world.edges": "periodic", "world.side": 3.0, "world.height": 3.0,
+    }),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FLOCKS)
+def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(name, seed):
+    preset, settings = FLOCKS[name]
+    found = load(preset, settings)
+    pairs, cells = (plan_of(found, precision=64, record=True, grid=grid) for grid in (False, True))
+    assert slotted(cells) and not slotted(pairs)
+    one, two = (cpu.fly(plan, tables(found, plan, seed)) for plan in (pairs, cells))
+    assert one.status == two.status == 0
+    assert one.frames is not None and two.frames is not None and len(one.frames) > EVERY
+    np.testing.assert_allclose(one.frames, two.frames, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(one.state, two.state, rtol=0.0, atol=1e-8)
+    assert two.values == pytest.approx(one.values, rel=1e-7, abs=1e-9, nan_ok=True)
