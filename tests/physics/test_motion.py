@@ -10,6 +10,7 @@ from airflock.core import random
 from airflock.engine.plain_start import begin
 from airflock.engine.plain_world import Place
 from airflock.scenarios.files import load
+from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 
 
@@ -140,3 +141,12 @@ def test_a_formation_starts_straight_ahead_at_the_speed_of_the_start():
     found = load("vasarhelyi_2018/fixed_wing", {"duration": 0.0, "start.speed": 7.0})
     states = begin(found, 0, Place(found))
     assert [(s.vx, s.vy, s.vz) for s in states] == [(7.0, 0.0, 0.0)] * 7
+
+
+def test_all_directions_are_equally_likely_at_the_start(seed):
+    rng = np.random.default_rng(seed)
+    n = 20_000
+    v = np.array([start.heading_off(*g, 3.0) for g in rng.normal(0.0, 1.0, (n, 3))])
+    np.testing.assert_allclose(np.linalg.norm(v, axis=1), 3.0, rtol=1e-9)
+    share = np.sort((v / 3.0 + 1.0) / 2.0, axis=0)  # a coordinate of a point on a sphere is uniform (Archimedes)
+    assert np.abs(share - (np.arange(n)[:, None] + 0.5) / n).max() < 2.2 / math.sqrt(n)  # Kolmogorov: p below 1e-4

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from airflock.core import random
 from airflock.core.agent import State
-from airflock.core.maths import norm
 from airflock.engine.passes.move import ATTEMPTS
 from airflock.engine.plain_world import Place
 from airflock.engine.tables import extents
@@ -70,8 +69,8 @@ def start_velocity(scenario: Scenario, seed: int, i: int) -> Vector:
         return ZERO
     gx, gy, gz, _ = normals(seed, random.START, 0, i, draw=1)
     gz = gz if scenario.dimensions == 3 else 0.0
-    f = scenario.start.speed / norm(gx, gy, gz)
-    return f * gx, f * gy, f * gz
+    velocity: Vector = start_rules.heading_off(gx, gy, gz, scenario.start.speed)
+    return velocity
 
 
 def normals(seed: int, stream: int, step: int, agent: int, draw: int = 0) -> tuple[float, float, float, float]:

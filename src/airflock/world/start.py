@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from airflock.core.maths import norm
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
@@ -55,6 +56,12 @@ class Parameters(Record):
 def spread(u, low, high):
     """A uniform number u in (0, 1) as a coordinate between low and high, m."""
     return low + (high - low) * u
+
+
+def heading_off(gx, gy, gz, speed):
+    """Velocity (m/s) at this speed (m/s) along three normal numbers: all directions are equally likely."""
+    f = speed / norm(gx, gy, gz)
+    return f * gx, f * gy, f * gz
 
 
 def in_vee(i, sx, sy, sz):

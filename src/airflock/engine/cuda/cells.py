@@ -10,13 +10,12 @@ from collections.abc import Iterable
 from typing import Any
 
 from airflock.core import random
-from airflock.core.maths import norm
 from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.passes import decide, move, scene
 from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.move import ATTEMPTS, beyond
+from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off
 from airflock.engine.plan import WHOLE, Plan
 from airflock.world import start as start_rules
 
@@ -127,7 +126,7 @@ def _common(build: CellBuilder) -> list[str]:
 def _begin(build: CellBuilder) -> list[str]:
     """Every agent at a random place, whoever else is there."""
     plan, axes = build.plan, build.plan.axes
-    philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
+    philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
     spread = build.source.name(start_rules.spread)
     draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
     draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
@@ -135,9 +134,7 @@ def _begin(build: CellBuilder) -> list[str]:
     if plan.start == "ball":
         draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
     draw += branch("free", ["placed = True", "break"])
-    turn = [f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)"]
-    turn += [f"gx, gy = {pair}(w0, w1); gz, g_ = {pair}(w2, w3)", f"gz = {build.z('gz')}"]
-    turn += [f"f = row_w.speed / {build.source.name(norm)}(gx, gy, gz)", "vx = f * gx; vy = f * gy; vz = f * gz"]
+    turn = [*heading_off(build, "row_w"), "vx = ux; vy = uy; vz = uz"]
     body = ["i = slot; placed = False; sx = ZERO; sy = ZERO; sz = ZERO; vx = ZERO; vy = ZERO; vz = ZERO"]
     body += [*loop(f"attempt in range({ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
     put = ("sx", "sy", "sz", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")

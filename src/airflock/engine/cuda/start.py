@@ -3,11 +3,10 @@
 from collections.abc import Iterable
 
 from airflock.core import random
-from airflock.core.maths import norm
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.move import ATTEMPTS, beyond, in_formation
+from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off, in_formation
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
@@ -42,7 +41,7 @@ def begin(build: CudaBuilder) -> list[str]:
         placed = in_formation(build, "s_{}", "row_w")
         placed += [*(f"{own(build, a)} = s_{a}" for a in axes), f"{own(build, 'vx')} = row_w.speed"]
         return [*lines, *agents(build, placed), "cuda.syncthreads()", *_heard_at_start(build)]
-    philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
+    philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
     spread = build.source.name(start_rules.spread)
     draw = [f"w0, w1, w2, w3 = {philox}(e, attempt, {random.START}, world, seed_low, seed_high)"]
     draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
@@ -62,13 +61,7 @@ def begin(build: CudaBuilder) -> list[str]:
     body = ["placed = False; sx = ZERO; sy = ZERO; sz = ZERO", *loop(f"attempt in range({ATTEMPTS})", draw)]
     body += branch("not placed", [*branch("tid == 0", ["statuses[block] = -(e + 1)"]), "return"])
     body += [*branch("tid == 0", seat), "cuda.syncthreads()"]
-    turn = [
-        f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)",
-        f"gx, gy = {pair}(w0, w1); gz, g_ = {pair}(w2, w3)",
-        "gz = gz" if plan.dimensions == 3 else "gz = ZERO",
-        f"f = row_w.speed / {build.source.name(norm)}(gx, gy, gz)",
-        *[f"{own(build, f'v{a}')} = f * g{a}" for a in axes],
-    ]
+    turn = [*heading_off(build, "row_w"), *[f"{own(build, f'v{a}')} = u{a}" for a in axes]]
     seated = [f"{own(build, a)} = {place(build, 'i', a)}" for a in axes]
     turning = [*branch("row_w.speed > ZERO", turn)]
     return [

@@ -2,7 +2,6 @@
 
 from airflock.body import wind
 from airflock.core import random
-from airflock.core.maths import norm
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.passes.perceive import normals
@@ -28,7 +27,7 @@ def begin(build: Builder) -> None:
         body = loop("i in range(n)", [*in_formation(build), "vx[i] = w.speed"])
         build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, body, "return 0")
         return
-    philox, uniform, pair = (build.source.name(f) for f in (random.draw, random.uniform, random.normal_pair))
+    philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
     spread = build.source.name(start_rules.spread)
     draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
     draw += [f"s{a} = {spread}({uniform}(w{c}), -w.extent_{a}, w.extent_{a})" for c, a in enumerate(axes)]
@@ -44,15 +43,19 @@ def begin(build: Builder) -> None:
     place = [f"{a}[i] = s{a}" for a in axes]
     draw += branch("free", [*place, "placed = True", "break"])
     body = ["placed = False", *loop(f"attempt in range({ATTEMPTS})", draw), "if not placed:", "    return -(i + 1)"]
-    turn = [
-        f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)",
-        f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
-        "gz = gz" if plan.dimensions == 3 else "gz = ZERO",
-        f"f = w.speed / {build.source.name(norm)}(gx, gy, gz)",
-        *[f"v{a}[i] = f * g{a}" for a in axes],
-    ]
+    turn = [*heading_off(build), *[f"v{a}[i] = u{a}" for a in axes]]
     lines += loop("i in range(n)", [*body, *branch("w.speed > ZERO", turn)])
     build.function("begin(n, m, row, whole, work, edges, spans, start, scene)", lines, "return 0")
+
+
+def heading_off(build: Builder, w: str = "w") -> list[str]:
+    """Lines that draw the velocity ux uy uz of agent i at the start; w : name of the arena's record."""
+    philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
+    return [
+        f"w0, w1, w2, w3 = {philox}(i, 0, {random.START + 256}, world, seed_low, seed_high)",
+        f"gx, gy = {pair}(w0, w1); gz, _ = {pair}(w2, w3)",
+        f"ux, uy, uz = {build.source.name(start_rules.heading_off)}(gx, gy, {build.z('gz')}, {w}.speed)",
+    ]
 
 
 def in_formation(build: Builder, put: str = "{}[i]", w: str = "w") -> list[str]:
