@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from airflock.aero.formation import forward, place_wings
-from airflock.aero.gradients import analytic, over_cells, slopes_of
+from airflock.aero.gradients import slopes
 from airflock.aero.lifting_line import shapes, solve
 from airflock.aero.wing import segments_of
 from airflock.core.maths import shorten
@@ -48,8 +48,7 @@ class Shared(NamedTuple):
 
 def workspace(n, wing, aero):
     """Scratch of the lifting line for n wings."""
-    cells = (aero.gradient == "cells") | (aero.gradient == "cells_frozen")
-    return shapes(n, segments_of(wing), "cells" if cells else "analytic")
+    return shapes(n, segments_of(wing), aero.gradient)
 
 
 def flock(n, x, y, z, vx, vy, aero, wing, work, shared):
@@ -57,26 +56,7 @@ def flock(n, x, y, z, vx, vy, aero, wing, work, shared):
     hx, hy = forward(n, vx, vy, wing)
     place_wings(n, x, y, z, hx, hy, wing, work)
     solve(n, work, wing)
-    if aero.gradient == "analytic":
-        slopes_of(n, work, wing)
-    if aero.gradient == "frozen":
-        slopes_of(n, work, wing)
-    for i in range(n):
-        gx, gy, gz = slope_of(i, n, work, wing, aero)
-        shared.slope_x[i] = gx * hx - gy * hy
-        shared.slope_y[i] = gx * hy + gy * hx
-        shared.slope_z[i] = gz
-
-
-def slope_of(i, n, work, wing, aero):
-    """Gradient of the drag of wing i in the air's axes, N/m (Eq. 8)."""
-    if aero.gradient == "cells":
-        return over_cells(i, n, work, wing, 0.0)
-    if aero.gradient == "cells_frozen":
-        return over_cells(i, n, work, wing, 1.0)
-    if aero.gradient == "analytic":
-        return analytic(i, n, work, wing, 0.0)
-    return analytic(i, n, work, wing, 1.0)
+    slopes(n, hx, hy, aero.gradient, wing, work, shared)
 
 
 def decide(shared, aero):

@@ -23,6 +23,32 @@ from airflock.aero.wing import apart, circulation_sum, lanes, pitch, segments_of
 from airflock.core.maths import FAR
 
 
+def slopes(n, hx, hy, gradient, wing, work, shared):
+    """Fill shared.slope_* with every wing's gradient of drag, N/m, where hx hy is the flock's forward."""
+    if gradient == "analytic":
+        slopes_of(n, work, wing)
+    if gradient == "frozen":
+        slopes_of(n, work, wing)
+    for i in range(n):
+        gx, gy, gz = slope_of(i, n, work, wing, gradient)
+        shared.slope_x[i] = gx * hx - gy * hy
+        shared.slope_y[i] = gx * hy + gy * hx
+        shared.slope_z[i] = gz
+
+
+def slope_of(i, n, work, wing, gradient):
+    """Gradient of the drag of wing i in the air's axes, N/m (Eq. 8); zero for any other way than these four."""
+    if gradient == "cells":
+        return over_cells(i, n, work, wing, 0.0)
+    if gradient == "cells_frozen":
+        return over_cells(i, n, work, wing, 1.0)
+    if gradient == "analytic":
+        return analytic(i, n, work, wing, 0.0)
+    if gradient == "frozen":
+        return analytic(i, n, work, wing, 1.0)
+    return 0.0, 0.0, 0.0
+
+
 def level(i, n, work):
     """Whether all wings fly at the height of wing i: then no drag changes to first order with it."""
     place = work.place

@@ -58,10 +58,10 @@ class Work(NamedTuple):
 
 
 def shapes(n, m, gradient):
-    """Shapes (rows, columns) of the scratch; gradient: "none", "cells" or "analytic"."""
+    """Shapes (rows, columns) of the scratch; gradient: "none" or a way of `gradients`."""
     w = lanes(m)
-    cells = gradient == "cells"
-    slope = gradient == "analytic"
+    cells = gradient in ("cells", "cells_frozen")
+    slope = gradient in ("analytic", "frozen")
     return Work(
         place=(3, n), alone=(3, w), response=(w, m), square=(m, 2 * m), tables=(n * n, m + w), circulation=(n, w),
         wash=(n, w), spare=(1, m), kept=(2 * n + 1 if cells else 1, m + w), trial=(n, w),

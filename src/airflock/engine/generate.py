@@ -1,8 +1,9 @@
 """From plain rules to the text of one driver module.
 
 The text of each rule is copied, global constants are inlined, float literals are cast to `real`, choices of a parameter
-record become constants, and every plain function that a rule calls comes along. The engine writes the loops around it
-(`passes`); the result is one file that depends on nothing but Numba.
+record become constants, and every plain function that a rule calls comes along; one that is handed a choice comes in a
+text of its own for each. The engine writes the loops around it (`passes`); the result is one file that depends on
+nothing but Numba.
 """
 
 import ast
@@ -18,6 +19,7 @@ from airflock.errors import RuleError
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True)'
+NOTHING: Mapping[str, str] = {}
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -35,24 +37,28 @@ class Source:
         self._names: dict[Any, str] = {}
         self._apart = False
 
-    def name(self, item: Any) -> str:
-        """Name in the driver of a plain function or a NamedTuple class; adds its text on first use."""
-        if item in self._names:
-            return self._names[item]
+    def name(self, item: Any, chosen: Mapping[str, str] = NOTHING) -> str:
+        """Name in the driver of a plain function or a NamedTuple class; adds its text on first use.
+
+        chosen : arguments of the function that are choices, by name; they become constants of its text
+        """
+        key = (item, *chosen.items()) if chosen else item
+        if key in self._names:
+            return self._names[key]
         drawn = inspect.isfunction(item) and item.__module__ == random_streams.__name__
         if drawn and item.__name__ in random_streams.PRIMITIVES:
             return str(item.__name__)  # bound by the device
         module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
-        name = base = f"{module}_{item.__name__}"
+        name = base = "_".join([module, item.__name__, *(text for text in chosen.values() if text.isidentifier())])
         count = 1
         while name in self._names.values():
             count += 1
             name = f"{base}{count}"
-        self._names[item] = name
+        self._names[key] = name
         if isinstance(item, type):
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
-            self.blocks.append(self._function(item, name))
+            self.blocks.append(self._function(item, name, chosen))
         return name
 
     def solver(self, rule: Callable[..., Any]) -> str:
@@ -69,17 +75,18 @@ class Source:
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(fields)!r})")
         return name
 
-    def _function(self, rule: Callable[..., Any], name: str) -> str:
+    def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
         law.check(rule)
         node = law.tree_of(rule)
         node.name = name
         node.returns = None
         node.args.defaults = []
+        node.args.args = [argument for argument in node.args.args if argument.arg not in chosen]
         for argument in node.args.args:
             argument.annotation = None
         if isinstance(node.body[0], ast.Expr) and isinstance(node.body[0].value, ast.Constant):
             node.body.pop(0)
-        rewritten = ast.fix_missing_locations(_Rewrite(rule, self).visit(node))
+        rewritten = ast.fix_missing_locations(_Rewrite(rule, self, chosen).visit(node))
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
@@ -97,12 +104,13 @@ def _depth(node: ast.AST) -> int:
 
 
 class _Rewrite(ast.NodeTransformer):
-    """Bind the free names of one rule and cast its literals."""
+    """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
 
-    def __init__(self, rule: Callable[..., Any], source: Source):
+    def __init__(self, rule: Callable[..., Any], source: Source, chosen: Mapping[str, str]):
         self.rule = rule
         self.source = source
-        self.local = set(rule.__code__.co_varnames)
+        self.chosen = chosen
+        self.local = set(rule.__code__.co_varnames) - set(chosen)
 
     def _real(self, node: ast.expr) -> ast.expr:
         return ast.Call(ast.Name("real", ast.Load()), [node], [])
@@ -147,6 +155,7 @@ class _Rewrite(ast.NodeTransformer):
         return node
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
+        self._hand_on(node)
         self.generic_visit(node)
         method = node.func
         if isinstance(method, ast.Attribute) and isinstance(method.value, ast.Name) and method.value.id == "percept":
@@ -162,6 +171,27 @@ class _Rewrite(ast.NodeTransformer):
             return folded
         return node
 
+    def _hand_on(self, node: ast.Call) -> None:
+        """Let a plain function that is handed a choice be called by the name of its text for this choice."""
+        called = self._found(node.func.id) if isinstance(node.func, ast.Name) else None
+        texts = [self._text(argument) for argument in node.args]
+        if isinstance(called, types.FunctionType) and any(text is not None for text in texts):
+            names = called.__code__.co_varnames
+            chosen = {name: text for name, text in zip(names, texts, strict=False) if text is not None}
+            node.func = ast.Name(self.source.name(called, chosen), ast.Load())
+            node.args = [argument for argument, text in zip(node.args, texts, strict=True) if text is None]
+
+    def _text(self, node: ast.expr) -> str | None:
+        """The choice that an expression is, if it is one."""
+        value: object = None
+        if isinstance(node, ast.Constant):
+            value = node.value
+        elif isinstance(node, ast.Name):
+            value = self.chosen.get(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            value = self.source.constants.get(node.value.id, {}).get(node.attr)
+        return value if isinstance(value, str) else None
+
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         self.generic_visit(node)
         inner = node.value
@@ -173,7 +203,9 @@ class _Rewrite(ast.NodeTransformer):
     def visit_Name(self, node: ast.Name) -> ast.expr:
         if node.id in self.local:
             return node
-        value = self.rule.__globals__.get(node.id, self._closure().get(node.id))
+        if node.id in self.chosen:
+            return ast.Constant(self.chosen[node.id])
+        value = self._found(node.id)
         if isinstance(value, bool) or value is None:
             return node
         if isinstance(value, float):
@@ -188,6 +220,10 @@ class _Rewrite(ast.NodeTransformer):
             f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
             "a plain function nor a NamedTuple"
         )
+
+    def _found(self, name: str) -> Any:
+        """What a free name of the rule stands for."""
+        return self.rule.__globals__.get(name, self._closure().get(name))
 
     def _closure(self) -> dict[str, Any]:
         cells = self.rule.__closure__ or ()

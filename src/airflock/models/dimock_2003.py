@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from airflock.aero.formation import forward, place_wings
-from airflock.aero.gradients import analytic, over_cells, slopes_of
+from airflock.aero.gradients import slopes
 from airflock.aero.lifting_line import induced_drag, shapes, solve
 from airflock.aero.wing import pitch, rounded, segments_of
 from airflock.core.maths import norm, shorten
@@ -95,8 +95,7 @@ class Shared(NamedTuple):
 
 def workspace(n, p, wing):
     """Scratch of the lifting line for n birds."""
-    scheme = {"cells": "cells", "cells_frozen": "cells", "analytic": "analytic", "frozen": "analytic", "none": "none"}
-    return shapes(n, segments_of(wing), scheme[p.gradient])
+    return shapes(n, segments_of(wing), p.gradient)
 
 
 def flock(n, x, y, z, vx, vy, p, wing, work, shared):
@@ -106,28 +105,7 @@ def flock(n, x, y, z, vx, vy, p, wing, work, shared):
     solve(n, work, wing)
     for i in range(n):
         shared.drag[i] = induced_drag(i, work, work.circulation, wing)
-    if p.gradient == "analytic":
-        slopes_of(n, work, wing)
-    if p.gradient == "frozen":
-        slopes_of(n, work, wing)
-    for i in range(n):
-        gx, gy, gz = slope_of(i, n, work, wing, p)
-        shared.slope_x[i] = gx * hx - gy * hy
-        shared.slope_y[i] = gx * hy + gy * hx
-        shared.slope_z[i] = gz
-
-
-def slope_of(i, n, work, wing, p):
-    """Gradient of the drag of bird i in the air's axes, N/m (Eq. 8)."""
-    if p.gradient == "cells":
-        return over_cells(i, n, work, wing, 0.0)
-    if p.gradient == "cells_frozen":
-        return over_cells(i, n, work, wing, 1.0)
-    if p.gradient == "analytic":
-        return analytic(i, n, work, wing, 0.0)
-    if p.gradient == "frozen":
-        return analytic(i, n, work, wing, 1.0)
-    return 0.0, 0.0, 0.0
+    slopes(n, hx, hy, p.gradient, wing, work, shared)
 
 
 def neighbour(dx, dy, dz, r, r2, p):
