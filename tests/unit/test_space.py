@@ -99,3 +99,13 @@ def test_unknown_keys_and_empty_spaces_are_told_together():
     assert len(faults) == 3
     assert any("did you mean space.model.p_rep?" in fault for fault in faults)
     assert read_space({}, FLOCK)[1] == ["space: nothing varies; give at least one key low and high"]
+
+
+def test_drag_descent_varies_only_where_it_is_flown():
+    table = {"aero": {"k_d": {"low": 0.01, "high": 1.0}}}
+    _, faults = read_space(table, FLOCK)
+    assert faults[0] == (
+        "space.aero.k_d is no number of vasarhelyi_2018/6ms, which has no section [aero]; "
+        "--set aero.k_d=VALUE adds drag descent to it"
+    )
+    assert space(table, load("vasarhelyi_2018/6ms", {"aero.k_d": 0.1})).keys == ("aero.k_d",)

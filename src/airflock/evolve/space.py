@@ -156,10 +156,11 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
-    """Key → declaration and present value of every number of a scenario."""
+    """Key → declaration and present value of every number of a scenario; drag descent's only where it is flown."""
     return {
         f"{section}.{name}".lstrip("."): (how, getattr(record, name))
         for section, record in records(scenario).items()
+        if section != "aero" or scenario.descends
         for name, how, _ in declarations(record)
         if isinstance(how, Quantity)
     }

@@ -23,6 +23,8 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
         if key not in known:
             near = get_close_matches(key, known, n=1, cutoff=0.5)
             hint = f"; did you mean space.{near[0]}?" if near else ""
+            if key.startswith("aero.") and not scenario.descends:
+                hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
             faults.append(f"space.{key} is no number of {scenario.name}{hint}")
             continue
         more = _entry_faults(key, entry, known[key][0], known)
