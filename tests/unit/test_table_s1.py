@@ -47,10 +47,15 @@ def test_hard_cores_and_short_alignment_are_told_apart():
 
 
 def test_independent_runs_are_alike_or_not():
-    best = SimpleNamespace(fitness=0.82, above=3000, candidates=15000)
-    close, far = SimpleNamespace(fitness=0.81), SimpleNamespace(fitness=0.70)
+    walls = {"model.v_shill": 19.5, "model.a_shill": 3.25}
+    best = SimpleNamespace(fitness=0.82, above=3000, candidates=15000, parameters=walls)
+    close, far = (SimpleNamespace(fitness=value, parameters=walls) for value in (0.81, 0.70))
     assert table_s1.alike(6, [best, close]).verdict == "reproduced"
-    assert table_s1.alike(6, [best, far]).verdict == "not reproduced"
+    found = table_s1.alike(6, [best, far])
+    assert found.verdict == "not reproduced"
+    assert found.reason == (
+        "0.820, 0.700; v_shill 19.5, 19.5 (printed 19.7), a_shill 3.25, 3.25 (printed 3.54)"
+    )  # whether a run that differs has found the printed optimum
     assert table_s1.working(6, best).ours == 3000
 
 

@@ -171,11 +171,16 @@ def alike(v: int, runs: Sequence[Result]) -> Claim:
     """Whether independent runs come to the same fitness."""
     values = [result.fitness for result in runs]
     apart = max(values) - min(values)
+    printed = optimum(v).parameters
+    walls = ", ".join(
+        f"{name} {', '.join(f'{result.parameters[key]:.3g}' for result in runs)} (printed {getattr(printed, name):g})"
+        for name, key in (("v_shill", "model.v_shill"), ("a_shill", "model.a_shill"))
+    )
     return Claim(
         id=f"s1.alike.{v}ms",
         statement=f"independent runs at {v} m/s come to very similar solutions: fitness of best less worst run",
         source="Results, Optimization",
         test=f"at most {ALIKE}",
         ours=apart, runs=len(runs),
-        **judged(apart <= ALIKE, ", ".join(f"{value:.3f}" for value in values)),
+        **judged(apart <= ALIKE, f"{', '.join(f'{value:.3f}' for value in values)}; {walls}"),
     )  # fmt: skip
