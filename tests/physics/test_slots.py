@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -45,3 +46,17 @@ def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(name, seed)
     np.testing.assert_allclose(one.frames, two.frames, rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(one.state, two.state, rtol=0.0, atol=1e-8)
     assert two.values == pytest.approx(one.values, rel=1e-7, abs=1e-9, nan_ok=True)
+
+
+def test_agents_that_decide_side_by_side_gather_shapes_of_their_own(seed):
+    """Each casts at what stands around it, whoever decides in another thread meanwhile."""
+    found = load("kidger/city", {"agents": 400, "duration": 1.2, "start.separation": 0.5})
+    plan = plan_of(found, precision=64, grid=True)
+    most = numba.get_num_threads()
+    flown = []
+    for threads in (1, most, most):
+        numba.set_num_threads(threads)
+        flown.append(cpu.fly(plan, tables(found, plan, seed)))
+    numba.set_num_threads(most)
+    assert flown[0].values["rays"] > 0.0
+    assert all((one.state == flown[0].state).all() for one in flown)

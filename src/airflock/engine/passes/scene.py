@@ -38,6 +38,9 @@ def look(build: Builder, model: Model) -> list[str]:
     if model.sight is None:
         return parts(*carried(build))
     lines = [*parts(*CAST[:-1]), "counts[0] = 0"]
+    if build.plan.grid:  # decided side by side: each agent gathers into memory of its own
+        own = f"near = np.empty({NEAR}, np.int64); counts = np.zeros(2, np.int64)"
+        lines = [*parts(*(part for part in CAST[:-1] if part not in ("near", "counts"))), own]
     if not sees(build):
         return [*lines, "gathered = 0"]
     position = f"mx[i], my[i], {build.z('mz[i]')}"
