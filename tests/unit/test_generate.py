@@ -5,6 +5,7 @@ import ast
 import pytest
 
 from airflock.engine.generate import Source
+from airflock.errors import RuleError
 
 
 def shape(form, x):
@@ -48,3 +49,63 @@ def test_names_of_texts_stay_apart():
     assert source.name(shape, {"form": "square"}) != source.name(shape, {"form": "cube"}) != source.name(shape)
     assert source.name(shape, {"form": "a b"}) != source.name(shape, {"form": "a c"})  # no names, numbered instead
     assert source.name(shape, {"form": "square"}) == source.name(shape, {"form": "square"})
+
+
+ROUND = True
+
+
+def nested(x, p):
+    if p.form == "a":
+        x = x + 1.0
+        if p.kind == "b":
+            total = 0.0
+            for _ in range(3):
+                total = total + x
+            return total
+    return x * p.unused
+
+
+def scaled(x, by=2.0):
+    return by * x if ROUND else x
+
+
+def usual(x):
+    return scaled(x) + scaled(x, 3.0)
+
+
+def unknown(x):
+    return x * wieght  # noqa: F821
+
+
+def rebound(form, x):
+    form = 1.0  # noqa: F841
+    return x
+
+
+def rebinds(x, p):
+    return rebound(p.form, x)
+
+
+def test_choices_within_choices_leave_nothing_unreachable_and_loops_are_seen():
+    source = Source("@njit(**JIT)", {"p": {"form": "a", "kind": "b"}})
+    source.name(nested)
+    assert "unused" not in source.blocks[0]
+    assert source.blocks[0].startswith('@njit(inline="always"')
+
+
+def test_defaults_and_truths_reach_a_driver():
+    source = Source("", {})
+    name = source.name(usual)
+    space = {"real": float}
+    exec("\n".join(source.blocks), space)
+    assert space[name](4.0) == usual(4.0) == 20.0
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [(unknown, "uses wieght, which is neither"), (rebinds, "rule rebound sets form, a choice that it is handed")],
+)
+def test_what_no_driver_can_hold_is_one_line(rule, said):
+    with pytest.raises(RuleError) as found:
+        Source("", {"p": {"form": "square"}}).name(rule)
+    assert said in str(found.value) and "\n" not in str(found.value)

@@ -46,6 +46,19 @@ def shadowed(dx, r):
     return min(least, r)
 
 
+def doubled(dx):
+    real = 2.0 * dx
+    return real
+
+
+def extreme(dx, r):
+    return max((dx, r))
+
+
+def walrus(dx):
+    return (far := dx * dx) + far
+
+
 def test_a_lawful_rule_passes():
     assert law.faults(lawful) == []
 
@@ -58,6 +71,9 @@ def test_a_lawful_rule_passes():
         (raises, "Raise is not allowed"),
         (foreign, "maths.norm: only math may be used"),
         (shadowed, "least is what the engine calls here"),
+        (doubled, "real is what the engine calls here"),
+        (extreme, "max of fewer than two numbers; write max(a, b)"),
+        (walrus, "NamedExpr is not allowed"),
     ],
 )
 def test_a_fault_names_file_line_and_reason(rule, said):
@@ -135,3 +151,19 @@ def test_rules_of_a_model_are_plain_python():
     p = module.Parameters()
     sums = module.neighbour(**{name: 1.0 for name in asks(module.neighbour, "neighbour") if name != "p"}, p=p)
     assert all(isinstance(value, float) and math.isfinite(value) for value in sums)
+
+
+def test_what_the_compiler_refuses_is_one_line():
+    from airflock.engine.simulate import score_flight
+    from airflock.models import viragh_2014
+    from airflock.scenarios.files import load
+
+    def decide(own, p):
+        return own.vx.as_integer_ratio()[0] * 1.0, own.vy, 0.0
+
+    law_ = {"Parameters": viragh_2014.Parameters, "COMMAND": "velocity", "decide": decide, "__name__": "mine"}
+    found = load("viragh_2014/4ms", {"duration": 1.0}, law=law_)
+    with pytest.raises(RuleError) as fault:
+        score_flight(found, 0)
+    assert "does not compile" in str(fault.value) and "as_integer_ratio" in str(fault.value)
+    assert "\n" not in str(fault.value)

@@ -4,6 +4,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -20,6 +21,7 @@ from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
+from airflock.errors import RuleError
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
 LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
@@ -69,16 +71,30 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
     values, sums = _sums(plan)
     frames = np.zeros((whole["steps"] // whole["sample_every"] + 1, 3 * dims, n), real) if plan.record else None
     scene = _scene(tables)
-    status = driver.fly(
-        tables.row, tables.whole, tables.faces, tables.edges, tables.spans, scene,
-        np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
-        work, words, past, store, gust, mem, memory, labels, values, sums,
-        np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
-        *grid.memory(plan, n, _rows),
-    )  # fmt: skip
+    with compiling(plan.model.name):
+        status = driver.fly(
+            tables.row, tables.whole, tables.faces, tables.edges, tables.spans, scene,
+            np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
+            work, words, past, store, gust, mem, memory, labels, values, sums,
+            np.zeros((1, 3 * dims, n), real) if frames is None else frames, *scratch(plan, tables.row, n),
+            *grid.memory(plan, n, _rows),
+        )  # fmt: skip
     if frames is not None and plan.stop:
         frames = frames[: int(sums[len(columns(plan.metrics))])]
     return Flown(combined(plan, sums) | goals_reached(plan, scene[7]), frames, work[: 2 * dims, :n].copy(), int(status))
+
+
+@contextmanager
+def compiling(model: str) -> Iterator[None]:
+    """Turn what the compiler says of a rule into one line. Raises RuleError."""
+    from numba.core.errors import NumbaError
+
+    try:
+        yield
+    except NumbaError as fault:
+        lines = [line.strip() for line in str(fault).splitlines()]
+        said = next((line for line in lines if line and not line.startswith(("Failed in", "During", "File"))), "")
+        raise RuleError(f"model {model}: a rule does not compile, though plain Python takes it: {said}") from fault
 
 
 def measure_frames(

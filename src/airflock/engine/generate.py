@@ -19,6 +19,7 @@ from airflock.errors import RuleError
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True)'
+GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
 NOTHING: Mapping[str, str] = {}
 INLINED = '@njit(inline="always", **JIT)'
 
@@ -60,6 +61,10 @@ class Source:
         else:
             self.blocks.append(self._function(item, name, chosen))
         return name
+
+    def names(self) -> set[str]:
+        """Names in the driver of all that has come so far."""
+        return set(self._names.values())
 
     def solver(self, rule: Callable[..., Any]) -> str:
         """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
@@ -149,8 +154,11 @@ class _Rewrite(ast.NodeTransformer):
     def visit_If(self, node: ast.If) -> Any:
         node.test = self.visit(node.test)
         if isinstance(node.test, ast.Constant):
-            kept = node.body if node.test.value else node.orelse
-            return [self.visit(statement) for statement in kept] or ast.Pass()
+            kept: list[ast.stmt] = []
+            for statement in node.body if node.test.value else node.orelse:
+                found = self.visit(statement)
+                kept += found if isinstance(found, list) else [found]
+            return kept or ast.Pass()
         self.generic_visit(node)
         return node
 
@@ -172,8 +180,12 @@ class _Rewrite(ast.NodeTransformer):
         return node
 
     def _hand_on(self, node: ast.Call) -> None:
-        """Let a plain function that is handed a choice be called by the name of its text for this choice."""
+        """Name all arguments of a call; a plain function that is handed a choice is called by its text for this one."""
         called = self._found(node.func.id) if isinstance(node.func, ast.Name) else None
+        if isinstance(called, types.FunctionType) and not node.keywords:  # a driver knows no defaults
+            usual = called.__defaults__ or ()
+            missing = called.__code__.co_argcount - len(node.args)
+            node.args += [ast.Constant(value) for value in usual[max(0, len(usual) - missing) :]] if missing > 0 else []
         texts = [self._text(argument) for argument in node.args]
         if isinstance(called, types.FunctionType) and any(text is not None for text in texts):
             names = called.__code__.co_varnames
@@ -204,10 +216,17 @@ class _Rewrite(ast.NodeTransformer):
         if node.id in self.local:
             return node
         if node.id in self.chosen:
+            if isinstance(node.ctx, ast.Store):
+                raise RuleError(
+                    f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} sets {node.id}, a choice that it is "
+                    "handed; give the variable another name"
+                )
             return ast.Constant(self.chosen[node.id])
-        value = self._found(node.id)
-        if isinstance(value, bool) or value is None:
+        if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
+        value = self._found(node.id)
+        if isinstance(value, bool):
+            return ast.Constant(value)
         if isinstance(value, float):
             return self._real(ast.Constant(value))
         if isinstance(value, int):
@@ -218,11 +237,11 @@ class _Rewrite(ast.NodeTransformer):
             return node
         raise RuleError(
             f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
-            "a plain function nor a NamedTuple"
+            "a plain function nor a NamedTuple" + ("; it is not defined" if value is None else "")
         )
 
     def _found(self, name: str) -> Any:
-        """What a free name of the rule stands for."""
+        """What a free name of the rule stands for; None if for nothing."""
         return self.rule.__globals__.get(name, self._closure().get(name))
 
     def _closure(self) -> dict[str, Any]:

@@ -10,7 +10,10 @@ from airflock.errors import RuleError
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
 RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
-FORBIDDEN = (ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp)
+TAKEN = "real"  # what a driver makes of every literal
+FORBIDDEN = (
+    ast.Try, ast.With, ast.Raise, ast.Lambda, ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp, ast.NamedExpr,
+)  # fmt: skip
 
 
 def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
@@ -37,10 +40,14 @@ def faults(rule: Callable[..., Any]) -> list[str]:
 
     if node.decorator_list:
         complain(node, "has a decorator; a rule is a plain function")
+    if TAKEN in code.co_varnames:
+        complain(node, f"{TAKEN} is what the engine calls here; give the variable another name")
     for item in ast.walk(node):
         called = RESERVED.get(getattr(item.func, "id", "")) if isinstance(item, ast.Call) else None
         if called in code.co_varnames:
             complain(item, f"{called} is what the engine calls here; give the variable another name")
+        if isinstance(item, ast.Call) and getattr(item.func, "id", "") in RESERVED and len(item.args) < 2:
+            complain(item, f"{item.func.id} of fewer than two numbers; write {item.func.id}(a, b)")  # type: ignore[attr-defined]
         if isinstance(item, FORBIDDEN):
             complain(item, f"{type(item).__name__} is not allowed in a rule")
         if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, ast.LShift, ast.RShift, ast.BitAnd)):
