@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -15,11 +16,13 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.recordings.layout import dataset
+from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | os.PathLike[str],
     seed: int = 0,
     *,
     precision: int = 32,
@@ -29,14 +32,16 @@ def simulate(
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
-    seed      : any integer from 0; the same seed gives the same bits
+    scenario  : or the name of a preset or scenario file, which is then loaded
+    seed      : any integer from 0 to 2^64 - 1; the same seed gives the same bits
     precision : 32 or 64 bits per number
     start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
     device    : cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked
     Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
-    scenario = scenario.in_flight(seed)
+    seed = sound_seed(seed)
+    scenario = loaded(scenario).in_flight(seed)
     device = picked([scenario], device, precision=precision, record=True, say=say)
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
