@@ -5,6 +5,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -55,7 +56,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
     text = flight(plan_of(scenario, precision=precision, record=True))
     return {
-        "airflock_scenario": json.dumps(plain(scenario.document)),
+        "airflock_scenario": json.dumps(flown_document(scenario)),
         "airflock_name": scenario.name,
         "airflock_metrics": json.dumps(asdict(scenario.measured_by())),
         "airflock_seed": seed,
@@ -65,6 +66,18 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
         "airflock_toolchain": toolchain(),
         "airflock_processor": processor(),
     }
+
+
+def flown_document(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain values; a law in a file of its own with its whole path, so that it is found from anywhere.
+
+    A law that was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
+    """
+    document: dict[str, Any] = plain(scenario.document)
+    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        document["model"]["kind"] = str(law.absolute())
+    return document
 
 
 def processor() -> str:
