@@ -16,6 +16,7 @@ from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
+from airflock.metrics import nearest
 from airflock.recordings.layout import frames_of
 from airflock.scenarios.files import MODELS, loaded, make
 from airflock.scenarios.scenario import Scenario
@@ -76,6 +77,8 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     names = [name for name, _, _ in columns(plan.metrics)]
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times, columns=names)
+    if frames.shape[2] == 1:  # no pair, no distance
+        course[[name for name in nearest.PAIRED if name in names]] = np.nan
     return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
 
 
