@@ -1,5 +1,7 @@
 """Recordings: layout, scores of flights and logs, and what is refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -78,7 +80,6 @@ def test_what_is_no_recording_is_refused_with_the_reason(circling, damage, words
 
 def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
     import importlib.util
-    from pathlib import Path
 
     path = Path(__file__).parents[2] / "examples" / "own_rule.py"
     spec = importlib.util.spec_from_file_location("own_rule", path)
@@ -90,6 +91,36 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
     file = airflock.save(airflock.simulate(scenario, 4, precision=64), tmp_path / "own.nc")
     scored = airflock.score(airflock.load_recording(file)).iloc[0]
     assert scored[direct.index].to_numpy() == pytest.approx(direct.to_numpy(), abs=1e-9)
+
+
+def test_a_law_in_a_file_is_found_again_from_anywhere_and_no_other_of_its_name_is_taken(tmp_path, monkeypatch):
+    from airflock.models import viragh_2014
+    from airflock.recordings.files import fly_again
+
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "mine.py").write_text(Path(viragh_2014.__file__).read_text())
+    (tmp_path / "sub" / "own.toml").write_text('duration = 2.0\nagents = 5\n[model]\nkind = "mine.py"\n')
+    monkeypatch.chdir(tmp_path)
+    scenario = airflock.load("sub/own.toml")
+    file = airflock.save(airflock.simulate(scenario, 1), tmp_path / "sub.nc")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "mine.py").write_text("raise ValueError('another law')\n")
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    again = airflock.load_recording(file)
+    assert airflock.score(again)["phi_vel"][0] > 0.0 and fly_again(again)[0]
+    assert scenario.document["model"]["kind"] == "mine.py"
+
+
+@pytest.mark.parametrize("precision", [32, 64])
+def test_one_agent_has_no_nearest_neighbour(precision):
+    alone = airflock.load("vasarhelyi_2018/4ms", {"duration": 2.0, "agents": 1, "metrics.collision_period": 0.2})
+    flight = airflock.simulate(alone, precision=precision)
+    flown = [airflock.score(alone, precision=precision), airflock.score(flight), over_time(flight)]
+    if precision == 64:
+        flown.append(airflock.score(alone, device="python"))
+    for found in flown:
+        assert found[["r_min", "r_min_mean"]].isna().all(axis=None) and found["phi_vel"].notna().all()
+        assert not (found > 1e12).any(axis=None)
 
 
 def test_same_sampling_gives_the_same_numbers_from_the_kernel_and_from_the_recording():

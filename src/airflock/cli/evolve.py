@@ -42,7 +42,7 @@ def evolve(
     """
     from airflock.errors import StudyError
     from airflock.evolve.folder import open_folder
-    from airflock.evolve.run import executor_for, on_device, run, study_of
+    from airflock.evolve.run import check_timeout, executor_for, on_device, run, study_of
     from airflock.evolve.sensitivity import METHODS
 
     given = {
@@ -60,6 +60,7 @@ def evolve(
     )
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")
+    check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
     begin = time.perf_counter()

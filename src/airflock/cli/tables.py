@@ -34,11 +34,11 @@ def _moments(given: Sequence[Any]) -> tuple[float, float, float]:
     return mean, spread, 0.5 * (values[(n - 1) // 2] + values[n // 2])
 
 
-def number(x: Any) -> str:
-    """A number with four significant digits, `never` where it is nan; a list of numbers side by side."""
+def number(x: Any, missing: str = "never") -> str:
+    """A number with four significant digits, `missing` where it is nan (a time's `never`); a list side by side."""
     if isinstance(x, (list, tuple)):
-        return ", ".join(f"{v:.3g}" if v == v else "never" for v in x)
-    return f"{x:.4g}" if x == x else "never"
+        return ", ".join(f"{v:.3g}" if v == v else missing for v in x)
+    return f"{x:.4g}" if x == x else missing
 
 
 def score_table(
@@ -64,11 +64,12 @@ def score_table(
     table.add_column("meaning", style="dim")
     for key in found["mean"]:
         unit, meaning = about.get(key, ("", ""))
-        mean = number(found["mean"][key])
+        missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
+        mean = number(found["mean"][key], missing)
         spread = found["std"][key]
         single = len(rows) == 1 or isinstance(spread, list) or spread != spread
         cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
-        cells += [number(found["median"][key])] if len(rows) > 1 else []
+        cells += [number(found["median"][key], missing)] if len(rows) > 1 else []
         if published:
             entry = published.get(key)
             spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"

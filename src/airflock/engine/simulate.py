@@ -20,6 +20,7 @@ from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 
 def plan_of(
@@ -100,6 +101,7 @@ def fly(
 
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
+    seed = sound_seed(seed)
     scenario = scenario.in_flight(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
@@ -219,6 +221,7 @@ def score_flights(
 
     device : cpu, cuda, python (no compiler, double precision), or auto, which tells `say` what it picked
     """
+    seeds = [sound_seed(seed) for seed in seeds]
     if device != "cpu":
         plans = [plan_of(scenario, precision=precision) for scenario in scenarios]
         device = _choice(device, scenarios, plans, say)

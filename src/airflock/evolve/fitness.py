@@ -1,6 +1,7 @@
 """Fitness of a candidate: from the order parameters of its flights to one number, or to several for a Pareto front."""
 
 import math
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,7 +37,7 @@ class Objective:
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
             raise StudyError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
-        value = float(values[self.name] if self.own is None else self.own(values))
+        value = float(values[self.name]) if self.own is None else own_value(self.own, self.name, values)
         return value if math.isfinite(value) else math.nan
 
     def of_candidate(self, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
@@ -51,6 +52,20 @@ class Objective:
         if self.over_seeds == "quantile":
             return float(np.quantile(found, self.quantile if self.maximise else 1.0 - self.quantile))
         return math.fsum(found) / len(found)
+
+
+def own_value(own: Own, name: str, values: Mapping[str, Any]) -> float:
+    """What a function of the user's own gives for one flight; whatever goes wrong in it is one line with its place."""
+    try:
+        return float(own(values))
+    except Exception as fault:  # the user's own function may fail in any way
+        last = traceback.extract_tb(fault.__traceback__)[-1]
+        code = getattr(own, "__code__", None)
+        place = f"{last.filename}:{last.lineno}"
+        if last.filename == __file__ and code is not None:  # it returned, but no number
+            place = f"{code.co_filename}:{code.co_firstlineno}"
+        reason = " ".join(str(fault).split())
+        raise StudyError(f"objective {name}: {place}: {type(fault).__name__}: {reason}") from fault
 
 
 def losses(rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]) -> NDArray[np.float64]:

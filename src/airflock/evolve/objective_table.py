@@ -46,6 +46,15 @@ def read_objectives(
     if not found:
         name = USUAL.get(scenario.metrics.kind, "fitness")
         found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
+    if text and not any(objective.own for objective in found):
+        names = [
+            name
+            for name, function in own.items()
+            if getattr(function, "__module__", "") == Path(str(table["own"])).stem
+        ]
+        write = f"write objective.maximise = '{names[0]}'" if names else "it holds no function"
+        others = f" (it holds {', '.join(names)})" if len(names) > 1 else ""
+        faults.append(f"objective.own = {table['own']!r}: no objective names a function of this file; {write}{others}")
     return tuple(found), faults
 
 

@@ -67,6 +67,7 @@ def evolve(
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
+    check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(folder, study, resume=resume)
     executor = executor_for(study, scheduler, threads, timeout)
@@ -113,6 +114,12 @@ def score_of(study: Study) -> Score:
         return score_flight(with_parameters(study.scenario, parameters), seed, precision=precision)
 
     return score
+
+
+def check_timeout(timeout: float | None) -> None:
+    """Refuse a time limit in which no flight could fly."""
+    if timeout is not None and not timeout > 0.0:
+        raise StudyError(f"timeout = {timeout:g} s is not positive")
 
 
 def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:

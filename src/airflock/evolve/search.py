@@ -143,6 +143,9 @@ def evaluate(
     ]
     for landed in executor.fly(missing):
         store.land(batch, landed)
+        if landed.values is not None and all(values is None for values in flown.values()):
+            for objective in study.objectives:  # a fault in one shows at the first flight, not after a generation
+                objective.of_flight(landed.values)
         flown[landed.flight.candidate, landed.flight.repeat] = landed.values
         if note:
             note(True)

@@ -13,6 +13,7 @@ REPORTS = {
 
 REDUCE = {"nearest2": "min", "least": "min"}  # of Pair, and of Agent
 OVER_TIME = {"r_min": "min"}
+PAIRED = ("r_min_mean", "r_min")  # undefined for one agent
 
 
 class Pair(NamedTuple):
@@ -52,3 +53,10 @@ def agent(pair, q):
 def sample(agents, n):
     """Mean and minimum over the n agents."""
     return Sample(agents.spacing / n, agents.least, agents.disconnected)
+
+
+def total(over_time):
+    """Nan where there never was a pair: one agent has no nearest neighbour."""
+    if over_time["r_min"] < 0.5 * math.sqrt(FAR):
+        return dict(over_time)
+    return {**over_time, **dict.fromkeys(PAIRED, math.nan)}

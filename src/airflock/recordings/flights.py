@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -15,11 +17,13 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.recordings.layout import dataset
+from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | os.PathLike[str],
     seed: int = 0,
     *,
     precision: int = 32,
@@ -29,14 +33,16 @@ def simulate(
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
-    seed      : any integer from 0; the same seed gives the same bits
+    scenario  : or the name of a preset or scenario file, which is then loaded
+    seed      : any integer from 0 to 2^64 - 1; the same seed gives the same bits
     precision : 32 or 64 bits per number
     start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
     device    : cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked
     Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
-    scenario = scenario.in_flight(seed)
+    seed = sound_seed(seed)
+    scenario = loaded(scenario).in_flight(seed)
     device = picked([scenario], device, precision=precision, record=True, say=say)
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
@@ -50,7 +56,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
     text = flight(plan_of(scenario, precision=precision, record=True))
     return {
-        "airflock_scenario": json.dumps(plain(scenario.document)),
+        "airflock_scenario": json.dumps(flown_document(scenario)),
         "airflock_name": scenario.name,
         "airflock_metrics": json.dumps(asdict(scenario.measured_by())),
         "airflock_seed": seed,
@@ -60,6 +66,18 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
         "airflock_toolchain": toolchain(),
         "airflock_processor": processor(),
     }
+
+
+def flown_document(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as plain values; a law in a file of its own with its whole path, so that it is found from anywhere.
+
+    A law that was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
+    """
+    document: dict[str, Any] = plain(scenario.document)
+    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    if law.suffix == ".py" and law.is_file():
+        document["model"]["kind"] = str(law.absolute())
+    return document
 
 
 def processor() -> str:

@@ -1,6 +1,7 @@
 """Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
 
 import json
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -15,13 +16,15 @@ from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
+from airflock.metrics import nearest
 from airflock.recordings.layout import frames_of
-from airflock.scenarios.files import MODELS, make
+from airflock.scenarios.files import MODELS, loaded, make
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seeds
 
 
 def score(
-    what: Scenario | xr.Dataset,
+    what: Scenario | str | os.PathLike[str] | xr.Dataset,
     seeds: int | Iterable[int] = 1,
     *,
     settings: Mapping[str, Any] | None = None,
@@ -33,7 +36,8 @@ def score(
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
-    what     : scenario (flown with `seeds`: a number of them, or the seeds themselves), or recording
+    what     : scenario, or the name of a preset or scenario file (flown with `seeds`: a number of them, or the seeds
+               themselves), or recording
     settings : for a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with
     threads  : flights side by side; by default one per core
     done     : called after each flight
@@ -42,9 +46,9 @@ def score(
     if isinstance(what, xr.Dataset):
         values, _ = measure(what, settings)
         return pd.DataFrame([values])
-    found = list(range(seeds)) if isinstance(seeds, int) else list(seeds)
+    scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
-    rows = score_flights([what] * len(found), found, **options)
+    rows = score_flights([scenario] * len(found), found, **options)
     return pd.DataFrame(rows, index=pd.Index(found, name="seed"))
 
 
@@ -73,6 +77,8 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     names = [name for name, _, _ in columns(plan.metrics)]
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times, columns=names)
+    if frames.shape[2] == 1:  # no pair, no distance
+        course[[name for name in nearest.PAIRED if name in names]] = np.nan
     return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
 
 

@@ -33,7 +33,7 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
 
     settings : keys like "model.p_rep" with the values that replace the file's
     law      : a flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead
-               of the file's; its parameters start from their defaults
+               of the file's, or one by its name or its file; its parameters start from their defaults
     Raises ScenarioError with one line per fault.
     """
     known = presets()
@@ -50,8 +50,24 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
         raise ScenarioError([f"{where}: {fault}"]) from fault
     if law is None:
         return make(document, where, settings, folder=path.parent)
+    if isinstance(law, (str, os.PathLike)):
+        kind = str(Path(law).absolute()) if str(law).endswith(".py") else str(law)
+        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings)
+    if not isinstance(law, (Model, Mapping)) and not hasattr(law, "__dict__"):
+        raise ScenarioError(
+            [f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
+        )
     own = law if isinstance(law, Model) else model(law)
     return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own)
+
+
+def loaded(what: Any) -> Scenario:
+    """A scenario, or the one that a name stands for."""
+    if isinstance(what, Scenario):
+        return what
+    if isinstance(what, (str, os.PathLike)):
+        return load(what)
+    raise ScenarioError([f"{type(what).__name__} is no scenario; give a Scenario, a preset's name or a scenario file"])
 
 
 def make(

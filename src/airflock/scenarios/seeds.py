@@ -1,0 +1,34 @@
+"""Seeds: which numbers can be one. A seed is the key of the random numbers, two words of 32 bits."""
+
+import operator
+from collections.abc import Iterable
+from typing import Any
+
+from airflock.errors import ParameterError
+
+LARGEST = 2**64 - 1
+
+
+def sound_seed(seed: Any) -> int:
+    """A seed as a plain integer; any other number would fly as if it were another seed."""
+    try:
+        found = operator.index(seed)
+    except TypeError:
+        raise ParameterError(f"seed = {seed!r} is not a whole number in [0, 2^64 - 1]") from None
+    if not 0 <= found <= LARGEST:
+        raise ParameterError(f"seed = {found} lies outside [0, 2^64 - 1]")
+    return found
+
+
+def sound_seeds(seeds: int | Iterable[int]) -> list[int]:
+    """Seeds of several flights: so many of them from 0 on, or those that are given."""
+    if isinstance(seeds, Iterable):
+        found = [sound_seed(seed) for seed in seeds]
+    else:
+        try:
+            found = list(range(operator.index(seeds)))
+        except TypeError:
+            raise ParameterError(f"seeds = {seeds!r} is no whole number and no list of seeds") from None
+    if not found:
+        raise ParameterError(f"seeds = {seeds!r}: nothing would be flown; give at least 1")
+    return found

@@ -1,0 +1,86 @@
+"""The Python names as a notebook uses them: names instead of scenarios, laws by name, seeds that can be one."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.errors import ParameterError, ScenarioError
+
+NAME = "vasarhelyi_2018/4ms"
+
+
+@pytest.fixture(scope="module")
+def short():
+    return airflock.load(NAME, {"duration": 1.0, "agents": 4})
+
+
+def test_names_and_files_fly_like_the_scenarios_that_they_stand_for(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text('duration = 1.0\nagents = 4\n[model]\nkind = "vicsek_1995"\n')
+    scenario = airflock.load(path)
+    assert airflock.score(path).equals(airflock.score(str(path))) and len(airflock.score(path)) == 1
+    assert airflock.score(path, [2]).equals(airflock.score(scenario, [2]))
+    assert airflock.simulate(path, 2).identical(airflock.simulate(scenario, 2))
+    for door in (airflock.score, airflock.simulate):
+        with pytest.raises(ScenarioError, match="did you mean vasarhelyi_2018/4ms?"):
+            door("vasarhelyi_2018/4m")
+        with pytest.raises(ScenarioError, match="int is no scenario; give a Scenario, a preset's name"):
+            door(7)
+
+
+def test_a_law_may_be_given_by_its_name_or_its_file(tmp_path):
+    from airflock.models import viragh_2014
+
+    by_name = airflock.load(NAME, law="viragh_2014")
+    assert by_name.model.name == "viragh_2014" and by_name.document["model"] == {"kind": "viragh_2014"}
+    path = tmp_path / "mine.py"
+    path.write_text(Path(viragh_2014.__file__).read_text())
+    assert airflock.load(NAME, law=path).model.name == airflock.load(NAME, law=str(path)).model.name == "mine"
+    with pytest.raises(ScenarioError, match="'vicsek' is no model; did you mean vicsek_1995?"):
+        airflock.load(NAME, law="vicsek")
+    with pytest.raises(ScenarioError, match=r"law = 3 is no law; give a module, a class, a mapping, or one of"):
+        airflock.load(NAME, law=3)
+
+
+@pytest.mark.parametrize(
+    ("seed", "said"),
+    [
+        (1.5, r"seed = 1.5 is not a whole number in \[0, 2\^64 - 1\]"),
+        ("one", "seed = 'one' is not a whole number"),
+        (-1, r"seed = -1 lies outside \[0, 2\^64 - 1\]"),
+        (1 + 2**64, r"seed = 18446744073709551617 lies outside \[0, 2\^64 - 1\]"),
+    ],
+)
+def test_what_would_fly_as_another_seed_is_refused(short, seed, said):
+    with pytest.raises(ParameterError, match=said):
+        airflock.simulate(short, seed)
+    with pytest.raises(ParameterError, match=said):
+        airflock.score(short, [0, seed])
+
+
+def test_the_largest_seed_flies_and_is_kept_in_a_file(short, tmp_path):
+    flight = airflock.simulate(short, 2**64 - 1)
+    again = airflock.load_recording(airflock.save(flight, tmp_path / "a.nc"))
+    assert int(again.attrs["airflock_seed"]) == 2**64 - 1
+    assert not np.array_equal(flight.position, airflock.simulate(short, 2**32 - 1).position)
+    assert airflock.score(short, np.int64(2)).equals(airflock.score(short, np.arange(2)))
+
+
+@pytest.mark.parametrize(
+    ("seeds", "said"),
+    [(0, "seeds = 0: nothing would be flown"), ([], "seeds = ..: nothing"), (-2, "give at least 1"), (1.5, "no whole")],
+)
+def test_a_score_of_no_flight_is_refused(short, seeds, said):
+    with pytest.raises(ParameterError, match=said):
+        airflock.score(short, seeds)
+
+
+def test_the_command_refuses_seeds_that_are_none():
+    command = [sys.executable, "-m", "airflock", "run", NAME, "--duration", "1", "--first-seed", "9" * 23]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr == f"airflock: seed = {'9' * 23} lies outside [0, 2^64 - 1]\n"
