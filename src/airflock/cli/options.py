@@ -58,6 +58,21 @@ def value(text: str) -> Any:
         return text.strip()
 
 
+@contextmanager
+def gathering(faults: list[str]) -> Iterator[None]:
+    """Note the faults of what is checked inside, one line each, and go on, so that all can be told at once."""
+    try:
+        yield
+    except AirflockError as fault:
+        faults += [line for line in str(fault).splitlines() if line not in faults]
+
+
+def refuse(faults: list[str]) -> None:
+    """End with all faults that were gathered, if there are any."""
+    if faults:
+        raise ScenarioError(faults)
+
+
 def writable(*paths: Path | None) -> None:
     """Refuse output files whose folder does not exist or cannot be written, before any work is done."""
     import os

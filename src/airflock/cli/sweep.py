@@ -1,6 +1,8 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
 import itertools
+from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,7 +36,10 @@ def sweep(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one).")
     ] = None,
-    show: Annotated[str, typer.Option(metavar="NAME", help="Order parameter to show.")] = "fitness",
+    show: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, or what comes nearest"),
+    ] = None,
 ) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
 
@@ -45,13 +50,24 @@ def sweep(
     from airflock.engine.simulate import picked, score_flights
     from airflock.scenarios.files import load
 
-    options.writable(table, plot)
-    fixed = options.settings(changes, agents, duration)
-    axes = [axis(text) for text in over]
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable(table, plot)
+    fixed, axes, scenarios = {}, [], []
+    with options.gathering(faults):
+        fixed = options.settings(changes, agents, duration)
+    for text in over:
+        with options.gathering(faults):
+            axes.append(axis(text))
     points = [
         dict(zip([key for key, _ in axes], grid, strict=True)) for grid in itertools.product(*(v for _, v in axes))
     ]
-    scenarios = [load(scenario, {**fixed, **point}) for point in points]
+    for point in points:
+        with options.gathering(faults):
+            scenarios.append(load(scenario, {**fixed, **point}))
+    with options.gathering(faults):
+        show = shown(show, scenarios)
+    options.refuse(faults)
     for note in dict.fromkeys(note for found in scenarios for note in found.notes):
         tables.say(f"note: {note}")
     numbers = range(first_seed, first_seed + seeds)
@@ -62,8 +78,6 @@ def sweep(
         rows = score_flights(
             flights, [j[2] for j in jobs], threads=threads, precision=precision, done=done, device=device
         )
-    if show not in rows[0]:
-        raise ScenarioError([f"--show {show}: no such order parameter; known: {', '.join(rows[0])}"])
     tidy = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
     if table is not None:
         from airflock import atomic
@@ -80,6 +94,22 @@ def sweep(
         tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
     else:
         _print(tidy, [key for key, _ in axes], show)
+
+
+def shown(asked: str | None, scenarios: Sequence[Any]) -> str:
+    """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
+    from airflock.metrics.registry import numbers_of
+
+    each = [numbers_of(found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
+    if asked is None:
+        usual = [name for name in ("fitness", "quality") if name in known]
+        return (usual + known + [""])[0]
+    if each and asked not in known:
+        near = get_close_matches(asked, known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+        raise ScenarioError([f"--show {asked}: no such order parameter; {hint}"])
+    return asked
 
 
 def axis(text: str) -> tuple[str, list[Any]]:

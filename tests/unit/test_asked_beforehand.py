@@ -1,0 +1,66 @@
+"""What is asked for is judged before anything flies: no flight is lost to a wrong name or a wrong ending."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from airflock.cli.main import app
+from airflock.engine import simulate
+from airflock.errors import AirflockError
+
+BEST = "zapotecatl_2016/best"
+OVER = ["--over", "model.r_s=0.1,0.2", "--duration", "1", "--seeds", "1"]
+
+
+@pytest.fixture
+def grounded(monkeypatch):
+    """Nothing may fly."""
+
+    def flown(*_, **__):
+        raise AssertionError("something was flown")
+
+    for name in ("score_flights", "score_flight", "fly"):
+        monkeypatch.setattr(simulate, name, flown)
+
+
+def refused(*arguments):
+    """Lines of the refusal."""
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert isinstance(done.exception, AirflockError), (done.exception, done.output)
+    return str(done.exception).splitlines()
+
+
+def test_a_wrong_name_to_show_is_refused_with_the_nearest(grounded):
+    assert refused("sweep", BEST, *OVER, "--show", "qualitty") == [
+        "--show qualitty: no such order parameter; did you mean quality?"
+    ]
+    (line,) = refused("sweep", BEST, *OVER, "--show", "fitness")
+    assert "no such order parameter" in line and "polarisation" in line
+
+
+def test_all_faults_of_a_sweep_are_told_together(grounded):
+    lines = refused("sweep", BEST, *OVER, "--show", "xxx", "--over", "model.w_c", "--table", "/nowhere/lost.csv")
+    assert [line.split(":")[0] for line in lines] == ["/nowhere/lost.csv", "--over model.w_c", "--show xxx"]
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [(BEST, "quality"), ("vicsek_1995/transition", "phi_vel"), ("vasarhelyi_2018/4ms", "fitness")],
+)
+def test_what_is_shown_by_default_is_reported(name, shown):
+    key = {"vicsek_1995/transition": "model.eta"}.get(name, "agents")
+    values = "10,11" if key == "agents" else "0.1,0.2"
+    asked = ["sweep", name, "--over", f"{key}={values}", "--duration", "1", "--seeds", "1"]
+    done = CliRunner().invoke(app, asked)
+    assert done.exit_code == 0, (done.exception, done.output)
+    assert f"{shown} (mean" in done.output
+
+
+def test_a_default_sweep_without_fitness_keeps_its_table(tmp_path):
+    file = tmp_path / "kept.csv"
+    done = CliRunner().invoke(app, ["sweep", BEST, *OVER, "--table", str(file), "--json"])
+    assert done.exit_code == 0, (done.exception, done.output)
+    assert len(file.read_text().splitlines()) == 3
+    text = done.stdout[done.stdout.index("{") :]
+    assert len(json.loads(text)["runs"]) == 2
