@@ -44,6 +44,18 @@ def test_all_faults_of_a_sweep_are_told_together(grounded):
     assert [line.split(":")[0] for line in lines] == ["/nowhere/lost.csv", "--over model.w_c", "--show xxx"]
 
 
+def test_a_key_swept_twice_is_refused(grounded):
+    assert refused("sweep", BEST, *OVER, "--over", " model.r_s=0.3") == [
+        "--over model.r_s: given 2 times; give all its values in one --over"
+    ]
+
+
+def test_a_picture_of_three_keys_is_refused(grounded, tmp_path):
+    more = ["--over", "agents=10,11", "--over", "model.w_c=1,2", "--plot", tmp_path / "map.png"]
+    (line,) = refused("sweep", BEST, *OVER, *more)
+    assert "map.png" in line and "1 or 2 keys, not 3" in line
+
+
 @pytest.mark.parametrize(
     ("name", "shown"),
     [(BEST, "quality"), ("vicsek_1995/transition", "phi_vel"), ("vasarhelyi_2018/4ms", "fitness")],

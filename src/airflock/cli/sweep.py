@@ -59,6 +59,8 @@ def sweep(
     for text in over:
         with options.gathering(faults):
             axes.append(axis(text))
+    with options.gathering(faults):
+        distinct([key for key, _ in axes], plot)
     points = [
         dict(zip([key for key, _ in axes], grid, strict=True)) for grid in itertools.product(*(v for _, v in axes))
     ]
@@ -112,9 +114,20 @@ def shown(asked: str | None, scenarios: Sequence[Any]) -> str:
     return asked
 
 
+def distinct(keys: Sequence[str], plot: Path | None) -> None:
+    """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
+    faults = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
+    faults = [fault for fault, key in zip(faults, keys, strict=True) if keys.count(key) > 1]
+    if plot is not None and len(set(keys)) > 2:
+        faults.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
+    if faults:
+        raise ScenarioError(list(dict.fromkeys(faults)))
+
+
 def axis(text: str) -> tuple[str, list[Any]]:
     """Key and values from KEY=a,b,c or KEY=low:high:count."""
     key, equals, values = text.partition("=")
+    key = key.strip()
     parts = values.split(":")
     if equals and len(parts) == 3:
         try:
