@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.engine import simulate
+from airflock.engine import cpu
 from airflock.errors import AirflockError
 
 BEST = "zapotecatl_2016/best"
@@ -20,8 +20,8 @@ def grounded(monkeypatch):
     def flown(*_, **__):
         raise AssertionError("something was flown")
 
-    for name in ("score_flights", "score_flight", "fly"):
-        monkeypatch.setattr(simulate, name, flown)
+    for name in ("flight_driver", "fly", "in_threads"):
+        monkeypatch.setattr(cpu, name, flown)
 
 
 def refused(*arguments):
@@ -76,3 +76,40 @@ def test_a_default_sweep_without_fitness_keeps_its_table(tmp_path):
     assert len(file.read_text().splitlines()) == 3
     text = done.stdout[done.stdout.index("{") :]
     assert len(json.loads(text)["runs"]) == 2
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ["run", BEST, "--plot", "lost.xyz"],
+        ["run", BEST, "--plot", "lost.nc"],
+        ["run", BEST, "--save", "lost.csv"],
+        ["run", BEST, "--save", "lost"],
+        ["sweep", BEST, *OVER, "--table", "lost.png"],
+        ["sweep", BEST, *OVER, "--plot", "lost.csv"],
+        ["plot", BEST, "--out", "lost.mp4"],
+        ["video", BEST, "--out", "lost.png"],
+        ["score", "none.nc", "--series", "lost.nc"],
+        ["harden", BEST, "--out", "lost.nc"],
+        ["display", "A", "--save", "lost.toml"],
+        ["display", "A", "--plot", "lost.jpg"],
+    ],
+)
+def test_an_ending_that_is_not_written_is_refused(grounded, asked, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (line,) = refused(*asked)
+    assert line.startswith("lost") and ("the only format" in line or "give one of" in line)
+    assert not list(tmp_path.iterdir())
+
+
+def test_all_endings_are_judged_together_with_the_scenario(grounded):
+    lines = refused("run", BEST, "--save", "a.csv", "--plot", "b.nc", "--set", "model.r_s=-1")
+    assert [line.split(":")[0] for line in lines] == ["a.csv", "b.nc", BEST]
+
+
+def test_a_recording_ends_in_nc(tmp_path):
+    import airflock
+
+    flown = airflock.simulate(airflock.load(BEST, {"duration": 1.0}), 0)
+    with pytest.raises(AirflockError, match=r"x.csv: ending .csv is not .nc"):
+        airflock.save(flown, tmp_path / "x.csv")

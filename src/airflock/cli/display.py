@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import PICTURES, RECORDINGS
 from airflock.errors import AirflockError
 
 
@@ -33,7 +34,7 @@ def display(
     """
     from airflock.display import fly_show, points_of
 
-    options.writable(save, plot)
+    options.writable((save, RECORDINGS), (plot, PICTURES))
     if not 0.0 <= failing <= 0.9:
         raise AirflockError(f"--failing = {failing:g} lies outside [0, 0.9]")
     count = drones if points is None else points

@@ -64,7 +64,7 @@ def validate(
 
 
 def _validate(name: str, changed: dict[str, Any]) -> None:
-    if name.endswith(".nc"):
+    if name.lower().endswith(".nc"):
         from airflock.recordings.files import fly_again, load_recording
 
         same, differences = fly_again(load_recording(name))

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import PICTURES, TABLES
 from airflock.errors import ScenarioError
 
 
@@ -52,7 +53,7 @@ def sweep(
 
     faults: list[str] = []
     with options.gathering(faults):
-        options.writable(table, plot)
+        options.writable((table, TABLES), (plot, PICTURES))
     fixed, axes, scenarios = {}, [], []
     with options.gathering(faults):
         fixed = options.settings(changes, agents, duration)
