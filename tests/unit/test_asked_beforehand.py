@@ -113,3 +113,23 @@ def test_a_recording_ends_in_nc(tmp_path):
     flown = airflock.simulate(airflock.load(BEST, {"duration": 1.0}), 0)
     with pytest.raises(AirflockError, match=r"x.csv: ending .csv is not .nc"):
         airflock.save(flown, tmp_path / "x.csv")
+
+
+def test_all_faults_of_a_display_are_told_together(grounded):
+    asked = ["display", "heart.pgn", "none.stl", "--failing", "0.95", "--failure", "fly", "--save", "x.csv"]
+    lines = refused(*asked, "--drones", "5", "--set", "wind.gustt=1")
+    starts = ("x.csv", "--failing", "--failure", "display", "heart.pgn", "none.stl")
+    assert len(lines) == 6 and all(any(s in line for line in lines) for s in starts), lines
+
+
+def test_the_table_of_a_display_fits_80_columns(monkeypatch, capsys):
+    from airflock.cli import display
+
+    monkeypatch.setenv("COLUMNS", "80")
+    row = {"shape": "pictures/of/a/heart.png", "time": 123.456, "error": 0.0283456, "worst": 0.123456, "drones": 2000}
+    display._print([{**row, "collisions": 1234, "hulls": 123, "struck": 12, "reassigned": 10}] * 2)
+    told = capsys.readouterr().out
+    assert "…" not in told and max(map(len, told.splitlines())) <= 80
+    for number in ("123.5", "0.02835", "0.1235", "2000", "1234", "123", "12", "10"):
+        assert number in told
+    assert "".join(line[:11].strip() for line in told.splitlines()).count(row["shape"]) == 2
