@@ -8,9 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airflock.body.registry import BODIES
-from airflock.core.parameters import Choice, Parameters, Quantity, choice, choices, declarations, quantity, row
-from airflock.errors import ParameterError
-from airflock.scenarios.files import MODELS
+from airflock.core.parameters import (
+    Choice,
+    Parameters,
+    Quantity,
+    choice,
+    choices,
+    declarations,
+    quantity,
+    quantity_fault,
+    row,
+)
+from airflock.errors import ParameterError, ScenarioError
+from airflock.scenarios.files import MODELS, load
 from airflock.scenarios.sections import SECTIONS
 
 RECORDS = {
@@ -60,3 +70,13 @@ def test_only_numbers_in_range_get_in(value):
     else:
         with pytest.raises(ParameterError, match=r"Example\.gain"):
             Example(gain=value)
+
+
+def test_a_plain_number_is_told_without_its_unit():
+    share = Quantity("1", 0.0, 1.0, "a share", "", False)
+    assert quantity_fault(2.0, share) == "= 2 lies outside [0, 1]"
+    assert quantity_fault("2", share) == "= '2' is not a number; give [0, 1]"
+    length = share._replace(unit="m")
+    assert quantity_fault(2.0, length) == "= 2 m lies outside [0, 1] m"
+    with pytest.raises(ScenarioError, match=r"agents = 0 lies outside \[1, 1e\+07\]$"):
+        load("vasarhelyi_2018/4ms", {"agents": 0})

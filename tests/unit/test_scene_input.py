@@ -221,3 +221,22 @@ def test_pictures_that_show_nothing_are_refused(tmp_path):
         with pytest.raises(AirflockError, match=re.escape(words)) as caught:
             points_of(str(tmp_path / shape), 10)
         assert str(caught.value).startswith(str(tmp_path / shape))  # and names no key that a display lacks
+
+
+@pytest.mark.parametrize("shape", ["heart.pgn", "drawing.svg", "my drawing.SVG", "there.1"])
+def test_a_file_of_another_kind_is_not_flown_as_text(tmp_path, monkeypatch, shape):
+    monkeypatch.chdir(tmp_path)
+    if shape in ("drawing.svg", "there.1"):
+        (tmp_path / shape).write_text("<svg/>")
+    with pytest.raises(AirflockError, match=r"no such file|no picture or mesh") as caught:
+        points_of(shape, 10)
+    assert str(caught.value).startswith(f"{shape}: ") and ".png" in str(caught.value) and ".stl" in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("text", ["2.0", "U.S.A", "GO ... NOW", "heart.pgn ", "A" * 300 + "."])
+def test_a_text_with_a_point_in_it_is_still_a_text(monkeypatch, text):
+    from airflock.display import shapes
+
+    monkeypatch.setattr(shapes, "_pixels_of_text", lambda _: np.ones((50, 50), bool))
+    assert points_of(text, 10).shape == (10, 3)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError
+from airflock.endings import PICTURES, RECORDINGS
 
 
 def display(
@@ -32,17 +32,28 @@ def display(
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
     from airflock.display import fly_show, points_of
+    from airflock.display.show import FAILURES, scenario_of
 
-    options.writable(save, plot)
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable((save, RECORDINGS), (plot, PICTURES))
     if not 0.0 <= failing <= 0.9:
-        raise AirflockError(f"--failing = {failing:g} lies outside [0, 0.9]")
+        faults.append(f"--failing = {failing:g} lies outside [0, 0.9]")
+    if failure not in FAILURES:
+        faults.append(f"--failure = {failure!r} is none of {', '.join(FAILURES)}")
+    settings: dict[str, Any] = {}
+    with options.gathering(faults):
+        settings = options.settings(changes)
+        scenario_of(drones, settings)
     count = drones if points is None else points
     if drones > count:
-        raise AirflockError(
-            f"--drones = {drones} are more than --points = {count}; give each drone a point, or fly fewer"
-        )
-    found = [points_of(shape, count, spacing, seed=number) for number, shape in enumerate(shapes)]
-    show = fly_show(found, drones, failing, failure, seed, options.settings(changes))
+        faults.append(f"--drones = {drones} are more than --points = {count}; give each drone a point, or fly fewer")
+    found = []
+    for number, shape in enumerate(shapes):
+        with options.gathering(faults):
+            found.append(points_of(shape, count, spacing, seed=number))
+    options.refuse(faults)
+    show = fly_show(found, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
     if save is not None:
         from airflock.display.show import recording_of
@@ -66,14 +77,15 @@ def _print(rows: list[dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
     names = {
-        "shape": "shape", "time": "formed after (s)", "error": "error (m)", "worst": "worst (m)",
-        "drones": "drones", "collisions": "collisions", "hulls": "with hovering", "struck": "struck",
-        "reassigned": "reassigned",
+        "time": "formed\nafter (s)", "error": "error\n(m)", "worst": "worst\n(m)", "drones": "drones",
+        "collisions": "hit\nflying", "hulls": "hit\nhovering", "struck": "hit by\nfalling",
+        "reassigned": "points\nanew",
     }  # fmt: skip
+    table.add_column("shape", overflow="fold")
     for title in names.values():
-        table.add_column(title, justify="left" if title == "shape" else "right")
+        table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(*(row[key] if key == "shape" else tables.number(float(row[key])) for key in names))
+        table.add_row(row["shape"], *(tables.number(float(row[key])) for key in names))
     Console().print(table)

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import SCENARIOS
 from airflock.errors import ScenarioError
 
 
@@ -43,7 +44,7 @@ def harden(
 
     path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
     found = load(path, options.settings(changes, None, duration))
-    options.writable(out)
+    options.writable((out, SCENARIOS))
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:
             raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])

@@ -44,27 +44,27 @@ def presets(
 
 
 def validate(
-    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets or recordings.")],
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets, studies or recordings.")
+    ],
     changes: options.Set = None,
 ) -> None:
-    """Check scenario files (every fault at once), or fly a recording again and compare the bits.
+    """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
 
     Example: airflock validate mine.toml
     """
-    from airflock.errors import ScenarioError
-
+    changed = options.settings(changes)
     faults: list[str] = []
     for name in files:
-        try:
-            _validate(name, options.settings(changes))
-        except ScenarioError as fault:
-            faults += fault.faults
-    if faults:
-        raise ScenarioError(faults)
+        found: list[str] = []
+        with options.gathering(found):
+            _validate(name, changed)
+        faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
+    options.refuse(faults)
 
 
 def _validate(name: str, changed: dict[str, Any]) -> None:
-    if name.endswith(".nc"):
+    if name.lower().endswith(".nc"):
         from airflock.recordings.files import fly_again, load_recording
 
         same, differences = fly_again(load_recording(name))
@@ -76,8 +76,15 @@ def _validate(name: str, changed: dict[str, Any]) -> None:
         typer.echo(f"{name}: flown again with the same bits")
         return
     from airflock.engine.simulate import plan_of
+    from airflock.evolve.study import is_study, load_study
     from airflock.scenarios.files import load
 
+    if is_study(name):
+        study = load_study(name, settings=changed)
+        plan_of(study.scenario)
+        what = f"{len(study.space.axes)} parameters of {study.scenario.name} vary"
+        typer.echo(f"{name}: valid study; {what}; begin it with airflock evolve {name} --out DIR")
+        return
     found = load(name, changed)
     plan_of(found)  # probes the rules
     for note in found.notes:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import PICTURES, VIDEOS
 from airflock.errors import AirflockError
 
 
@@ -47,7 +48,7 @@ def plot(
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
-    options.writable(out)
+    options.writable((out, PICTURES))
     from airflock.plots.save import save_figure
 
     save_figure(_figure(what, kind, seed, begin, end, options.settings(changes, agents, duration)), out)
@@ -90,7 +91,7 @@ def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | 
 
 
 def _scenario(what: str, changed: dict[str, Any]) -> Any:
-    if what.endswith(".nc"):
+    if what.lower().endswith(".nc"):
         from airflock.recordings.files import load_recording
         from airflock.recordings.scores import scenario_of
 
@@ -101,7 +102,7 @@ def _scenario(what: str, changed: dict[str, Any]) -> Any:
 
 
 def _recording(what: str, seed: int, changed: dict[str, Any]) -> Any:
-    if what.endswith(".nc"):
+    if what.lower().endswith(".nc"):
         if changed:
             raise AirflockError(f"{what}: is a recording; --set, --agents and --duration need a scenario to fly")
         from airflock.recordings.files import load_recording
@@ -128,7 +129,7 @@ def video(
 
     Example: airflock video vasarhelyi_2018/obstacles --duration 120 --out flight.mp4
     """
-    options.writable(out)
+    options.writable((out, VIDEOS))
     from airflock.plots.video import frame_count
     from airflock.plots.video import video as make_video
 

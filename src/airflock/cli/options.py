@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
 Where = Annotated[
@@ -58,18 +59,37 @@ def value(text: str) -> Any:
         return text.strip()
 
 
-def writable(*paths: Path | None) -> None:
-    """Refuse output files whose folder does not exist or cannot be written, before any work is done."""
+@contextmanager
+def gathering(faults: list[str]) -> Iterator[None]:
+    """Note the faults of what is checked inside, one line each, and go on, so that all can be told at once."""
+    try:
+        yield
+    except AirflockError as fault:
+        faults += [line for line in str(fault).splitlines() if line not in faults]
+
+
+def refuse(faults: list[str]) -> None:
+    """End with all faults that were gathered, if there are any."""
+    if faults:
+        raise ScenarioError(faults)
+
+
+def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
+    """Refuse files to be written, each with its possible endings, that cannot be; before any work is done."""
     import os
 
-    for path in paths:
+    faults = []
+    for path, endings in outputs:
         if path is None:
             continue
-        folder = path.parent
+        folder, wrong = path.parent, ending_fault(path, endings)
+        if wrong:
+            faults.append(wrong)
         if not folder.is_dir():
-            raise AirflockError(f"{path}: the folder {folder} does not exist")
-        if path.is_dir() or not os.access(folder, os.W_OK):
-            raise AirflockError(f"{path}: cannot be written")
+            faults.append(f"{path}: the folder {folder} does not exist")
+        elif path.is_dir() or not os.access(folder, os.W_OK):
+            faults.append(f"{path}: cannot be written")
+    refuse(faults)
 
 
 @contextmanager

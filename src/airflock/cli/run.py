@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import PICTURES, RECORDINGS, TABLES
 
 
 def run(
@@ -30,9 +31,13 @@ def run(
     from airflock.metrics.registry import reports
     from airflock.scenarios.files import load
 
-    changed = options.settings(changes, agents, duration)
-    found = load(scenario, changed)
-    options.writable(save, plot)
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable((save, RECORDINGS), (plot, PICTURES))
+    with options.gathering(faults):
+        changed = options.settings(changes, agents, duration)
+        found = load(scenario, changed)
+    options.refuse(faults)
     for note in found.notes:
         tables.say(f"note: {note}")
     numbers, flights = list(range(first_seed, first_seed + seeds)), [found] * seeds
@@ -94,7 +99,7 @@ def score(
     from airflock.recordings.files import load_recording
     from airflock.recordings.scores import aero_settings, measure, scenario_of
 
-    options.writable(series)
+    options.writable((series, TABLES))
     changed = options.settings(changes)
     rows, courses = [], []
     about: dict[str, tuple[str, str]] = {}

@@ -1,12 +1,15 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
 import itertools
+from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
+from airflock.endings import PICTURES, TABLES
 from airflock.errors import ScenarioError
 
 
@@ -34,7 +37,10 @@ def sweep(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one).")
     ] = None,
-    show: Annotated[str, typer.Option(metavar="NAME", help="Order parameter to show.")] = "fitness",
+    show: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, or what comes nearest"),
+    ] = None,
 ) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
 
@@ -45,13 +51,26 @@ def sweep(
     from airflock.engine.simulate import picked, score_flights
     from airflock.scenarios.files import load
 
-    options.writable(table, plot)
-    fixed = options.settings(changes, agents, duration)
-    axes = [axis(text) for text in over]
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable((table, TABLES), (plot, PICTURES))
+    fixed, axes, scenarios = {}, [], []
+    with options.gathering(faults):
+        fixed = options.settings(changes, agents, duration)
+    for text in over:
+        with options.gathering(faults):
+            axes.append(axis(text))
+    with options.gathering(faults):
+        distinct([key for key, _ in axes], plot)
     points = [
         dict(zip([key for key, _ in axes], grid, strict=True)) for grid in itertools.product(*(v for _, v in axes))
     ]
-    scenarios = [load(scenario, {**fixed, **point}) for point in points]
+    for point in points:
+        with options.gathering(faults):
+            scenarios.append(load(scenario, {**fixed, **point}))
+    with options.gathering(faults):
+        show = shown(show, scenarios)
+    options.refuse(faults)
     for note in dict.fromkeys(note for found in scenarios for note in found.notes):
         tables.say(f"note: {note}")
     numbers = range(first_seed, first_seed + seeds)
@@ -62,8 +81,6 @@ def sweep(
         rows = score_flights(
             flights, [j[2] for j in jobs], threads=threads, precision=precision, done=done, device=device
         )
-    if show not in rows[0]:
-        raise ScenarioError([f"--show {show}: no such order parameter; known: {', '.join(rows[0])}"])
     tidy = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
     if table is not None:
         from airflock import atomic
@@ -82,9 +99,36 @@ def sweep(
         _print(tidy, [key for key, _ in axes], show)
 
 
+def shown(asked: str | None, scenarios: Sequence[Any]) -> str:
+    """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
+    from airflock.metrics.registry import numbers_of
+
+    each = [numbers_of(found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
+    if asked is None:
+        usual = [name for name in ("fitness", "quality") if name in known]
+        return (usual + known + [""])[0]
+    if each and asked not in known:
+        near = get_close_matches(asked, known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+        raise ScenarioError([f"--show {asked}: no such order parameter; {hint}"])
+    return asked
+
+
+def distinct(keys: Sequence[str], plot: Path | None) -> None:
+    """Refuse a key that is swept twice, and a picture of more keys than it has axes."""
+    faults = [f"--over {key}: given {keys.count(key)} times; give all its values in one --over" for key in keys]
+    faults = [fault for fault, key in zip(faults, keys, strict=True) if keys.count(key) > 1]
+    if plot is not None and len(set(keys)) > 2:
+        faults.append(f"--plot {plot}: a picture shows 1 or 2 keys, not {len(set(keys))}; leave it out, or sweep fewer")
+    if faults:
+        raise ScenarioError(list(dict.fromkeys(faults)))
+
+
 def axis(text: str) -> tuple[str, list[Any]]:
     """Key and values from KEY=a,b,c or KEY=low:high:count."""
     key, equals, values = text.partition("=")
+    key = key.strip()
     parts = values.split(":")
     if equals and len(parts) == 3:
         try:

@@ -13,6 +13,11 @@ from typing import Any, NamedTuple
 from airflock.errors import ParameterError
 
 
+def with_unit(text: str, unit: str) -> str:
+    """A number or a range followed by its unit; a plain number, of unit 1, by nothing."""
+    return text if unit in ("", "1") else f"{text} {unit}"
+
+
 class Quantity(NamedTuple):
     """Declaration of one number: SI unit, allowed range (both ends included), meaning and source."""
 
@@ -22,6 +27,11 @@ class Quantity(NamedTuple):
     meaning: str
     source: str
     optional: bool  # None is allowed and means "derived from the rest of the scenario"
+
+    @property
+    def span(self) -> str:
+        """The allowed range with its unit, for people to read."""
+        return with_unit(f"[{self.low:g}, {self.high:g}]", self.unit)
 
 
 class Choice(NamedTuple):
@@ -124,9 +134,9 @@ def quantity_fault(value: Any, declared: Quantity) -> str:
     if value is None and declared.optional:
         return ""
     if not isinstance(value, float):
-        return f"= {value!r} is not a number; give {declared.unit} in [{declared.low:g}, {declared.high:g}]"
+        return f"= {value!r} is not a number; give {declared.span}"
     if not declared.low <= value <= declared.high:
-        return f"= {value:g} {declared.unit} lies outside [{declared.low:g}, {declared.high:g}] {declared.unit}"
+        return f"= {with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
     return ""
 
 

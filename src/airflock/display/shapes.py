@@ -6,6 +6,8 @@ shares of the area (Lloyd 1982) or far from each other on the surface of a mesh 
 large as their distance asks for, so that drones have room.
 """
 
+import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from airflock.errors import AirflockError, SceneError
 Points = NDArray[np.float64]
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".gif")
 MESHES = (".stl", ".obj", ".glb", ".gltf", ".ply", ".off")
+FILE_NAME = re.compile(r".*\.[A-Za-z][A-Za-z0-9]{1,4}")  # what ends so is meant as a file, not as a text
 MOST_BYTES = 50_000_000
 MOST_PIXELS = 25_000_000
 LEAN = 0.5  # m back for each m up
@@ -29,7 +32,7 @@ def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0
 
     shape : the path of an image or mesh, or any other text, which is written
 
-    Raises AirflockError where the file is missing, too large, damaged or empty.
+    Raises AirflockError where the file is missing, of another kind, too large, damaged or empty.
     """
     path = Path(shape)
     rng = np.random.default_rng(seed)
@@ -39,6 +42,11 @@ def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0
             raise AirflockError(f"{shape}: no such file")
         if path.stat().st_size > MOST_BYTES:
             raise AirflockError(f"{shape}: {path.stat().st_size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB")
+    elif FILE_NAME.fullmatch(shape) or (kind and os.path.isfile(shape)):
+        fault = f"ending {path.suffix} is no picture or mesh" if os.path.isfile(shape) else "no such file"
+        raise AirflockError(
+            f"{shape}: {fault}; give {', '.join(IMAGES + MESHES)}, or for a text add a space at its end"
+        )
     if kind in MESHES:
         found = _spread_over_mesh(path, count, rng)
     else:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from airflock.core.parameters import Quantity
+from airflock.core.parameters import Quantity, with_unit
 from airflock.evolve.space import Axis, Space, Tie, declared, usual_scale
 from airflock.scenarios.scenario import Scenario
 
@@ -75,16 +75,17 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
 def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapping[str, Any]) -> list[str]:
     """What is wrong with one entry by itself."""
     faults = []
-    span = f"[{how.low:g}, {how.high:g}] {how.unit}"
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if name not in ENTRY:
             near = get_close_matches(name, ENTRY, n=1, cutoff=0.5)
             faults.append(f"space.{key}.{name} is no key; {f'did you mean {near[0]}?' if near else ', '.join(ENTRY)}")
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
-            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {span}")
+            faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
         elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
-            faults.append(f"space.{key}.{name} = {value:g} {how.unit} lies outside the declared {span}")
+            faults.append(
+                f"space.{key}.{name} = {with_unit(f'{value:g}', how.unit)} lies outside the declared {how.span}"
+            )
         elif name == "unit" and value != how.unit:
             faults.append(f"space.{key}.unit = {value!r}: the unit is {how.unit}")
         elif name == "scale" and value not in ("linear", "log"):
@@ -100,14 +101,14 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
 
 
 def _range_faults(axis: Axis) -> list[str]:
-    where = f"space.{axis.key}"
+    where, span = f"space.{axis.key}", with_unit(f"[{axis.low:g}, {axis.high:g}]", axis.unit)
     if not axis.low < axis.high:
         word = "empty" if axis.low == axis.high else "inverted"
-        return [f"{where}: the range [{axis.low:g}, {axis.high:g}] {axis.unit} is {word}; low must lie below high"]
+        return [f"{where}: the range {span} is {word}; low must lie below high"]
     if axis.scale == "log" and axis.low <= 0.0:
-        return [f"{where}: low = {axis.low:g} {axis.unit} must be above 0 on a logarithmic scale"]
+        return [f"{where}: low = {with_unit(f'{axis.low:g}', axis.unit)} must be above 0 on a logarithmic scale"]
     if axis.integer and math.floor(axis.high) < math.ceil(axis.low):
-        return [f"{where}: the range [{axis.low:g}, {axis.high:g}] {axis.unit} holds no whole number"]
+        return [f"{where}: the range {span} holds no whole number"]
     return []
 
 
@@ -126,7 +127,8 @@ def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | No
             faults.append(f"space.{axis.key}.above = {axis.above!r} neither varies nor is fixed")
         lower = axes[axis.above].high if axis.above in axes else space.fixed.get(axis.above, axis.low)
         if axis.above and lower > axis.high:
-            faults.append(f"space.{axis.key}.high = {axis.high:g} {axis.unit} lies below {axis.above} = {lower:g}")
+            high = with_unit(f"{axis.high:g}", axis.unit)
+            faults.append(f"space.{axis.key}.high = {high} lies below {axis.above} = {lower:g}")
     for key, tie in space.tied.items():
         if tie.of not in axes and tie.of not in space.fixed:
             faults.append(f"space.{key}.tied = {tie.of!r} neither varies nor is fixed")
@@ -136,9 +138,8 @@ def _faults_between(space: Space, known: Mapping[str, tuple[Quantity, float | No
         for end in ends:
             value = tie.factor * end + tie.offset
             if not how.low <= value <= how.high:
-                faults.append(
-                    f"space.{key} = {value:g} {how.unit} at {tie.of} = {end:g} lies outside [{how.low:g}, {how.high:g}]"
-                )
+                reached = with_unit(f"{value:g}", how.unit)
+                faults.append(f"space.{key} = {reached} at {tie.of} = {end:g} lies outside {how.span}")
     if not space.axes and not told:
         faults.append("space: nothing varies; give at least one key low and high")
     return faults

@@ -20,7 +20,7 @@ from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
 from airflock.evolve.space import Space, full_space
 from airflock.evolve.space_table import read_space
 from airflock.scenarios import schema
-from airflock.scenarios.files import load
+from airflock.scenarios.files import load, tells_of_study
 from airflock.scenarios.scenario import Scenario
 
 S6 = "Vásárhelyi et al. 2018, Table S6"
@@ -137,6 +137,17 @@ def shipped() -> dict[str, Path]:
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
 
+def is_study(name: str | os.PathLike[str]) -> bool:
+    """Whether a name is that of a study's file, rather than of a scenario; a preset's name is the preset's."""
+    path = Path(name)
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        return tells_of_study(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError):
+        return False
+
+
 def load_study(
     name: str | os.PathLike[str],
     *,
@@ -160,7 +171,7 @@ def load_study(
             document = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
             raise ScenarioError([f"{path}: {fault}"]) from fault
-    if not {"space", "scenario", "objective", "search"} & set(document):
+    if not tells_of_study(document):
         return make_study({"scenario": text, **(tables or {})}, text, settings=settings, search=search)
     where = text if text in known else str(path)
     document = {**document, **(tables or {})}

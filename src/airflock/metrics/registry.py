@@ -66,6 +66,16 @@ FITNESS: dict[str, dict[str, tuple[str, str]]] = {
 }
 
 
+def numbers_of(q: Any, goals: bool = False) -> tuple[str, ...]:
+    """Names of the order parameters that are one number, of flights scored by `metrics.*`, with goals or not.
+
+    Partial fitnesses and fitness come last; time_to_goal, one number for each goal, is left out.
+    """
+    found = [name for each in metrics_of(q) for name in each.reports]
+    found += [name for name in GOALS if goals and name != "time_to_goal"]
+    return tuple(dict.fromkeys((*found, *FITNESS.get(q.kind, {}))))
+
+
 def reports(kind: str) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights with a key metrics.kind report."""
     found = {name: about for each in SETS[kind] for name, about in each.reports.items()}

@@ -9,10 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from airflock.atomic import atomic
+from airflock.endings import PICTURES, ending_fault
 from airflock.errors import AirflockError, RecordingError
 
 # no dates: the same figure gives the same file
-ENDINGS: dict[str, dict[str, Any]] = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
 
 class PictureError(RecordingError):
@@ -24,11 +25,11 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
 
     resolution : dots per inch of .png, and of what is drawn as pixels within the others
     """
-    with complete_or_absent(path, tuple(ENDINGS)) as temporary:
+    with complete_or_absent(path, PICTURES) as temporary:
         ending = temporary.suffix.lower()
         figure.savefig(
-            temporary, format=ending[1:], dpi=resolution, metadata=ENDINGS[ending], facecolor=figure.get_facecolor(),
-            bbox_inches="tight", pad_inches=0.08,
+            temporary, format=ending[1:], dpi=resolution, metadata=DATES.get(ending, {}),
+            facecolor=figure.get_facecolor(), bbox_inches="tight", pad_inches=0.08,
         )  # fmt: skip
     return Path(path)
 
@@ -37,17 +38,17 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
 def complete_or_absent(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
     target = Path(path)
-    if target.suffix.lower() not in endings:
-        said = f"ending {target.suffix}" if target.suffix else "name without an ending"
-        raise PictureError(f"{target}: {said} is no format known here; give one of {', '.join(endings)}")
+    fault = ending_fault(target, endings)
+    if fault:
+        raise PictureError(fault)
     if target.is_dir():
         raise PictureError(f"{target}: is a folder; give a file name")
     try:
         with atomic(target) as temporary:
             yield temporary
-    except (OSError, RuntimeError) as fault:
-        reason = getattr(fault, "strerror", None) or (str(fault).splitlines() or [type(fault).__name__])[0]
-        raise PictureError(f"{target}: cannot be written: {reason}; nothing was saved") from fault
+    except (OSError, RuntimeError) as wrong:
+        reason = getattr(wrong, "strerror", None) or (str(wrong).splitlines() or [type(wrong).__name__])[0]
+        raise PictureError(f"{target}: cannot be written: {reason}; nothing was saved") from wrong
 
 
 def positive(**numbers: float) -> None:

@@ -17,6 +17,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
+from airflock.endings import VIDEOS
 from airflock.errors import AirflockError
 from airflock.plots import style
 from airflock.plots.save import complete_or_absent, positive
@@ -35,7 +36,6 @@ from airflock.plots.scene import (
 from airflock.plots.through import scenery
 
 Array = NDArray[Any]
-ENDINGS = (".mp4", ".gif")
 TAIL_POINTS = 9
 DPI = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the picture
 # the outline of a dart that flies right, in units of its length
@@ -68,7 +68,7 @@ def video(
     """
     instants = _instants(recording, fps, speed, start, stop)
     positive(height=height)
-    with complete_or_absent(path, ENDINGS) as temporary:
+    with complete_or_absent(path, VIDEOS) as temporary:
         stage = Stage(recording, start, stop, tail=tail, height=height, speed=speed)
         film = _film(temporary, stage.size, fps)
         try:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from airflock import atomic
+from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
 from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
@@ -16,12 +17,15 @@ from airflock.recordings.scores import scenario_of
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a recording as netCDF: to a temporary name first, then renamed; raises RecordingError and leaves nothing.
+    """Write a recording as .nc: to a temporary name first, then renamed; raises RecordingError and leaves nothing.
 
     The file is made in memory, because the HDF5 library crashes the process when the disk is full.
     """
     check(recording, str(path))
     target = Path(path)
+    wrong = ending_fault(target, RECORDINGS)
+    if wrong:
+        raise RecordingError(wrong)
     if target.is_dir():
         raise RecordingError(f"{target}: is a folder; give a file name ending in .nc")
     try:

@@ -48,6 +48,8 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
         raise ScenarioError([f"{where}: {fault}"]) from fault
+    if tells_of_study(document) and "model" not in document:
+        raise ScenarioError([f"{where}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     if law is None:
         return make(document, where, settings, folder=path.parent)
     if isinstance(law, (str, os.PathLike)):
@@ -68,6 +70,11 @@ def loaded(what: Any) -> Scenario:
     if isinstance(what, (str, os.PathLike)):
         return load(what)
     raise ScenarioError([f"{type(what).__name__} is no scenario; give a Scenario, a preset's name or a scenario file"])
+
+
+def tells_of_study(document: Mapping[str, Any]) -> bool:
+    """Whether a document has a table or key that only studies have."""
+    return bool({"space", "scenario", "objective", "search"} & set(document))
 
 
 def make(

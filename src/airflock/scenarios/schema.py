@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from airflock.core.parameters import Choice, Points, Quantity, Text, declarations
+from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
 
 LONG_FORM = {"value", "unit", "source", "note"}
 
@@ -84,10 +84,9 @@ def _line(section: str, item: Any, record: type) -> str:
         return f"{name} is no key; {hint}"
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):
-        span = f"[{declared.low:g}, {declared.high:g}] {declared.unit}"
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return f"{name} = {value:g} {declared.unit} lies outside {span}"
-        return f"{name} = {value!r} is not a number; give {span}"
+            return f"{name} = {with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
+        return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
         near = get_close_matches(str(value), declared.options, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""

@@ -1,0 +1,21 @@
+"""Endings of the files that are written: the name of a file says its format."""
+
+import os
+from pathlib import Path
+
+PICTURES = (".png", ".pdf", ".svg")
+VIDEOS = (".mp4", ".gif")
+RECORDINGS = (".nc",)
+TABLES = (".csv",)
+SCENARIOS = (".toml",)
+
+
+def ending_fault(path: str | os.PathLike[str], endings: tuple[str, ...]) -> str:
+    """What is wrong with the ending of a file to be written; empty if nothing is."""
+    target = Path(path)
+    if target.suffix.lower() in endings:
+        return ""
+    said = f"ending {target.suffix}" if target.suffix else "name without an ending"
+    if len(endings) == 1:
+        return f"{target}: {said} is not {endings[0]}, the only format written here"
+    return f"{target}: {said} is no format known here; give one of {', '.join(endings)}"
