@@ -71,7 +71,7 @@ def flight(plan: Plan) -> str:
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     if plan.model.neighbour is not None:
         choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
-        choose += slots.rearrange(build, grid.opened(build))
+        choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
@@ -102,7 +102,7 @@ def flight(plan: Plan) -> str:
         advance = [f"fastest = turns({given})", advance[1]]
     step += branch("step < steps", advance)
     lines += loop("step in range(steps + 1)", step)
-    lines += slots.restored(build, grid.opened(build))
+    lines += slots.restored(build)
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
     arguments += (
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")

@@ -8,10 +8,10 @@ a small one. Of the numbers of an agent none depends on its slot; sums over the 
 
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.passes.flock import owners
+from airflock.engine.passes.grid import CHUNKS, opened
 from airflock.engine.plan import Plan
 
 EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
-PARTS = 8  # of the flock, side by side
 
 
 def slotted(plan: Plan) -> bool:
@@ -24,14 +24,11 @@ def numbered(build: Builder) -> list[str]:
     return [*build.order(), *loop("i in range(m)", ["order[i] = i"])] if build.slots else []
 
 
-def rearrange(build: Builder, sorted_: list[str]) -> list[str]:
-    """Lines that now and then move all agents to where they were just sorted to.
-
-    sorted_ : lines that bind `whose`, the slot now of the agent at each place, and free memory, `totals_`
-    """
+def rearrange(build: Builder) -> list[str]:
+    """Lines that now and then move all agents to where they were just sorted to; sums lend their memory meanwhile."""
     if not build.slots:
         return []
-    body = [*sorted_, "kept = totals_[:n]"]
+    body = [*opened(build), "kept = totals_[:n]"]
     for table in ("work", "mem", "memory"):
         rows = [f"lane = {table}[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
         body += loop(f"c in range({table}.shape[0])", rows)
@@ -39,12 +36,12 @@ def rearrange(build: Builder, sorted_: list[str]) -> list[str]:
     return branch(f"k % {EVERY} == 0", ["rearrange(n, work, mem, memory, cells)"])
 
 
-def restored(build: Builder, sorted_: list[str]) -> list[str]:
+def restored(build: Builder) -> list[str]:
     """Lines that bring positions and velocities back into the order of agents."""
     if not build.slots:
         return []
     axes = build.plan.axes
-    lines = [*sorted_, "kept = totals_[:n]"]
+    lines = [*opened(build), "kept = totals_[:n]"]
     for name in (*axes, *(f"v{a}" for a in axes)):
         lines += [f"lane = work[{build.row(name)}]"]
         lines += loop("i in range(n)", ["kept[order[i]] = lane[i]"]) + loop("i in range(n)", ["lane[i] = kept[i]"])
@@ -53,5 +50,5 @@ def restored(build: Builder, sorted_: list[str]) -> list[str]:
 
 def _spread(line: str) -> list[str]:
     """A loop over all slots, in parts side by side."""
-    part = loop(f"i in range(n * part // {PARTS}, n * (part + 1) // {PARTS})", [line])
-    return loop(f"part in prange({PARTS})", part)
+    part = loop(f"i in range(n * part // {CHUNKS}, n * (part + 1) // {CHUNKS})", [line])
+    return loop(f"part in prange({CHUNKS})", part)
