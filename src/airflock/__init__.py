@@ -15,18 +15,22 @@ _WHERE = {
     "choice": "airflock.core.parameters",
     "Parameters": "airflock.core.parameters",
     "simulate": "airflock.recordings.flights",
+    "Flight": "airflock.engine.flight",
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",
     "load_recording": "airflock.recordings.files",
 }
 __all__ = [*_WHERE, "__version__"]
+_WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 
 
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         module = import_module(_WHERE[name])
-        return module if name == "evolve" else getattr(module, name)  # a module that can be called
+        if name == "evolve":
+            return module  # which can be called
+        return getattr(module, "Flight" if name == "open" else name)
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 

@@ -103,9 +103,9 @@ def doctor(as_json: options.Json = False) -> None:
     from importlib.metadata import PackageNotFoundError, version
 
     from airflock import __version__
-    from airflock.engine.cpu import cores
     from airflock.engine.simulate import score_flight
     from airflock.engine.store import cache_folder
+    from airflock.engine.threads import cores
     from airflock.recordings.flights import processor
     from airflock.scenarios.files import load
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from airflock.engine import cpu
 from airflock.engine.cpu import Flown
 from airflock.engine.plan import Plan
 from airflock.engine.tables import clock, tables
+from airflock.engine.threads import cores
 from airflock.errors import DeviceError, ScenarioError
 from airflock.scenarios.scenario import Scenario
 
@@ -59,13 +59,13 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     missing = trouble() or next(filter(None, faults), None)
     if missing is not None:
         return Choice("cpu", missing)
-    seconds = sum(work(scenario) for scenario in scenarios) / cpu.cores()
+    seconds = sum(work(scenario) for scenario in scenarios) / cores()
     if seconds < WORTH:
-        return Choice("cpu", f"about {seconds:.2g} s of work on {cpu.cores()} cores")
+        return Choice("cpu", f"about {seconds:.2g} s of work on {cores()} cores")
     missing = next(filter(None, map(no_room, largest.values(), largest)), None)
     if missing is not None:
         return Choice("cpu", missing)
-    return Choice("cuda", f"about {seconds:.2g} s of work on {cpu.cores()} cores would be left to the CPU")
+    return Choice("cuda", f"about {seconds:.2g} s of work on {cores()} cores would be left to the CPU")
 
 
 def by_cells(scenario: Scenario, plan: Plan, given: bool = False) -> bool:

@@ -5,14 +5,18 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+from numpy.typing import NDArray
+
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import cpu, devices
+from airflock.engine import cpu, devices, failure
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan, make_plan
 from airflock.engine.probe import probe
+from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
+from airflock.engine.threads import in_threads
 from airflock.errors import FlightError, ScenarioError
 from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
@@ -106,9 +110,7 @@ def fly(
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
-        inside = start_inside(scenario, start) if plan.scene else ""
-        if inside:
-            raise FlightError(f"{scenario.name}: {inside}")
+        start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
@@ -149,16 +151,11 @@ def checked(
 ) -> cpu.Flown:
     """A flight that went well; raises FlightError for any other."""
     if flown.status < 0:
-        raise FlightError(
-            f"{scenario.name}: seed {seed}: agent {-flown.status - 1} of {scenario.agents} found no place at "
-            f"start.separation = {scenario.separation():g} m; enlarge the arena or lower start.separation"
-        )
+        raise FlightError(failure.no_place(scenario, seed, -flown.status - 1))
     bad = _first_bad(flown)
     if bad is not None:
-        step = _first_bad_step(scenario, seed, precision, start, device)
         raise FlightError(
-            f"{scenario.name}: seed {seed}: agent {bad} left the finite numbers at step {step} "
-            f"(t = {step * scenario.flight.dt:g} s)"
+            failure.not_finite(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
         )
     return flown
 
@@ -172,10 +169,11 @@ def _first_bad(flown: cpu.Flown) -> int | None:
 
 
 def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
-    """First step after which a state is not finite: flights are deterministic, so shorter ones find it by halves."""
+    """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
     low, high = 0, clock(scenario)["steps"]
-    plan = plan_of(scenario, precision=precision)
-    plan = replace(plan, given_start=start is not None)
+    if device == "cpu":
+        return failure.first_bad_step(opened(scenario, seed, precision, False, start), low, high)
+    plan = replace(plan_of(scenario, precision=precision), given_start=start is not None)
     while high - low > 1:
         middle = (low + high) // 2
         shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))
@@ -184,6 +182,55 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
         else:
             high = middle
     return high
+
+
+def opened(
+    scenario: Scenario,
+    seed: int,
+    precision: int = 32,
+    record: bool = False,
+    start: Any = None,
+    world: int = 0,
+    *,
+    given_start: bool = False,
+) -> State:
+    """State of a flight before its first step.
+
+    start       : as in `fly`; given_start : whether agents have been given their places already, so that none are drawn
+    Raises FlightError where `start` cannot be flown.
+    """
+    plan = plan_of(scenario, precision=precision, record=record)
+    given = None
+    if start is not None:
+        given = sound_start(scenario, plan, start)
+    plan = replace(plan, given_start=given_start or start is not None)
+    return State(plan, tables(scenario, plan, seed, world), cpu.flight_driver(plan), given)
+
+
+def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
+    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s.
+
+    Raises FlightError, one line, where their shape, their kind or their values are wrong.
+    """
+    import numpy as np
+
+    names = [*plan.axes, *(f"v{axis}" for axis in plan.axes)]
+    shape, said = (len(names), scenario.agents), f"{scenario.name}: start: "
+    try:
+        given = np.asarray(start, np.float32 if plan.bits == 32 else np.float64)
+    except (TypeError, ValueError) as fault:
+        raise FlightError(f"{said}not an array of numbers: {fault}") from fault
+    if given.shape != shape:
+        wanted = f"{shape}, the rows {', '.join(names)} of {scenario.agents} agents in m and m/s"
+        raise FlightError(f"{said}its shape is {given.shape}; give {wanted}")
+    bad = np.argwhere(~np.isfinite(given))
+    if len(bad):
+        row, agent = bad[0]
+        raise FlightError(f"{said}{names[row]} of agent {agent} is {given[row, agent]}, not a finite number")
+    inside = start_inside(scenario, given) if plan.scene else ""
+    if inside:
+        raise FlightError(f"{scenario.name}: {inside}")
+    return given
 
 
 def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> dict[str, float]:
@@ -230,7 +277,7 @@ def score_flights(
             together = zip(scenarios, seeds, flown, strict=True)
             return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
     if device == "python":
-        return list(cpu.in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
+        return list(in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
     for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
         compile_for(scenario, precision=precision)  # once, before threads ask for it
 
@@ -240,7 +287,7 @@ def score_flights(
     jobs = [job(scenario, seed) for scenario, seed in zip(scenarios, seeds, strict=True)]
     if any(_pays(scenario) for scenario in scenarios):
         threads = 1  # each flight takes all cores by itself
-    return list(cpu.in_threads(jobs, threads, done))
+    return list(in_threads(jobs, threads, done))
 
 
 def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:

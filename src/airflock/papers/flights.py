@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.engine.cpu import in_threads
 from airflock.engine.simulate import score_flights
+from airflock.engine.threads import in_threads
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.scenario import Scenario

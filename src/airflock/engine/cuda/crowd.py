@@ -19,6 +19,7 @@ from airflock.engine.passes.flock import owners
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, clock, tables
+from airflock.engine.totals import combined
 from airflock.errors import DeviceError
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.wings import FORMATIONS
@@ -198,7 +199,7 @@ def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> F
         places = flock.state()[0]
     status = min(0, int(flock.near.copy_to_host()[:, 3].min()))
     kept = np.stack(frames) if plan.record else None
-    return Flown(cpu.combined(plan, _sums(plan, np.array(series))), kept, places, status)
+    return Flown(combined(plan, _sums(plan, np.array(series))), kept, places, status)
 
 
 def _sums(plan: Plan, series: NDArray[np.float64]) -> NDArray[np.float64]:

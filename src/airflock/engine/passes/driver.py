@@ -1,4 +1,4 @@
-"""Drivers: whole flights, and whole recordings, as the order in which the passes run."""
+"""Drivers: any part of a flight, and whole recordings, as the order in which the passes run."""
 
 from airflock.engine import vectors
 from airflock.engine.passes import decide, flock, grid, measure, move, perceive, scene, slots
@@ -37,7 +37,15 @@ SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
 
 
 def flight(plan: Plan) -> str:
-    """Text of the driver that flies one world: function `fly`."""
+    """Text of the driver that flies one world: function `advance(first, last, half, held, ...)`.
+
+    It flies the steps first to last - 1 and returns the next one, or minus the first agent (from 1) that found no room.
+    All that a flight carries from one step to the next lies in arrays, so that any cuts give the bits of the whole.
+    half : 1: step `first` has been sensed and decided already; 2: sense and decide at step `first`, and go no further
+    held : how far agents may have come since pairs were last looked at (m), how far they may come (m), whether the rest
+           of the collisions' memory is at its start, whether the flight has ended at a collision, whether agents have
+           their places (each 1 or 0)
+    """
     build = Builder(plan)
     build.slots = slots.slotted(plan)
     axes = plan.axes
@@ -54,19 +62,16 @@ def flight(plan: Plan) -> str:
         measure.measure(build, clock)
     lines = build.whole("agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring")
     lines += build.records("q c") + ["n = agents", SPAN, "late = real(delay) * c.dt"]
-    lines += [
-        "status = begin(n, m, row, whole, work, edges, spans, start, scene)",
-        *branch("status < 0", ["return status"]),
-        *slots.numbered(build),
-    ]
     heard_late = plan.noisy or plan.delayed
-    lines += loop("slot in range(ring)", ["snapshot(slot, m, work, past)"]) if heard_late else []
-    lines += ["travelled = ZERO; gap = ZERO; calm = False; fastest = ZERO"]
-    step = branch(
+    start = ["status = begin(n, m, row, whole, work, edges, spans, start, scene)"]
+    start += [*branch("status < 0", ["return status"]), *slots.numbered(build)]
+    start += loop("slot in range(ring)", ["snapshot(slot, m, work, past)"]) if heard_late else []
+    lines += [*branch("held[4] < HALF", [*start, "held[4] = ONE"]), *build.order()]
+    lines += ["travelled = held[0]; gap = held[1]; calm = held[2] > HALF; fastest = ZERO; following = last"]
+    sense = branch(
         "(step + delay) % decide_every == 0", ["snapshot(((step + delay) // decide_every) % ring, m, work, past)"]
     )
-    step = ["time = real(step) * c.dt", *(step if heard_late else [])]
-    step += _world(build, "c.dt")
+    sense = [*(sense if heard_late else []), *_world(build, "c.dt")]
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     if plan.model.neighbour is not None:
@@ -77,37 +82,42 @@ def flight(plan: Plan) -> str:
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
-    step += [] if plan.sequential else branch("step % decide_every == 0", choose)
+    step = ["time = real(step) * c.dt"]
+    if plan.sequential:  # who senses and who moves alternate: there is no place to cut a step
+        step += sense
+    else:
+        sense += branch("step % decide_every == 0", choose)
+        step += [*branch("(step != first) | (half & 1 == 0)", sense), *branch("half & 2 != 0", ["break"])]
     step += _watch(build)
     if plan.stop:
-        step += branch(f"values[{_column(plan, 'n_coll')}] > 0.5", ["break"])
+        step += branch(f"values[{_column(plan, 'n_coll')}] > 0.5", ["held[3] = ONE; following = step", "break"])
     sample = []
     if "sample" in _clocks(plan):
         sample += [f"measure_sample({measure.arguments(build)})"]
         sample += measure.accumulate(build, "sample")
     if plan.record:
-        sample += ["frame = step // sample_every"]
+        sample += ["frame = step // sample_every - (first + sample_every - 1) // sample_every"]
         names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
         sample += loop(
             "i in range(n)", [f"frames[frame, {c}, {build.who}] = work[{build.row(x)}, i]" for c, x in enumerate(names)]
         )
     step += branch("step % sample_every == 0", sample) if sample else []
-    advance = [
+    moving = [
         "fastest = move(step, n, m, row, whole, work, words, gust)",
         "travelled += real(2.0) * math.sqrt(fastest) * c.dt",
     ]
     if plan.sequential:
         _turns(build)
         given = "step, n, m, time, late, row, whole, faces, edges, spans, scene, work, words, store, gust, mem"
-        advance = [f"fastest = turns({given})", advance[1]]
-    step += branch("step < steps", advance)
-    lines += loop("step in range(steps + 1)", step)
-    lines += slots.restored(build)
+        moving = [f"fastest = turns({given})", moving[1]]
+    step += branch("step < steps", moving)
+    lines += loop("step in range(first, last)", step)
+    lines += ["held[0] = travelled; held[1] = gap; held[2] = ONE if calm else ZERO"]
     arguments = "row, whole, faces, edges, spans, scene, start, work, words, past, store, gust, mem, memory, labels"
     arguments += (
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
     )
-    build.function(f"fly({arguments})", lines, "return 0")
+    build.function(f"advance(first, last, half, held, {arguments})", lines, "return following")
     return _text(build, plan.model.name)
 
 
@@ -203,5 +213,5 @@ def _text(build: Builder, label: str) -> str:
     if not build.plan.grid:  # which sorts cells into arrays of its own
         head = head.replace("COUNTED = True", "COUNTED = False")
     last = build.functions[-1].replace("@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
-    parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {len(build.rows)}"]
+    parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {build.rows!r}"]
     return "\n\n".join(parts) + "\n"

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from airflock.display import fly_show, points_of
-from airflock.engine.cpu import in_threads
+from airflock.engine.threads import in_threads
 from airflock.papers import statistics
 from airflock.papers.claims import Claim, judged
 from airflock.papers.flights import Flights
