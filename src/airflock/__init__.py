@@ -16,6 +16,7 @@ _WHERE = {
     "Parameters": "airflock.core.parameters",
     "simulate": "airflock.recordings.flights",
     "Flight": "airflock.engine.flight",
+    "recording_of": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",

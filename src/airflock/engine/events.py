@@ -39,7 +39,7 @@ def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
             raise FlightError(f"events[{number}]: needs step, kind and data") from fault
         if event.kind not in KINDS or event.step < 0 or not isinstance(event.data, Mapping):
             raise FlightError(
-                f"events[{number}]: kind = {event.kind!r} at step {event.step}: known: {', '.join(KINDS)}"
+                f"events[{number}]: kind = {event.kind!r} at step {event.step}; known kinds: {', '.join(KINDS)}"
             )
         events.append(event)
     return sorted(events, key=lambda event: event.step)

@@ -62,12 +62,13 @@ class Flight:
         self.scenario = loaded(scenario).in_flight(self.seed)
         self.precision, self.records = precision, record
         self._state = opened(self.scenario, self.seed, precision, record, start, world)
-        self._origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
+        self.origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
         self._steps, self.step, self._since = self._state.whole("steps"), 0, 0
         self._sensed = False
         self.events: list[Event] = []
         self.windows: list[Window] = []
         self._frames: list[NDArray[Any]] = []
+        self._sampled: list[NDArray[Any]] = []
         self._planned = events_of(events)
         self._coming: tuple[Scenario, dict[str, Any], Future[State]] | None = None
 
@@ -144,7 +145,9 @@ class Flight:
             raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
         self.step, self._sensed = done, False
         if frames is not None:
-            self._frames.append(frames[: state.samples() - before] if state.ended else frames)
+            frames = frames[: state.samples() - before] if state.ended else frames
+            self._frames.append(frames)
+            self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
         if not state.finite:
             self._fail(first)
 
@@ -186,6 +189,11 @@ class Flight:
     def scores(self) -> dict[str, Any]:
         """Order parameters and fitness of the window since the last change, up to now."""
         return finish(self.scenario, self._state.values())
+
+    @property
+    def frame_times(self) -> NDArray[Any]:
+        """Times of the samples in `frames`, s."""
+        return np.concatenate([np.zeros(0), *self._sampled])
 
     @property
     def frames(self) -> NDArray[Any]:
@@ -352,8 +360,9 @@ class Flight:
     def snapshot(self) -> Snapshot:
         """Keep the present moment, to go back to with `restore`."""
         return Snapshot(
-            __version__, self._origin, self.scenario, self._state, self._state.buffer.copy(), self.step, self._sensed,
+            __version__, self.origin, self.scenario, self._state, self._state.buffer.copy(), self.step, self._sensed,
             self._since, tuple(self.events), tuple(self.windows), tuple(self._frames),
+            tuple(self._sampled),
         )  # fmt: skip
 
     def restore(self, snapshot: Snapshot) -> "Flight":
@@ -363,7 +372,7 @@ class Flight:
         """
         if snapshot.version != __version__:
             raise FlightError(f"snapshot: made by version {snapshot.version}, this is {__version__}")
-        if snapshot.origin is not self._origin:
+        if snapshot.origin is not self.origin:
             theirs, seed = snapshot.origin[0].name, snapshot.origin[1]
             raise FlightError(f"snapshot: of {theirs}, seed {seed}, in a flight of its own; not of this flight")
         self._coming, self._planned = None, []
@@ -372,7 +381,8 @@ class Flight:
         self._state.buffer[:] = snapshot.bytes
         self.scenario, self.step, self._sensed = snapshot.scenario, snapshot.step, snapshot.sensed
         self._since, self._steps = snapshot.begin, self._state.whole("steps")
-        self.events, self.windows, self._frames = list(snapshot.events), list(snapshot.windows), list(snapshot.frames)
+        self.events, self.windows = list(snapshot.events), list(snapshot.windows)
+        self._frames, self._sampled = list(snapshot.frames), list(snapshot.sampled)
         self.world = self._state.whole("world")
         return self
 
@@ -385,7 +395,8 @@ class Flight:
         twin.__dict__.update(self.__dict__)
         twin._state = self._state.twin()
         twin._planned, twin._coming = list(self._planned), None
-        twin.events, twin.windows, twin._frames = list(self.events), list(self.windows), list(self._frames)
+        twin.events, twin.windows = list(self.events), list(self.windows)
+        twin._frames, twin._sampled = list(self._frames), list(self._sampled)
         if world is not None and world != self.world:
             twin._to_world(world)
         return twin
@@ -400,7 +411,7 @@ class Flight:
 
     def again(self) -> "Flight":
         """The same flight from its start, with the same events to come."""
-        scenario, seed, precision, start = self._origin
+        scenario, seed, precision, start = self.origin
         return Flight(scenario, seed, precision=precision, record=self.records, start=start, events=self.events)
 
 

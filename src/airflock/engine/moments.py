@@ -39,3 +39,4 @@ class Snapshot:
     events: tuple[Event, ...]
     windows: tuple[Window, ...]
     frames: tuple[NDArray[Any], ...]
+    sampled: tuple[NDArray[Any], ...]

@@ -3,19 +3,22 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from airflock import __version__
-from airflock.engine import cpu
+from airflock.engine.events import Event
+from airflock.engine.flight import Flight
 from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
+from airflock.errors import FlightError
 from airflock.recordings.layout import dataset
 from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
@@ -30,6 +33,7 @@ def simulate(
     start: Any = None,
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
+    events: Sequence[Event | Mapping[str, Any]] = (),
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
@@ -38,18 +42,36 @@ def simulate(
     precision : 32 or 64 bits per number
     start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
     device    : cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked
+    events    : what is done to the flight on its way, as `Flight.events` or the attribute airflock_events hold it
     Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
     hold the scenario, the seed, versions and processor, so that it can be flown again.
     """
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)
     device = picked([scenario], device, precision=precision, record=True, say=say)
+    if device == "cpu":
+        flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events)
+        flight.finish()
+        return recording_of(flight)
+    if events:
+        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu")
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
-    period = clock(scenario)["sample_every"] * scenario.flight.dt
+    times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
+    attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
+    return dataset(flown.frames, scenario.dimensions, times, attributes, scenario.model.command)
+
+
+def recording_of(flight: Flight) -> xr.Dataset:
+    """Recording of what an open flight has flown so far; it must have been opened with record=True.
+
+    Its attribute airflock_events holds what was done to the flight; with scenario and seed it gives the same bits.
+    """
+    scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
-    attributes |= {"airflock_device": device} if device != "cpu" else {}
-    return dataset(flown.frames, scenario.dimensions, period, attributes, scenario.model.command)
+    if flight.events:
+        attributes["airflock_events"] = json.dumps([plain(event.plain()) for event in flight.events])
+    return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
@@ -99,8 +121,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(entry) for entry in value]
     return value
-
-
-def warm(scenario: Scenario, precision: int = 32) -> None:
-    """Compile or load the driver of a scenario before it is needed."""
-    cpu.flight_driver(plan_of(scenario, precision=precision))
