@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.passes.flock import scratch_of
 from airflock.engine.state import BEGUN, State
 
 
@@ -29,6 +30,8 @@ def carry(old: State, new: State, step: int) -> None:
     if old.plan.goals and new.plan.goals and old.arrays["reached"].shape == new.arrays["reached"].shape:
         for name in ("aim", "reached"):
             new.arrays[name][...] = old.arrays[name]
+    for name in _solved(old, new):
+        new.arrays[name][...] = old.arrays[name]
     new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]
 
 
@@ -79,3 +82,16 @@ def _remembered(old: State, new: State) -> None:
         if count and place is not None:
             new.arrays["memory"][first : first + count] = old.arrays["memory"][place : place + count]
         first += count
+
+
+def _solved(old: State, new: State) -> list[str]:
+    """What rules of the whole flock carry from call to call, where wings are what they were; else it is found anew."""
+    first = 0
+    for letter, names in new.plan.records.items():
+        if letter == "wing" and old.plan == new.plan:
+            wing = slice(first, first + len(names))
+            if np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
+                scratch = scratch_of(new.plan, new.tables.row, new.agents)
+                return [name for parts in scratch for name, _, spare in parts if not spare]
+        first += len(names)
+    return []

@@ -114,6 +114,6 @@ def measure_frames(
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
     driver.measure_frames(
         tables.row, tables.whole, tables.edges, tables.spans, state.scene, own["work"], own["memory"], state.labels,
-        own["values"], own["sums"], np.ascontiguousarray(frames, real), series, real.type(period), *state.solvers,
+        own["values"], own["sums"], np.ascontiguousarray(frames, real), series, real.type(period), *state.scratch,
     )  # fmt: skip
     return state.values(), series

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.passes import grid
-from airflock.engine.passes.flock import scratch
+from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.tables import Tables
@@ -54,20 +54,26 @@ class State:
             "past": ((whole["ring"], 2 * dims, m), real),
             "store": (packets, real),
         }
+        scratch = scratch_of(plan, tables.row, n)
+        kept = {name: (size, real) for parts in scratch for name, size, spare in parts if not spare}
         self.plan, self.driver, self.tables, self.agents = plan, driver, tables, n
         self.buffer, self.arrays = _one_buffer(
-            {name: (array.shape, array.dtype) for name, array in initial.items()} | empty
+            {name: (array.shape, array.dtype) for name, array in initial.items()} | empty | kept
         )
         for name, array in initial.items():
             self.arrays[name][...] = array
         self.arrays["store"][:, 2 * dims] = NEVER
         self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
         self.start = np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real)
-        # used within a step only: random words, shapes near an agent, marks of clusters, cells; solvers, which besides
-        # keep what follows from the numbers of a wing alone
+        # used within a step only: random words, shapes near an agent, marks of clusters, cells, and what rules of the
+        # whole flock use within a call (its pages of zeros cost nothing until they are written)
         self.words, self.near = rows((4, m), np.uint32), np.zeros(NEAR, np.int64)
         self.labels = rows((2, m), np.int32 if plan.bits == 32 else np.int64)
-        self.solvers, self.cells = scratch(plan, tables.row, n), grid.memory(plan, n, rows)
+        self.solvers = tuple(
+            tuple(np.zeros(size, real) if spare else self.arrays[name] for name, size, spare in parts)
+            for parts in scratch
+        )
+        self.cells = grid.memory(plan, n, rows)
         self.no_frames = np.zeros((1, 3 * dims, n), real)
         self._given = self._arguments()
 
@@ -79,7 +85,12 @@ class State:
             own["work"], self.words, own["past"], own["store"], own["gust"], own["mem"], own["memory"], self.labels,
             own["values"], own["sums"],
         )  # fmt: skip
-        return before, (*self.solvers, *self.cells)
+        return before, (*self.scratch, *self.cells)
+
+    @property
+    def scratch(self) -> tuple[tuple[tuple[NDArray[Any], ...], ...], ...]:
+        """Scratch of the rules of the whole flock, as one last argument of a driver or none."""
+        return (self.solvers,) if self.solvers else ()
 
     @property
     def scene(self) -> tuple[NDArray[Any], ...]:
