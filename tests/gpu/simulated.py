@@ -41,6 +41,10 @@ CASES = {
         "world.dimensions": "3", "radio.kind": "links", "radio.delay": 0.2, "radio.near": 5.0, "radio.far": 30.0,
         "model.limit": "cap",
     }, 2, True),
+    "torus": ("vasarhelyi_2018", {
+        "world.edges": "periodic", "world.side": 40.0, "radio.kind": "links", "radio.loss": 0.5, "radio.near": 5.0,
+        "radio.far": 20.0, "start.speed": 4.0,
+    }, 2, True),
     "polygon": ("vasarhelyi_2018", {
         "world.arena": "polygon", "world.corners": PENTAGON, "sensors.noise": 0.0, "radio.delay": 0.31,
         "sensors.period": 0.25, "metrics.period": 0.5, "agents": 4,

@@ -4,7 +4,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine import interpreted
 from airflock.engine.passes import grid
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.driver import flight, replay
@@ -54,9 +55,14 @@ def replay_driver(plan: Plan) -> ModuleType:
     return load_driver(replay(plan), "recordings")
 
 
-def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
+def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
+    """Driver of a plan: compiled, or with device = python its text as plain Python."""
+    return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
+
+
+def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: str = "cpu") -> Flown:
     """Fly one world from its tables; `start` is (component, agent) where the plan asks for it."""
-    driver = flight_driver(plan)
+    driver = driver_of(plan, device)
     real = tables.row.dtype
     whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
     n, dims = whole["agents"], plan.dimensions
@@ -71,7 +77,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
     values, sums = _sums(plan)
     frames = np.zeros((whole["steps"] // whole["sample_every"] + 1, 3 * dims, n), real) if plan.record else None
     scene = _scene(tables)
-    with compiling(plan.model.name):
+    with compiling(plan.model.name) if device == "cpu" else nullcontext():
         status = driver.fly(
             tables.row, tables.whole, tables.faces, tables.edges, tables.spans, scene,
             np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real),
@@ -98,10 +104,10 @@ def compiling(model: str) -> Iterator[None]:
 
 
 def measure_frames(
-    plan: Plan, tables: Tables, frames: NDArray[Any], period: float = 0.0
+    plan: Plan, tables: Tables, frames: NDArray[Any], period: float = 0.0, device: str = "cpu"
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """Score frames (time, component, agent), period s apart: combined values, and the values of every instant."""
-    driver = replay_driver(plan)
+    driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
     m = -(-frames.shape[2] // LANES) * LANES
     values, sums = _sums(plan)

@@ -38,7 +38,13 @@ SPAN = "m = n if n % 32 <= 10 else work.shape[1]"
 
 def flight(plan: Plan) -> str:
     """Text of the driver that flies one world: function `fly`."""
+    return _text(stages(plan), plan.model.name)
+
+
+def stages(plan: Plan, lenient: bool = False) -> Builder:
+    """Stages of the driver that flies one world; the last one is `fly`. lenient : as for `generate.Source`."""
     build = Builder(plan)
+    build.source.lenient = lenient
     build.slots = slots.slotted(plan)
     axes = plan.axes
     perceive.snapshot(build)
@@ -108,7 +114,7 @@ def flight(plan: Plan) -> str:
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
     )
     build.function(f"fly({arguments})", lines, "return 0")
-    return _text(build, plan.model.name)
+    return build
 
 
 def _column(plan: Plan, name: str) -> int:
@@ -167,6 +173,11 @@ def _watch(build: Builder) -> list[str]:
 
 def replay(plan: Plan) -> str:
     """Text of the driver that measures a recording: function `measure_frames`."""
+    return _text(replay_stages(plan), "recordings")
+
+
+def replay_stages(plan: Plan) -> Builder:
+    """Stages of the driver that measures a recording; the last one is `measure_frames`."""
     build = Builder(plan)
     axes = plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
@@ -190,7 +201,7 @@ def replay(plan: Plan) -> str:
         lines,
         "return 0",
     )
-    return _text(build, "recordings")
+    return build
 
 
 def _clocks(plan: Plan) -> list[str]:

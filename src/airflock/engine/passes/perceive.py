@@ -71,11 +71,12 @@ def receive(build: Builder) -> None:
     if not (plan.lossy or plan.links):
         return
     philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
-    lines = build.records("k c") + build.whole("world", "seed_low", "seed_high")
+    lines = build.records("k c w" if plan.periodic else "k c") + build.whole("world", "seed_low", "seed_high")
     lines += build.bind([*axes, "heard", "age"])
-    distance = "math.sqrt(" + " + ".join(f"({a}[j] - {a}[i]) * ({a}[j] - {a}[i])" for a in axes) + " + TINY)"
+    offsets = {a: f"o{a}" if plan.periodic else f"({a}[j] - {a}[i])" for a in axes}  # neighbours are met at their image
+    inner = [f"o{a} = {a}[j] - {a}[i]" for a in axes] + build.image(axes, "o{}") if plan.periodic else []
+    inner += ["d = math.sqrt(" + " + ".join(f"{offset} * {offset}" for offset in offsets.values()) + " + TINY)"]
     draw = f"w0, w1, w2, w3 = {philox}(i * n + j, k_, {{}}, world, seed_low, seed_high)"
-    inner = [f"d = {distance}"]
     if plan.lossy:
         inner += [
             draw.format(random.LOSS),
