@@ -92,12 +92,14 @@ def receive(build: Builder) -> None:
             f"fast = real({packets}(real(k_), k.fast_rate, c.period))",
             f"slow = real({packets}(real(k_), k.slow_rate, c.period))",
         ]
+        lines += ["farthest = math.sqrt(k.range * k.range + TINY)"] if plan.bits == 64 else []  # as d carries its guard
+        within = "farthest" if plan.bits == 64 else "k.range"
         stamp = 2 * len(axes)
         inner += [
             draw.format(random.LINK),
             f"miss_fast = (ONE - {received}(d, ZERO, k)) ** fast",
             f"miss_slow = (ONE - {received}(d, ONE, k)) ** slow",
-            f"got = arrives & (d <= k.range) & ({uniform}(w0) >= miss_fast * miss_slow)",
+            f"got = arrives & (d <= {within}) & ({uniform}(w0) >= miss_fast * miss_slow)",
             "if got:",
             *[f"    store[i, {c}, j] = {s}[j]" for c, s in enumerate(states)],
             f"    store[i, {stamp}, j] = time - late",
