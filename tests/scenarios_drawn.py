@@ -6,16 +6,20 @@ spheres and rays touch what they pass. `drawn` takes any `random.Random`: that o
 or a seeded one.
 """
 
+from itertools import combinations, product
+from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.body.registry import BODIES as KNOWN_BODIES
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.errors import ScenarioError
 from airflock.scenarios.files import MODELS, find_model, make
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import SECTIONS, Flight
 
 # A length (m) at which agents of a law act on each other, the number that carries it, and a speed, m/s
 SCALES = {
@@ -26,6 +30,7 @@ SCALES = {
 BODIES = {
     "velocity": ("multirotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
 }  # fmt: skip
+CUBE = str(Path(__file__).parent / "cube.obj")
 SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python
 
 
@@ -98,13 +103,12 @@ def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
     if body in ("multirotor", "jostled") and rng.random() < 0.5:
         keys["body.noise"] = 0.0
     elif rng.random() < 0.5:
-        from airflock.body.registry import BODIES as KNOWN
-
-        sometimes(keys, rng, KNOWN[body].Parameters, "body", 0.4)
+        sometimes(keys, rng, KNOWN_BODIES[body].Parameters, "body", 0.4)
     if kind != "dimock_2003" and law.command == "velocity" and rng.random() < 0.12:
-        keys |= {"aero.k_d": rng.choice((0.05, 0.3)), "aero.gradient": rng.choice(("frozen", "cells", "cells_frozen"))}
+        keys |= {"aero.k_d": rng.choice((0.05, 0.3)), "aero.gradient": rng.choice(OPTIONS["aero"]["gradient"])}
     keys["wing.segments"] = rng.choice(SEGMENTS)
-    keys["wing.stall"] = rng.choice(("refused", "noted"))
+    for name in ("layout", "positions", "frame", "stall"):
+        keys[f"wing.{name}"] = rng.choice(OPTIONS["wing"][name])
 
 
 def world(keys: dict[str, Any], rng: Random, length: float) -> None:
@@ -127,8 +131,11 @@ def world(keys: dict[str, Any], rng: Random, length: float) -> None:
 
 def scene(keys: dict[str, Any], rng: Random, length: float) -> None:
     """What stands in the world."""
-    kind = rng.choice(("none", "none", "boxes", "city", "forest"))
+    kind = rng.choice(("none", "none", "none", "boxes", "boxes", "city", "forest", "mesh"))
     if kind == "none":
+        return
+    if kind == "mesh":
+        keys |= {"scene.kind": kind, "scene.file": CUBE, "scene.unit": 0.5 * length, "scene.up": rng.choice("zy")}
         return
     keys |= {"scene.kind": kind, "scene.seed": rng.randrange(1000), "scene.ground": rng.choice(("yes", "no"))}
     if kind == "boxes":
@@ -243,10 +250,29 @@ def lattice(keys: dict[str, Any], rng: Random, length: float, speed: float, reac
     return np.concatenate([chosen, along] if three else [chosen[:2], along[:2]])
 
 
+def options(record: type) -> dict[str, tuple[str, ...]]:
+    """Of each choice of a record what it may be."""
+    return {name: declared.options for name, declared, _ in declarations(record) if isinstance(declared, Choice)}
+
+
+OPTIONS = {section: options(record) for section, record in {**SECTIONS, "flight": Flight}.items()}
+OPTIONS |= {kind: options(find_model(kind).Parameters) for kind in MODELS}
+OPTIONS |= {
+    "model": {"kind": MODELS},
+    "body": {"kind": tuple(KNOWN_BODIES), **options(KNOWN_BODIES["heading"].Parameters)},
+}
+OPTIONS["wing"] = OPTIONS["wing"] | {"segments": tuple(dict.fromkeys(SEGMENTS))}
+CHOICES = [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
+SWITCHES = (
+    "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
+    "stop", "descends", "given", "sees", "walls",
+)  # fmt: skip
+
+
 def notions(draw: Draw) -> set[str]:
     """What is on or off, and which of each choice was drawn."""
     found, keys = draw.scenario, draw.keys
-    switches = {
+    switches: dict[str, bool] = {
         "three": found.dimensions == 3, "noisy": found.sensors.noise > 0.0, "late": found.radio.delay > 0.0,
         "lossy": found.radio.loss > 0.0, "links": found.radio.kind == "links", "gusts": found.wind.gust > 0.0,
         "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
@@ -255,13 +281,38 @@ def notions(draw: Draw) -> set[str]:
         "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
     }  # fmt: skip
+    assert tuple(switches) == SWITCHES
     names = {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
     records = {
         "model": found.parameters, "body": found.body, "radio": found.radio, "world": found.world, "scene": found.scene,
-        "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics, "top": found.flight,
-    }  # fmt: skip
+        "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
+        "flight": found.flight,
+    } | ({"aero": found.aero} if found.descends else {})  # fmt: skip
     kind = keys["model.kind"]
     for section, record in records.items():
         owner = kind if section == "model" else section
         names |= {f"{owner}.{name} = {value}" for name, value in choices(record).items()}
     return names | {f"model.kind = {kind}", f"body.kind = {keys['body.kind']}"}
+
+
+IMPOSSIBLE = (
+    {"goals on", "own on"},  # goals of the flock, or one for each agent
+    {"periodic on", "islands on"},
+    {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},
+    {"sequential on", "links on"}, {"descends on", "sequential on"},
+    {"sees on", "walls on"}, {"descends on", "sees on"},
+)  # fmt: skip
+
+
+def missing(held_by_draw: list[list[str]]) -> list[str]:
+    """What no draw holds, of the notions of each: a choice, or a pair of notions on or off."""
+    held = set().union(*held_by_draw)
+    switched = [[name for name in names if name.endswith((" on", " off"))] for names in held_by_draw]
+    pairs = {pair for names in switched for pair in combinations(sorted(names), 2)}
+    lacking = [name for name in CHOICES if name not in held]
+    for one, other in combinations(sorted(SWITCHES), 2):
+        for a, b in product(("on", "off"), repeat=2):
+            pair = tuple(sorted((f"{one} {a}", f"{other} {b}")))
+            if pair not in pairs and set(pair) not in IMPOSSIBLE:
+                lacking.append(" with ".join(pair))
+    return lacking
