@@ -32,6 +32,11 @@ def flown(found, seed=0, start=None, precision=64):
     return fly(found, seed, precision=precision, record=True, start=start)
 
 
+def interpreted(found, seed=0, start=None):
+    """The same flight by the same driver text, not compiled: for whatever is no question of compiling."""
+    return fly(found, seed, precision=64, record=True, start=start, device="python")
+
+
 def from_start(found, *agents, precision=64):
     """Compiled flight from given (x, y, vx, vy) or (x, y, z, vx, vy, vz) of each agent."""
     return flown(

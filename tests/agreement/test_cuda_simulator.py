@@ -12,8 +12,8 @@ pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airfloc
 
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
-    "paper", "split", "storm", "polygon", "silo", "links", "table", "couzin", "vicsek", "groups", "together", "city",
-    "herd", "stop", "display", "wings", "vee", "echelon",
+    "paper", "split", "storm", "polygon", "silo", "links", "torus", "table", "couzin", "vicsek", "groups", "together",
+    "city", "herd", "stop", "display", "wings", "vee", "echelon",
 )  # fmt: skip
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from airflock.engine import cpu
-from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
 from flocks import flown, scenario
+from reference.flight import fly_plainly
 
 PAPER = {
     "agents": 30, "duration": 20.0, "world__side": 120.0, "world__walls": "nearest_per_axis", "start__separation": 6.0,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from airflock.engine.plain import fly_plainly
 from airflock.scenarios.files import load
 from flocks import PENTAGON, SILENT, flown, from_start, ideal, scenario
+from reference.flight import fly_plainly
 
 OPEN = {"world__side": 1e4, "world__height": 1e4}
 

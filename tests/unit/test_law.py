@@ -59,8 +59,41 @@ def walrus(dx):
     return (far := dx * dx) + far
 
 
+def named_like_indices(k, n, e, m, row, word, p):
+    return 2 * k + (n - 1) / 3 + e * 2 + (m + 1) * row - 1 + 2 * word
+
+
+def element(table, k):
+    return table[k][0]
+
+
+def halved(m):
+    return (m + 1) // 2
+
+
+def indices(x, work, first, last, size, p):
+    total = 0.0
+    at = 0
+    other = at + 3
+    for k in range(size - 1):
+        total += x[2 * k + 1] + element(work, first - 1) * float(3 * other - 1) + float(k + 1)
+    for e in range(first + 1, 2 * last):
+        total += float(halved(4 * e) - 1)
+    return total
+
+
 def test_a_lawful_rule_passes():
     assert law.faults(lawful) == []
+
+
+def test_a_float_is_a_float_whatever_its_name():
+    """A name that is used as no index makes of an integer beside it a double in a kernel of single precision."""
+    said = law.faults(named_like_indices)
+    assert [line.partition("integer ")[2].split()[0] for line in sorted(said)] == ["1", "1", "1", "2", "2", "2", "3"]
+
+
+def test_what_counts_or_points_is_an_integer_whatever_its_name():
+    assert law.faults(indices) == law.faults(halved) == []
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine import interpreted
 from airflock.engine.passes.driver import flight, replay
 from airflock.engine.plan import Plan
 from airflock.engine.state import State
@@ -47,13 +48,17 @@ def replay_driver(plan: Plan) -> ModuleType:
     return load_driver(replay(plan), "recordings")
 
 
-def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None) -> Flown:
+def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
+    """Driver of a plan: compiled, or with device = python its text as plain Python."""
+    return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
+
+
+def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: str = "cpu") -> Flown:
     """Fly one world from its tables, from step 0 to its end.
 
     start : (component, agent), m and m/s, where the plan asks for it
     """
-    driver = flight_driver(plan)
-    state = State(plan, tables, driver, start)
+    state = State(plan, tables, driver_of(plan, device), start)
     steps, every = state.whole("steps"), state.whole("sample_every")
     frames = (
         np.zeros((steps // every + 1, 3 * plan.dimensions, state.agents), tables.row.dtype) if plan.record else None
@@ -104,10 +109,10 @@ def compiling(model: str) -> Iterator[None]:
 
 
 def measure_frames(
-    plan: Plan, tables: Tables, frames: NDArray[Any], period: float = 0.0
+    plan: Plan, tables: Tables, frames: NDArray[Any], period: float = 0.0, device: str = "cpu"
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
     """Score frames (time, component, agent), period s apart: combined values, and the values of every instant."""
-    driver = replay_driver(plan)
+    driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
     state = State(plan, tables, driver)
     own = state.arrays

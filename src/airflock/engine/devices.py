@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from airflock.engine import cpu
 from airflock.engine.cpu import Flown
 from airflock.engine.plan import Plan
 from airflock.engine.tables import clock, tables
@@ -108,9 +109,8 @@ def fly_one(
 ) -> Flown:  # plan: with or without recorded frames
     """Fly one world on a named device other than the CPU."""
     if device == "python":
-        from airflock.engine.plain import fly_plainly
-
-        return fly_plainly(scenario, seed, start)
+        plan = replace(plan, grid=False, bits=64)
+        return cpu.fly(plan, tables(scenario, plan, seed), start, device)
     return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
 
 

@@ -22,6 +22,7 @@ from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
+DEVICES = ("cpu", "python")
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
 
 
@@ -36,6 +37,7 @@ class Flight:
     precision : 32 or 64 bits per number
     record    : keep a frame every metrics.period
     start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
+    device    : cpu, or python: the same stages uncompiled, for debuggers, in double precision
     world     : which of 2^32 independent streams of random numbers of this seed
     events    : what is done to the flight on its way, as `events` of an earlier flight holds it
 
@@ -56,12 +58,16 @@ class Flight:
         record: bool = False,
         start: Any = None,
         world: int = 0,
+        device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
     ):
         self.seed, self.world = sound_seed(seed), world
         self.scenario = loaded(scenario).in_flight(self.seed)
         self.precision, self.records = precision, record
-        self._state = opened(self.scenario, self.seed, precision, record, start, world)
+        if device not in DEVICES:
+            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(DEVICES)}")
+        self.device = device
+        self._state = opened(self.scenario, self.seed, precision, record, start, world, device=device)
         self.origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
         self._steps, self.step, self._since = self._state.whole("steps"), 0, 0
         self._sensed = False
@@ -412,7 +418,15 @@ class Flight:
     def again(self) -> "Flight":
         """The same flight from its start, with the same events to come."""
         scenario, seed, precision, start = self.origin
-        return Flight(scenario, seed, precision=precision, record=self.records, start=start, events=self.events)
+        return Flight(
+            scenario,
+            seed,
+            precision=precision,
+            record=self.records,
+            start=start,
+            events=self.events,
+            device=self.device,
+        )
 
 
 def _compiled(state: State) -> State:

@@ -171,8 +171,8 @@ def _first_bad(flown: cpu.Flown) -> int | None:
 def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
     """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
     low, high = 0, clock(scenario)["steps"]
-    if device == "cpu":
-        return failure.first_bad_step(opened(scenario, seed, precision, False, start), low, high)
+    if device != "cuda":
+        return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), low, high)
     plan = replace(plan_of(scenario, precision=precision), given_start=start is not None)
     while high - low > 1:
         middle = (low + high) // 2
@@ -193,18 +193,22 @@ def opened(
     world: int = 0,
     *,
     given_start: bool = False,
+    device: str = "cpu",
 ) -> State:
     """State of a flight before its first step.
 
     start       : as in `fly`; given_start : whether agents have been given their places already, so that none are drawn
+    device      : cpu, or python, in double precision and with all pairs
     Raises FlightError where `start` cannot be flown.
     """
     plan = plan_of(scenario, precision=precision, record=record)
+    if device == "python":
+        plan = replace(plan, grid=False, bits=64)
     given = None
     if start is not None:
         given = sound_start(scenario, plan, start)
     plan = replace(plan, given_start=given_start or start is not None)
-    return State(plan, tables(scenario, plan, seed, world), cpu.flight_driver(plan), given)
+    return State(plan, tables(scenario, plan, seed, world), cpu.driver_of(plan, device), given)
 
 
 def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from airflock import __version__
 from airflock.engine.events import Event
-from airflock.engine.flight import Flight
+from airflock.engine.flight import DEVICES, Flight
 from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
@@ -49,12 +49,12 @@ def simulate(
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)
     device = picked([scenario], device, precision=precision, record=True, say=say)
-    if device == "cpu":
-        flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events)
+    if device in DEVICES:
+        flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
         flight.finish()
         return recording_of(flight)
     if events:
-        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu")
+        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu or python")
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
@@ -69,6 +69,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
     """
     scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
+    attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
         attributes["airflock_events"] = json.dumps([plain(event.plain()) for event in flight.events])
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)

@@ -1,5 +1,6 @@
 """Builder: what all passes share while the text of one driver grows."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from textwrap import indent
 from typing import Any
@@ -98,6 +99,9 @@ class Builder:
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return
         read = [line.partition(" = ")[0] for line in lines if " = " in line and line[0] != " " and ";" not in line]
+        several = [part.partition(" = ")[0] for line in lines if line[0] != " " for part in line.split("; ")]
+        used = set(re.findall(r"\w+", "\n".join(body)))
+        read += [name for name in several if name not in read and name in used]
         given = ", ".join(dict.fromkeys(["i", *arguments.split(", "), *(w for w in read if w.isidentifier())]))
         self.function(f"{name}_of({given})", body, f"return {answer}")
         self.turns.append((lines, f"{name}_of({given})"))

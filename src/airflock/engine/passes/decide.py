@@ -37,9 +37,12 @@ def neighbours(build: Builder) -> None:
     selective = plan.lossy or plan.links
     rows += ["heard", "age"] if selective else []
     lines = build.records("p k c w" if plan.periodic else "p k c") + build.bind(rows)
-    lines += ["range_ = least(k.range, LIMIT)", "range2 = range_ * range_"]
+    # A neighbour at exactly the range or the reach counts. Squares of distances that carry the guard TINY, which only
+    # double precision can tell, are compared with squares that carry it, too.
+    guard = " + TINY" if plan.bits == 64 else ""
+    lines += ["range_ = least(k.range, LIMIT)", f"range2 = range_ * range_{'' if truth else guard}"]
     if model.reach is not None:
-        lines += [f"near = least({build.call(model.reach, 'reach', {})}, LIMIT)", "near2 = near * near"]
+        lines += [f"near = least({build.call(model.reach, 'reach', {})}, LIMIT)", f"near2 = near * near{guard}"]
     outer = ["ii = integer(i)"]
     if selective:
         outer += ["receive(i, k_, n, time, late, row, whole, work, store)"]

@@ -46,7 +46,13 @@ def flight(plan: Plan) -> str:
            of the collisions' memory is at its start, whether the flight has ended at a collision, whether agents have
            their places (each 1 or 0)
     """
+    return _text(stages(plan), plan.model.name)
+
+
+def stages(plan: Plan, lenient: bool = False) -> Builder:
+    """Stages of the driver that flies one world; the last one is `advance`. lenient : as for `generate.Source`."""
     build = Builder(plan)
+    build.source.lenient = lenient
     build.slots = slots.slotted(plan)
     axes = plan.axes
     perceive.snapshot(build)
@@ -118,7 +124,7 @@ def flight(plan: Plan) -> str:
         ", values, sums, frames" + (", scratch" if flock.owners(plan) else "") + (", cells" if plan.grid else "")
     )
     build.function(f"advance(first, last, half, held, {arguments})", lines, "return following")
-    return _text(build, plan.model.name)
+    return build
 
 
 def _column(plan: Plan, name: str) -> int:
@@ -177,6 +183,11 @@ def _watch(build: Builder) -> list[str]:
 
 def replay(plan: Plan) -> str:
     """Text of the driver that measures a recording: function `measure_frames`."""
+    return _text(replay_stages(plan), "recordings")
+
+
+def replay_stages(plan: Plan) -> Builder:
+    """Stages of the driver that measures a recording; the last one is `measure_frames`."""
     build = Builder(plan)
     axes = plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
@@ -200,7 +211,7 @@ def replay(plan: Plan) -> str:
         lines,
         "return 0",
     )
-    return _text(build, "recordings")
+    return build
 
 
 def _clocks(plan: Plan) -> list[str]:

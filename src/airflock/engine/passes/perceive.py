@@ -71,11 +71,12 @@ def receive(build: Builder) -> None:
     if not (plan.lossy or plan.links):
         return
     philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
-    lines = build.records("k c") + build.whole("world", "seed_low", "seed_high")
+    lines = build.records("k c w" if plan.periodic else "k c") + build.whole("world", "seed_low", "seed_high")
     lines += build.bind([*axes, "heard", "age"])
-    distance = "math.sqrt(" + " + ".join(f"({a}[j] - {a}[i]) * ({a}[j] - {a}[i])" for a in axes) + " + TINY)"
+    offsets = {a: f"o{a}" if plan.periodic else f"({a}[j] - {a}[i])" for a in axes}  # neighbours are met at their image
+    inner = [f"o{a} = {a}[j] - {a}[i]" for a in axes] + build.image(axes, "o{}") if plan.periodic else []
+    inner += ["d = math.sqrt(" + " + ".join(f"{offset} * {offset}" for offset in offsets.values()) + " + TINY)"]
     draw = f"w0, w1, w2, w3 = {philox}(i * n + j, k_, {{}}, world, seed_low, seed_high)"
-    inner = [f"d = {distance}"]
     if plan.lossy:
         inner += [
             draw.format(random.LOSS),
@@ -91,12 +92,14 @@ def receive(build: Builder) -> None:
             f"fast = real({packets}(real(k_), k.fast_rate, c.period))",
             f"slow = real({packets}(real(k_), k.slow_rate, c.period))",
         ]
+        lines += ["farthest = math.sqrt(k.range * k.range + TINY)"] if plan.bits == 64 else []  # as d carries its guard
+        within = "farthest" if plan.bits == 64 else "k.range"
         stamp = 2 * len(axes)
         inner += [
             draw.format(random.LINK),
             f"miss_fast = (ONE - {received}(d, ZERO, k)) ** fast",
             f"miss_slow = (ONE - {received}(d, ONE, k)) ** slow",
-            f"got = arrives & (d <= k.range) & ({uniform}(w0) >= miss_fast * miss_slow)",
+            f"got = arrives & (d <= {within}) & ({uniform}(w0) >= miss_fast * miss_slow)",
             "if got:",
             *[f"    store[i, {c}, j] = {s}[j]" for c, s in enumerate(states)],
             f"    store[i, {stamp}, j] = time - late",

@@ -9,7 +9,7 @@ import pandas as pd
 from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own
-from airflock.engine.plain_world import Course, Place, Senses
+from airflock.engine.place import Course, Place, Senses
 from airflock.models import kidger
 from airflock.papers import statistics
 from airflock.papers.claims import Claim, judged

@@ -1,11 +1,11 @@
-"""Rules of the whole flock as plain Python: what `passes.flock` does for a driver, on lists of floats."""
+"""Rules of the whole flock, on lists of floats."""
 
 from collections.abc import Callable, Sequence
+from inspect import signature
 from typing import Any
 
 from airflock.core.agent import State, answer
 from airflock.core.contract import Metric
-from airflock.engine.passes.flock import shapes_of
 from airflock.scenarios.scenario import Scenario
 
 Survey = Callable[[Sequence[State]], list[Any]]  # states of all agents → what the rule found for each
@@ -27,6 +27,12 @@ def of_metric(metric: Metric, agents: int, q: Any, wing: Any) -> Survey | None:
         return None
     shapes = shapes_of(metric.workspace, agents, {"q": q, "wing": wing})
     return _solver(metric.survey, "survey", metric.Shared, shapes, {"q": q, "wing": wing}, metric.name)
+
+
+def shapes_of(workspace: Callable[..., Any], agents: int, records: dict[str, Any]) -> Any:
+    """Shapes of the scratch: what `workspace` returns for n and the records that it asks for."""
+    given = {**records, "n": agents}
+    return workspace(*(given[name] for name in signature(workspace).parameters))
 
 
 def _solver(

@@ -1,4 +1,4 @@
-"""The world of a plain flight: surfaces, edges, rays and casts, goals, and what an agent perceives of them."""
+"""Place: the world around one agent in plain Python, its surfaces, edges, rays, casts and goals, outside a driver."""
 
 import math
 from collections.abc import Iterator
@@ -119,7 +119,7 @@ class Place:
 
 
 class Course:
-    """The goals of a flight: where the goal is, which one it is, and when each was reached (s; nan: never)."""
+    """Goals: where the goal is, which one it is, and when each was reached (s; nan: never)."""
 
     def __init__(self, scenario: Scenario):
         self.given, self.points = scenario.goals, [tuple(map(float, p)) for p in scenario.waypoints()]

@@ -1,7 +1,4 @@
-"""Order parameters as plain Python: what `passes.measure` does for a driver, without a compiler.
-
-A breakpoint set in a metric rule stops here with ordinary floats in its hands.
-"""
+"""Order parameters: pairs, clusters, members and agents of one instant in plain loops, and their sums over time."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -10,8 +7,8 @@ from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
-from airflock.engine.plain_flock import Survey, of_metric
-from airflock.engine.plain_world import Place
+from airflock.engine.place import Place
+from reference.flock import Survey, of_metric
 
 Record = Any  # a NamedTuple of floats that a metric declares
 

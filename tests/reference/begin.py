@@ -1,4 +1,4 @@
-"""Where agents of a plain flight start, and the random numbers that they draw."""
+"""Where agents start, and the random numbers that they draw."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from airflock.core import random
 from airflock.core.agent import State
-from airflock.engine.passes.move import ATTEMPTS
-from airflock.engine.plain_world import Place
+from airflock.engine.place import Place
 from airflock.engine.tables import extents
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
+ATTEMPTS = 20_000  # draws of a place for one agent
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 

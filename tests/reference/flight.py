@@ -1,7 +1,6 @@
-"""A whole flight as plain Python: no compiler, lists and floats, one agent after the other.
+"""The flight: lists and floats, one agent after the other, who perceives, decides and moves.
 
-It runs the same rules on the same random numbers in the same order as a compiled driver and is about a thousand times
-slower. Set a breakpoint in any rule, of a model, a body, a radio, a wind or a metric, and look around.
+It runs the same rules on the same random numbers in the same order as a driver.
 """
 
 from collections.abc import Sequence
@@ -18,13 +17,13 @@ from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
-from airflock.engine.plain_flock import of_model
-from airflock.engine.plain_scores import Scores
-from airflock.engine.plain_start import ZERO, Vector, begin, given, normals
-from airflock.engine.plain_world import Course, Place, Senses
+from airflock.engine.place import Course, Place, Senses
 from airflock.engine.tables import clock
 from airflock.metrics.registry import metrics_of
 from airflock.scenarios.scenario import Scenario
+from reference.begin import ZERO, Vector, begin, given, normals
+from reference.flock import of_model
+from reference.scores import Scores
 
 LIMIT = 1e8  # m; no radio reaches farther
 
@@ -177,7 +176,7 @@ def hear(
             continue
         own, true = flock[i].state, place.beside(flock[i].state, other.state)
         distance = norm(true.x - own.x, true.y - own.y, true.z - own.z)
-        in_range = distance <= min(k.range, LIMIT)
+        in_range = distance <= norm(min(k.range, LIMIT), 0.0, 0.0)  # at exactly the range it is heard
         pair = i * len(flock) + j
         arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
             distance, k
