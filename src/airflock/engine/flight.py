@@ -286,8 +286,9 @@ class Flight:
         known = self._coming[1] if self._coming else {}
         new = changed(base, settings)
         state = opened(
-            new, self.seed, self.precision, self.records, None, self.world, given_start=self._state.plan.given_start
-        )
+            new, self.seed, self.precision, self.records, world=self.world, device=self.device,
+            given_start=self._state.plan.given_start,
+        )  # fmt: skip
         if state.whole("steps") < self.step:
             raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
         said = {**known, **settings}
