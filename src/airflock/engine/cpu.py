@@ -71,7 +71,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: s
 
 
 BEAT = 0.1  # s; about how long a compiled call flies until Ctrl-C and the like are heard
-FEWEST = 256  # steps of the first of them
+FIRST = 200_000  # agents times steps of the first of them; some 10 ms
 
 
 def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = None, half: int = 0) -> int:
@@ -80,12 +80,11 @@ def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = N
     frames : (sample, component, agent) for all samples of these steps, or None
     Returns the next step, or minus the first agent (from 1) that found no place.
     """
-    steps, step, every = FEWEST, first, state.whole("sample_every")
+    steps, step, every = max(1, FIRST // state.agents), first, state.whole("sample_every")
     skipped = -(-first // every)
     while step < last and not state.ended:
         heed()
-        part = min(step + steps, last)
-        begun = time.monotonic()
+        part, begun = min(step + steps, last), time.monotonic()
         rest = None if frames is None else frames[-(-step // every) - skipped :]
         done = state.advance(step, part, half, rest)
         if done < 0:
@@ -118,7 +117,7 @@ def measure_frames(
     own = state.arrays
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
     driver.measure_frames(
-        tables.row, tables.whole, tables.edges, tables.spans, state.scene, own["work"], own["memory"], state.labels,
+        tables.row, tables.whole, tables.edges, tables.spans, state.scene, own["work"], own["memory"], own["labels"],
         own["values"], own["sums"], np.ascontiguousarray(frames, real), series, real.type(period), *state.scratch,
     )  # fmt: skip
     return state.values(), series

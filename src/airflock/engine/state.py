@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from airflock.engine.totals import combined, goals_reached, samples, sums_of
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
 LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
+AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
 NEVER = -1e9  # s; time stamp of a packet that has not come
 ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
 GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
@@ -34,47 +36,28 @@ class State:
 
     def __init__(self, plan: Plan, tables: Tables, driver: ModuleType, start: NDArray[Any] | None = None):
         real = tables.row.dtype
-        whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
-        n, dims, m = whole["agents"], plan.dimensions, lanes(whole["agents"])
-        initial = {
-            "held": np.zeros(5, real),
-            "row": tables.row,
-            "whole": tables.whole,
-            "gust": np.zeros(3, real),
-            "mem": beginnings(plan.model.Memory, m, real),
-            "memory": memories(plan, m, real),
-            **dict(zip(("values", "sums"), sums_of(plan), strict=True)),
-            **_goals(tables),
-            "later": tables.later,
-            "shapes": tables.shapes if len(tables.later) else tables.shapes[:0],
-        }
-        packets = (n, 2 * dims + 1, m) if plan.links else (1, 2 * dims + 1, 1)
-        empty = {
-            "work": ((len(driver.ROWS), m), real),
-            "past": ((whole["ring"], 2 * dims, m), real),
-            "store": (packets, real),
-        }
-        scratch = scratch_of(plan, tables.row, n)
-        kept = {name: (size, real) for parts in scratch for name, size, spare in parts if not spare}
-        self.plan, self.driver, self.tables, self.agents = plan, driver, tables, n
-        self.buffer, self.arrays = _one_buffer(
-            {name: (array.shape, array.dtype) for name, array in initial.items()} | empty | kept
-        )
-        for name, array in initial.items():
-            self.arrays[name][...] = array
-        self.arrays["store"][:, 2 * dims] = NEVER
+        agents, ring = int(tables.whole[AGENTS]), int(tables.whole[RING])
+        scratch = scratch_of(plan, tables.row, agents)
+        kept = tuple((name, size) for parts in scratch for name, size, spare in parts if not spare)
+        counts = (len(driver.ROWS), agents, ring, len(tables.goals), len(tables.later), tables.shapes.shape)
+        layout = _layout(plan, real, *counts, kept)
+        self.plan, self.driver, self.tables, self.agents = plan, driver, tables, agents
+        self.buffer, self.arrays = layout.filled()
+        own = self.arrays
+        own["row"][:], own["whole"][:] = tables.row, tables.whole
+        if len(tables.goals):
+            own["aim"][:3] = tables.goals[0]
+        if len(tables.later):
+            own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
-        self.start = np.zeros((2 * dims, n), real) if start is None else np.ascontiguousarray(start, real)
-        # used within a step only: random words, shapes near an agent, marks of clusters, cells, and what rules of the
-        # whole flock use within a call (its pages of zeros cost nothing until they are written)
-        self.words, self.near = rows((4, m), np.uint32), np.zeros(NEAR, np.int64)
-        self.labels = rows((2, m), np.int32 if plan.bits == 32 else np.int64)
+        components = plan.dimensions
+        self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
+        self.no_frames = np.zeros((0, 3 * components, agents), real)
+        # what is used within a call only: its pages of zeros cost nothing until they are written
         self.solvers = tuple(
-            tuple(np.zeros(size, real) if spare else self.arrays[name] for name, size, spare in parts)
-            for parts in scratch
+            tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
         )
-        self.cells = grid.memory(plan, n, rows)
-        self.no_frames = np.zeros((1, 3 * dims, n), real)
+        self.cells = grid.memory(plan, agents, rows)
         self._given = self._arguments()
 
     def _arguments(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -82,7 +65,7 @@ class State:
         own, tables = self.arrays, self.tables
         before = (
             own["held"], own["row"], own["whole"], tables.faces, tables.edges, tables.spans, self.scene, self.start,
-            own["work"], self.words, own["past"], own["store"], own["gust"], own["mem"], own["memory"], self.labels,
+            own["work"], own["words"], own["past"], own["store"], own["gust"], own["mem"], own["memory"], own["labels"],
             own["values"], own["sums"],
         )  # fmt: skip
         return before, (*self.scratch, *self.cells)
@@ -98,7 +81,7 @@ class State:
         own, tables = self.arrays, self.tables
         shapes = own["shapes"] if len(tables.later) else tables.shapes
         return (
-            shapes, tables.nodes, tables.links, self.near, own["counts"], tables.goals, own["aim"], own["reached"],
+            shapes, tables.nodes, tables.links, own["near"], own["counts"], tables.goals, own["aim"], own["reached"],
             own["later"],
         )  # fmt: skip
 
@@ -202,25 +185,66 @@ class State:
         self.arrays["sums"][:] = sums_of(self.plan)[1]
 
 
-def _one_buffer(shapes: dict[str, tuple[tuple[int, ...], Any]]) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
-    """Zeros for named arrays, one after another in one buffer, each from a cache line on."""
-    sizes = {name: math.prod(shape) * np.dtype(kind).itemsize for name, (shape, kind) in shapes.items()}
-    places, end = {}, 0
-    for name, size in sizes.items():
-        places[name], end = end, end + -(-size // LINE) * LINE
-    buffer = rows((end,), np.uint8)
-    return buffer, {
-        name: buffer[places[name] : places[name] + sizes[name]].view(kind).reshape(shape)
-        for name, (shape, kind) in shapes.items()
-    }
+class Layout(NamedTuple):
+    """Where the arrays of a state lie in its buffer, and what they hold before a flight.
+
+    places : name, first byte, shape and kind of each array, each from a cache line on
+    """
+
+    places: tuple[tuple[str, int, tuple[int, ...], Any], ...]
+    beginning: NDArray[np.uint8]
+
+    def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
+        """A new buffer as it is before a flight, and its arrays by name."""
+        size = len(self.beginning)
+        room = np.empty(size + LINE, np.uint8)
+        first = -room.__array_interface__["data"][0] % LINE
+        buffer = room[first : first + size]
+        buffer[:] = self.beginning
+        arrays = {name: np.ndarray(shape, kind, room, first + place) for name, place, shape, kind in self.places}
+        return buffer, arrays
 
 
-def _goals(tables: Tables) -> dict[str, NDArray[Any]]:
-    """Where the flock's goal is and its number, when each was reached (s; -1: not yet), and counts of the scene."""
-    real = tables.row.dtype
-    aim, reached = np.zeros(4, real), np.full(len(tables.goals), -1.0, real)
-    aim[:3] = tables.goals[0] if len(tables.goals) else 0.0
-    return {"aim": aim, "reached": reached, "counts": np.zeros(2, np.int64)}
+@lru_cache(maxsize=64)
+def _layout(
+    plan: Plan,
+    real: Any,
+    count: int,
+    agents: int,
+    ring: int,
+    goals: int,
+    later: int,
+    shapes: tuple[int, int],
+    kept: tuple[Any, ...],
+) -> Layout:
+    """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
+    m, dims = lanes(agents), plan.dimensions
+    label = np.int32 if plan.bits == 32 else np.int64
+    packets = (agents, 2 * dims + 1, m) if plan.links else (1, 2 * dims + 1, 1)
+    values, sums = sums_of(plan)
+    beginnings = {
+        "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,
+        "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
+    }  # fmt: skip
+    beginnings["store"][:, 2 * dims] = NEVER
+    shaped: dict[str, tuple[tuple[int, ...], Any]] = {
+        "held": ((5,), real), "row": ((sum(map(len, plan.records.values())),), real),
+        "whole": ((len(WHOLE),), np.int64), "gust": ((3,), real), "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
+        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
+        "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
+        "labels": ((2, m), label),
+    }  # fmt: skip
+    shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
+    shaped |= {name: (size, real) for name, size in kept}
+    places, end = [], 0
+    for name, (shape, kind) in shaped.items():
+        places.append((name, end, shape, np.dtype(kind)))
+        end += -(-math.prod(shape) * np.dtype(kind).itemsize // LINE) * LINE
+    layout = Layout(tuple(places), np.zeros(end, np.uint8))
+    buffer, arrays = layout.filled()
+    for name, array in beginnings.items():
+        arrays[name][...] = array
+    return Layout(layout.places, buffer.copy())
 
 
 def lanes(agents: int) -> int:
@@ -239,11 +263,11 @@ def rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
 
 def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
     """What metrics remember of each agent, at its start: (field, lane)."""
-    blocks = [beginnings(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
+    blocks = [beginning(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
     return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
 
 
-def beginnings(record: Any, m: int, real: Any) -> NDArray[Any]:
+def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
     """The defaults of a Memory for each of m lanes: (field, lane)."""
     starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
     return np.repeat(np.array(starts, real)[:, None], m, axis=1)
