@@ -227,9 +227,10 @@ def _layout(
         "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
     beginnings["store"][:, 2 * dims] = NEVER
+    columns = sum(map(len, plan.records.values()))
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {
-        "held": ((5,), real), "row": ((sum(map(len, plan.records.values())),), real),
-        "whole": ((len(WHOLE),), np.int64), "gust": ((3,), real), "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
+        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": ((3,), real),
+        "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
         "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
         "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
         "labels": ((2, m), label),
