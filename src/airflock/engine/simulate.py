@@ -18,7 +18,7 @@ from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
-from airflock.scenarios.places import start_inside
+from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
@@ -106,9 +106,9 @@ def fly(
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
         plan = replace(plan, given_start=True)
-        inside = start_inside(scenario, start) if plan.scene else ""
-        if inside:
-            raise FlightError(f"{scenario.name}: {inside}")
+        fault = start_fault(scenario, start)
+        if fault:
+            raise FlightError(f"{scenario.name}: {fault}")
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 

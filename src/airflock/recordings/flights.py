@@ -11,7 +11,6 @@ from typing import Any
 import xarray as xr
 
 from airflock import __version__
-from airflock.engine import cpu
 from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
@@ -99,8 +98,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(entry) for entry in value]
     return value
-
-
-def warm(scenario: Scenario, precision: int = 32) -> None:
-    """Compile or load the driver of a scenario before it is needed."""
-    cpu.flight_driver(plan_of(scenario, precision=precision))
