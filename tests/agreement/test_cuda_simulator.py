@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+from needed import needed
+
+needed("numba_cuda")
 
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (

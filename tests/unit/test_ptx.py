@@ -7,8 +7,9 @@ import pytest
 
 from airflock.engine.simulate import plan_of
 from airflock.scenarios.files import load, presets
+from needed import needed
 
-pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+needed("numba_cuda")
 
 CAPABILITIES = ((8, 0), (9, 0))
 # One preset per publication: the others differ in numbers or in which perturbations are on. Threads of one of them.

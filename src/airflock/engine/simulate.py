@@ -22,7 +22,7 @@ from airflock.metrics import fitness_dimock, fitness_kidger
 from airflock.metrics.fitness_vasarhelyi import fitness
 from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
-from airflock.scenarios.places import start_inside
+from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
@@ -231,9 +231,9 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     if len(bad):
         row, agent = bad[0]
         raise FlightError(f"{said}{names[row]} of agent {agent} is {given[row, agent]}, not a finite number")
-    inside = start_inside(scenario, given) if plan.scene else ""
-    if inside:
-        raise FlightError(f"{scenario.name}: {inside}")
+    fault = start_fault(scenario, given)
+    if fault:
+        raise FlightError(f"{scenario.name}: {fault}")
     return given
 
 

@@ -162,7 +162,7 @@ class CudaBuilder(Builder):
         context.cells, context.exact = self.cells(), name.startswith("measure_")
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
-        body = [_Renamed(self, name).visit(s) for s in body]
+        body = [_Renamed(self).visit(s) for s in body]
         body, numbers = with_reciprocals(self.forms, body, {f"row_{letter}" for letter in self.plan.records})
         self.source.blocks += self.forms.made
         self.forms.made.clear()
@@ -225,9 +225,9 @@ def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
 
 
 class _Renamed(ast.NodeTransformer):
-    """Records under the kernel's names (p → row_p), rows that share another's under its name, radio calls gone."""
+    """Records under the kernel's names (p → row_p), rows that share another's under its name."""
 
-    def __init__(self, build: CudaBuilder, name: str):
+    def __init__(self, build: CudaBuilder):
         self.build = build
         self.letters = set(build.letters)
 
