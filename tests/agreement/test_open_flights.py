@@ -172,6 +172,13 @@ def test_scenario_seed_and_events_are_the_same_bits(scenario):
     assert [repr(window.scores) for window in again.windows] == [repr(window.scores) for window in flight.windows]
 
 
+def test_a_flight_of_another_world_starts_elsewhere_and_flies_again(scenario):
+    flight = airflock.open(scenario, 6, world=7).advance(1.0)
+    assert not np.array_equal(flight.state, airflock.open(scenario, 6).advance(1.0).state)
+    again = airflock.open(scenario, 6, events=flight.events)
+    assert whole(again.advance(1.0)) == whole(flight)
+
+
 def test_a_change_to_the_same_numbers_changes_no_bit(scenario):
     straight, changed = airflock.open(scenario, 6).advance(6.0), airflock.open(scenario, 6)
     changed.advance(2.0).change({"model.p_rep": scenario.parameters.p_rep}).advance(4.0)

@@ -61,13 +61,13 @@ class Flight:
         device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
     ):
-        self.seed, self.world = sound_seed(seed), world
+        self.seed, self.world = sound_seed(seed), 0
         self.scenario = loaded(scenario).in_flight(self.seed)
         self.precision, self.records = precision, record
         if device not in DEVICES:
             raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(DEVICES)}")
         self.device = device
-        self._state = opened(self.scenario, self.seed, precision, record, start, world, device=device)
+        self._state = opened(self.scenario, self.seed, precision, record, start, device=device)
         self.origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
         self._steps, self.step, self._since = self._state.whole("steps"), 0, 0
         self._sensed = False
@@ -77,6 +77,10 @@ class Flight:
         self._sampled: list[NDArray[Any]] = []
         self._planned = events_of(events)
         self._coming: tuple[Scenario, dict[str, Any], Future[State]] | None = None
+        if world:
+            self._to_world(world)
+        while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
+            self._to_world(int(self._planned.pop(0).data["world"]))  # before the start is drawn
 
     # ------------------------------------------------------------------------------------------------- time
 

@@ -231,9 +231,9 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     if len(bad):
         row, agent = bad[0]
         raise FlightError(f"{said}{names[row]} of agent {agent} is {given[row, agent]}, not a finite number")
-    fault = start_fault(scenario, given)
-    if fault:
-        raise FlightError(f"{scenario.name}: {fault}")
+    outside = start_fault(scenario, given)
+    if outside:
+        raise FlightError(f"{scenario.name}: {outside}")
     return given
 
 
