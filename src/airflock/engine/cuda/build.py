@@ -16,6 +16,7 @@ from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder, branch
 from airflock.engine.plan import Plan
+from airflock.engine.replace import ReplacementError, must_replace
 
 STAGES = (
     "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
@@ -145,12 +146,18 @@ class CudaBuilder(Builder):
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
-        if name in ("snapshot", "perceive"):
-            return [line.replace("ring[", "past[") for line in lines]
-        if name.startswith("measure_"):  # whose pair loops end with the last agent
-            return [line.replace(" & (integer(j) < nn)", "") for line in lines]
+        heard = self.plan.noisy or self.plan.delayed
+        if name == "snapshot" or (name == "perceive" and heard):
+            return must_replace(lines, "ring[", "past[")
+        if name.startswith("measure_") and any("j in range(m)" in line for line in lines):
+            return must_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent
         shared = self.shape.registers and self.shape.per_agent > 1
-        return shared_noise(lines) if name == "move" and shared else lines
+        return shared_noise(lines) if self.drawn_for_two(name) and shared else lines
+
+    def drawn_for_two(self, name: str) -> bool:
+        """Whether a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
+        plan = self.plan
+        return name == "move" and plan.dimensions == 2 and self.wants(plan.body.move, "move", "gx", "gy", "gz")
 
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
@@ -207,16 +214,14 @@ class CudaBuilder(Builder):
 
 def shared_noise(lines: list[str]) -> list[str]:
     """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
-    found = []
-    for line in lines:
-        if line == "if step % 2 == 0:":
-            found += ["if step % (2 * PER_AGENT) == 0:"]
-        elif line.endswith(" if step % 2 == 0 else g2") or line.endswith(" if step % 2 == 0 else g3"):
-            name = line.partition(" = ")[0]
-            found += [line, f"{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"]
-        else:
-            found += [line.replace("(i, step // 2,", "(i, step // 2 + sub,")]
-    return found
+    lines = must_replace(lines, "if step % 2 == 0:", "if step % (2 * PER_AGENT) == 0:")
+    lines = must_replace(lines, "(i, step // 2,", "(i, step // 2 + sub,")
+    for number in (2, 3):
+        (line,) = (line for line in lines if line.endswith(f" if step % 2 == 0 else g{number}"))
+        name = line.partition(" = ")[0]
+        handed = f"{line}\n{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"
+        lines = must_replace(lines, line, handed)
+    return lines
 
 
 def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
@@ -247,15 +252,19 @@ def _split(statements: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
 
 def _with_radio(statements: list[ast.stmt], radio: tuple[list[ast.stmt], list[ast.stmt]]) -> list[ast.stmt]:
     """The loop nest of `neighbours` with the reception of each pair in it, instead of a call that fills rows."""
+    replaced = 0
     for outer in statements:
         if isinstance(outer, ast.For):
             kept: list[ast.stmt] = []
             for s in outer.body:
                 if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call):
                     kept += radio[0]
+                    replaced += 1
                     continue
                 if isinstance(s, ast.For):
                     s.body = [*radio[1], *s.body]
                 kept.append(s)
             outer.body = kept
+    if replaced != 1:
+        raise ReplacementError(f"neighbours calls receive {replaced} times instead of once")
     return statements

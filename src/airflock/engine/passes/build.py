@@ -9,6 +9,7 @@ from airflock.core.vocabulary import asks
 from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.replace import must_replace
 from airflock.world import edges
 
 JIT = "@njit(**JIT)"
@@ -94,7 +95,7 @@ class Builder:
         """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i."""
         if not self.plan.sequential:
             spread = self.plan.grid and name == "decide"
-            body = [line.replace("i in range(n)", "i in prange(n)") for line in body] if spread else body
+            body = must_replace(body, "i in range(n)", "i in prange(n)") if spread else body
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return
         read = [line.partition(" = ")[0] for line in lines if " = " in line and line[0] != " " and ";" not in line]
