@@ -22,6 +22,7 @@ STAGES = (
     "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
     "measure_",
 )  # fmt: skip
+WITHIN = ("noise", "gusts")  # stages that a kernel has within `move`, so that registers carry them over
 REDUCED = 24  # totals that one stage reduces at once, at most
 
 
@@ -53,6 +54,7 @@ class CudaBuilder(Builder):
         self.letters: set[str] = set()
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
+        self.within: dict[str, list[str]] = {}
         self.receive: tuple[list[ast.stmt], list[ast.stmt]] | None = None
         self.forms = Forms(self.source.blocks, JIT)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
@@ -82,9 +84,10 @@ class CudaBuilder(Builder):
         """Integers of this world are read once, by the kernel."""
         return []
 
-    def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
-        """Loop over all agents, whatever the order of updates."""
-        return [f"for i in range({lanes}):", *(f"    {line}" for text in body for line in text.splitlines())]
+    @property
+    def in_turn(self) -> bool:
+        """Never: a kernel takes one agent after another by its own loop."""
+        return False
 
     def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
         """One stage of a step."""
@@ -98,13 +101,15 @@ class CudaBuilder(Builder):
             lines += [body] if isinstance(body, str) else list(body)
         if name == "receive":
             self.receive = _split(parse(lines))
+        elif name in WITHIN:
+            self.within[name] = lines
         elif name.startswith(STAGES):
             self._stage(name, lines)
         else:
             self.plain.add(name)
             self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
             return
-        if name != "receive":
+        if name not in ("receive", *WITHIN):
             self.letters, self.bound = set(), set()
 
     def once(self, lines: Iterable[str]) -> list[str]:
@@ -161,7 +166,7 @@ class CudaBuilder(Builder):
 
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
-        statements = parse(self.prepared(name, lines))
+        statements = parse(self.prepared(name, self._with_parts(lines) if name == "move" else lines))
         if name == "neighbours" and self.receive is not None:
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
@@ -178,6 +183,17 @@ class CudaBuilder(Builder):
         else:
             body = [*parse(reciprocal_lines(numbers)), *body]
         self._add(name, body, context.rows)
+
+    def _with_parts(self, lines: list[str]) -> list[str]:
+        """Lines of `move` with those of the noise and the gusts in place of their calls."""
+        for name, part in self.within.items():
+            (call,) = (line for line in lines if f"{name}(" in line)
+            at, answer = lines.index(call), call.rpartition(" = ")[0] or "0"
+            if part[-1] not in (f"return {answer}", f"return ({answer})"):
+                raise ReplacementError(f"{name} ends with {part[-1]!r}, but move calls it as {call!r}")
+            lines = [*lines[:at], *part[:-1], *lines[at + 1 :]]
+        self.within = {}
+        return lines
 
     def _add(self, name: str, body: list[ast.stmt], rows: set[str]) -> None:
         """The device function of lowered statements."""

@@ -6,7 +6,6 @@ So the order of every sum, and with it every bit, is the same in each run. Only 
 loss.
 """
 
-from collections.abc import Iterable
 from typing import Any
 
 from airflock.core import random
@@ -87,9 +86,10 @@ class CellBuilder(CudaBuilder):
             found += image if line == "{image}" else ACROSS if line == "{across}" and periodic else [line]
         return tuple(line for line in found if line != "{across}")
 
-    def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
-        """Nothing: candidates come at their image."""
-        return []
+    @property
+    def images(self) -> bool:
+        """Never: candidates come at their image."""
+        return False
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Numbers of agents instead of places in the table; noise of an odd step is drawn again."""
@@ -97,7 +97,7 @@ class CellBuilder(CudaBuilder):
             lines = must_replace(lines, "integer(j)", "sorted_[j, 3]")
             lines = must_replace(lines, "ii = integer(i)", "ii = real(i)")
             for a in self.plan.axes:
-                lines = must_replace(lines, f"[j] - own_{a};", f"[j] - base_{a};")
+                lines = must_replace(lines, f"[j] - own_{a}", f"[j] - base_{a}")
         return must_replace(lines, "if step % 2 == 0:", "if step >= 0:") if self.drawn_for_two(name) else lines
 
 

@@ -46,6 +46,16 @@ class Builder:
         return self.rows.setdefault(name, len(self.rows))
 
     @property
+    def in_turn(self) -> bool:
+        """Whether a loop over all agents is the body alone, for the agent in turn."""
+        return self.plan.sequential
+
+    @property
+    def images(self) -> bool:
+        """Whether a stage takes offsets between agents to the nearest image."""
+        return self.plan.periodic
+
+    @property
     def who(self) -> str:
         """Number of the agent that a loop is at."""
         return "order[i]" if self.slots else "i"
@@ -89,7 +99,7 @@ class Builder:
 
     def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
         """Loop over all agents (n) or lanes (m); with a sequential update the body alone, for the agent in turn."""
-        return list(body) if self.plan.sequential else loop(f"i in range({lanes})", body)
+        return list(body) if self.in_turn else loop(f"i in range({lanes})", body)
 
     def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
         """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i."""

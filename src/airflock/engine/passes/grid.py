@@ -75,7 +75,7 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
     wide = max(1, len(sums))
-    meet += ["slot = whose[e]", *[f"totals[slot, {k}] = t{c}" for k, c in enumerate(sums)]]
+    meet += ["slot = whose[e]", *[f"totals[slot, {k}] = total_{c}" for k, c in enumerate(sums)]]
     cell = [
         "here = (oz * count[1] + oy) * count[0] + ox",
         *["if starts[here] == starts[here + 1]:", "    continue"],
