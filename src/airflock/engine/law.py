@@ -4,6 +4,7 @@ import ast
 import inspect
 import textwrap
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from airflock.errors import RuleError
@@ -16,10 +17,16 @@ FORBIDDEN = (
 )  # fmt: skip
 
 
+@lru_cache(maxsize=4096)
+def _source(rule: Callable[..., Any]) -> str:
+    """Text of a rule; finding its end in its file takes longer than all else that is done with it."""
+    return textwrap.dedent(inspect.getsource(rule))
+
+
 def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
     """Syntax tree of a rule from its own source file or notebook cell."""
     try:
-        text = textwrap.dedent(inspect.getsource(rule))
+        text = _source(rule)
     except (OSError, TypeError) as fault:
         raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
     node = ast.parse(text).body[0]

@@ -1,8 +1,7 @@
 """Values that an expression of a stage can have while its driver is made, besides ordinary Python objects."""
 
 import ast
-import inspect
-import textwrap
+import linecache
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -88,12 +87,17 @@ class Text:
 
 
 @cache
+def _module(path: str) -> dict[tuple[str, int], ast.FunctionDef]:
+    """Functions of a file of stages by name and line: the whole file is read at once, as it has little else."""
+    found = ast.parse("".join(linecache.getlines(path))).body
+    return {(node.name, node.lineno): node for node in found if isinstance(node, ast.FunctionDef)}
+
+
+@cache
 def text_of(function: Callable[..., Any]) -> Text:
-    """Syntax of a function, read once."""
-    lines, first = inspect.getsourcelines(function)
-    node = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    assert isinstance(node, ast.FunctionDef)
-    ast.increment_lineno(node, first - 1)
+    """Syntax of a function of a module, read once."""
+    code = function.__code__
+    node = _module(code.co_filename)[code.co_name, code.co_firstlineno]
     loops = [item for item in ast.walk(node) if isinstance(item, ast.comprehension)]
     inner = {id(name) for loop in loops for name in ast.walk(loop.target)}
     bound = Counter(
