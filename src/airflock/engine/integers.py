@@ -9,7 +9,7 @@ import inspect
 import textwrap
 import types
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from airflock.errors import RuleError
@@ -19,10 +19,16 @@ KEEPING = {"min", "max", "abs"}  # integers of integers
 MAKING = {"int", "len"}
 
 
+@lru_cache(maxsize=4096)
+def _source(rule: Callable[..., Any]) -> str:
+    """Text of a rule; finding its end in its file takes longer than all else that is done with it."""
+    return textwrap.dedent(inspect.getsource(rule))
+
+
 def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
     """Syntax tree of a rule from its own source file or notebook cell."""
     try:
-        text = textwrap.dedent(inspect.getsource(rule))
+        text = _source(rule)
     except (OSError, TypeError) as fault:
         raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
     node = ast.parse(text).body[0]
