@@ -10,7 +10,7 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Plan, make_plan
+from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
@@ -30,10 +30,12 @@ def plan_of(
     record: bool = False,
     metrics: tuple[Metric, ...] | None = None,
     grid: bool | None = None,
+    given_start: bool = False,
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid : neighbours by cells or all pairs; by default what is faster, and all pairs in a box too small for cells
+    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
+    given_start : the start is handed over with each flight
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -44,7 +46,13 @@ def plan_of(
         scenario.parameters,
         metrics_of(scenario.metrics) if metrics is None else metrics,
         scenario.world,
-        grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        scenario.numbers,
+        build=Build(
+            bits=precision,
+            record=record,
+            given_start=given_start,
+            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        ),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
@@ -54,7 +62,6 @@ def plan_of(
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
         sequential=scenario.flight.update == "sequential",
-        bits=precision,
         noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
@@ -63,7 +70,6 @@ def plan_of(
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
-        record=record,
     )
 
 
@@ -105,7 +111,7 @@ def fly(
     scenario = scenario.in_flight(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
-        plan = replace(plan, given_start=True)
+        plan = plan.built(given_start=True)
         inside = start_inside(scenario, start) if plan.scene else ""
         if inside:
             raise FlightError(f"{scenario.name}: {inside}")
@@ -175,7 +181,7 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
     """First step after which a state is not finite: flights are deterministic, so shorter ones find it by halves."""
     low, high = 0, clock(scenario)["steps"]
     plan = plan_of(scenario, precision=precision)
-    plan = replace(plan, given_start=start is not None)
+    plan = plan.built(given_start=start is not None)
     while high - low > 1:
         middle = (low + high) // 2
         shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))

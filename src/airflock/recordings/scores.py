@@ -12,7 +12,6 @@ import xarray as xr
 
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
-from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
@@ -66,14 +65,12 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = replace(plan_of(scenario, precision=precision), record=False)
-    found = tables(scenario, plan, 0)
+    plan = plan_of(scenario, precision=precision)
     q = scenario.measured_by()
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
-    for name, seconds in every.items():
-        found.whole[WHOLE.index(name)] = max(1, round(seconds / period))
-    found.whole[WHOLE.index("agents")] = frames.shape[2]
-    values, series = cpu.measure_frames(plan, found, frames, period)
+    steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
+    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    values, series = cpu.measure_frames(plan, numbers, frames, period)
     names = [name for name, _, _ in columns(plan.metrics)]
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times, columns=names)

@@ -11,9 +11,10 @@ from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
 from airflock.core import random
 from airflock.core.contract import Body, Model
+from airflock.core.parameters import number_names
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.geometry import largest_extension
-from airflock.scenarios.sections import Flight
+from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
 from airflock.world import arena, goals, scenery, start
 
@@ -63,6 +64,20 @@ class Scenario:
     def descends(self) -> bool:
         """Whether drag descent is added to the model (the section [aero])."""
         return self.model.flock is descent.flock
+
+    @property
+    def records(self) -> dict[str, Any]:
+        """Key of a section → its record of parameters; the empty key holds those at the top."""
+        return {section.key: getattr(self, section.field) for section in ORDER}
+
+    @property
+    def numbers(self) -> dict[str, tuple[str, ...]]:
+        """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
+        return {
+            each.letter: each.derived._fields if each.derived else number_names(self.records[each.key])  # type: ignore[attr-defined]
+            for each in ORDER
+            if each.letter
+        }
 
     @property
     def vehicle(self) -> Body:
