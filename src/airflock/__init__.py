@@ -11,6 +11,9 @@ _WHERE = {
     "load": "airflock.scenarios.files",
     "presets": "airflock.scenarios.files",
     "model": "airflock.core.contract",
+    "body": "airflock.body",
+    "metric": "airflock.core.contract",
+    "metric_set": "airflock.metrics.registry",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",
     "Parameters": "airflock.core.parameters",
@@ -26,7 +29,7 @@ __all__ = [*_WHERE, "__version__"]
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         module = import_module(_WHERE[name])
-        return module if name == "evolve" else getattr(module, name)  # a module that can be called
+        return module if name in ("evolve", "body") else getattr(module, name)  # modules that can be called
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 

@@ -23,7 +23,6 @@ from airflock.engine.plain_scores import Scores
 from airflock.engine.plain_start import ZERO, Vector, begin, given, normals
 from airflock.engine.plain_world import Course, Place, Senses
 from airflock.engine.tables import clock
-from airflock.metrics.registry import metrics_of
 from airflock.scenarios.scenario import Scenario
 
 LIMIT = 1e8  # m; no radio reaches farther
@@ -69,7 +68,7 @@ def fly_plainly(
     flock = [Agent(state) for state in begun]
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
-    chosen = metrics_of(scenario.metrics) if metrics is None else metrics
+    chosen = scenario.order_parameters if metrics is None else metrics
     scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
     solve = of_model(scenario)
     if len(flock) < scenario.agents:

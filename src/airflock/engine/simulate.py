@@ -14,9 +14,6 @@ from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.tables import clock, tables
 from airflock.errors import FlightError, ScenarioError
-from airflock.metrics import fitness_dimock, fitness_kidger
-from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_inside
 from airflock.scenarios.scenario import Scenario
@@ -44,7 +41,7 @@ def plan_of(
     return make_plan(
         scenario.model,
         scenario.parameters,
-        metrics_of(scenario.metrics) if metrics is None else metrics,
+        scenario.order_parameters if metrics is None else metrics,
         scenario.world,
         scenario.numbers,
         build=Build(
@@ -75,7 +72,7 @@ def plan_of(
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
-    found = metrics_of(scenario.metrics) if metrics is None else metrics
+    found = scenario.order_parameters if metrics is None else metrics
     used = scenario.model.flock is not None or any(
         "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
     )
@@ -197,15 +194,9 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
     return finish(scenario, fly(scenario, seed, precision=precision).values)
 
 
-def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
-    """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
-    if scenario.metrics.kind == "dimock":
-        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
-    if scenario.metrics.kind == "kidger":
-        return {**values, **fitness_kidger.fitness(values, scenario.agents, scenario.flight.duration)}
-    if scenario.metrics.kind != "vasarhelyi":
-        return values
-    return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
+def finish(scenario: Scenario, values: dict[str, Any]) -> dict[str, Any]:
+    """Order parameters with what the scenario's metric set makes of them: partial fitnesses and fitness."""
+    return scenario.measures.judged(values, scenario.agents, scenario.flight.duration, scenario.measured_by())
 
 
 def compile_for(scenario: Scenario, *, precision: int = 32) -> None:

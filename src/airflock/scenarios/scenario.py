@@ -8,9 +8,8 @@ from typing import Any
 from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
-from airflock.body.registry import BODIES
 from airflock.core import random
-from airflock.core.contract import Body, Model
+from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.parameters import number_names
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.geometry import largest_extension
@@ -26,6 +25,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
+    vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
     notes     : what was adjusted, for a person to read
@@ -46,6 +46,8 @@ class Scenario:
     aero: descent.Parameters
     metrics: metric_parameters.Parameters
     flight: Flight
+    vehicle: Body
+    measures: MetricSet
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -80,9 +82,9 @@ class Scenario:
         }
 
     @property
-    def vehicle(self) -> Body:
-        """The body that `body` holds the numbers of."""
-        return next(found for found in BODIES.values() if type(self.body) is found.Parameters)
+    def order_parameters(self) -> tuple[Metric, ...]:
+        """The metrics that measure a flight."""
+        return self.measures.of(self.metrics)
 
     def in_flight(self, seed: int) -> "Scenario":
         """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws."""
@@ -128,7 +130,7 @@ class Scenario:
             given["max_e"] = largest_extension(self.world) or None
         if given["k"] is None:
             given["k"] = given["max_e"]
-        return metric_parameters.Parameters(**given)
+        return type(self.metrics)(**given)
 
     def separation(self) -> float:
         """Smallest distance of two agents at the start, m."""
