@@ -29,6 +29,7 @@ class Model:
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
+    violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -51,6 +52,7 @@ class Model:
     preferred_speed: Callable[..., float] | None = None
     interaction_range: Callable[..., float] | None = None
     doc: str = ""
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
@@ -101,6 +103,7 @@ def model(namespace: Any, name: str = "") -> Model:
         preferred_speed=found.get("preferred_speed"),
         interaction_range=found.get("interaction_range"),
         doc=str(found.get("__doc__") or ""),
+        violates=dict(found.get("VIOLATES", {})),
     )
 
 
@@ -110,6 +113,7 @@ class Body:
 
     accepts     : the COMMAND of the models that it can carry
     integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
+    violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -117,6 +121,7 @@ class Body:
     accepts: str
     integration: str
     move: Callable[..., Any]
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.move))
@@ -131,7 +136,8 @@ def body(namespace: Any, name: str = "") -> Body:
     asks(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
-    return Body(name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"])
+    violates = dict(found.get("VIOLATES", {}))
+    return Body(name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"], violates)
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,7 @@ class Metric:
               `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
     total   : from the combined values of a whole flight to named order parameters; by default they are these
+    violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -169,6 +176,7 @@ class Metric:
     clock: str = "sample"
     total: Callable[..., dict[str, float]] | None = None
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
@@ -210,6 +218,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         reduce=dict(found.get("REDUCE", {})),
         over_time=dict(found.get("OVER_TIME", {})),
         reports=dict(found.get("REPORTS", {})),
+        violates=dict(found.get("VIOLATES", {})),
         clock=clock,
         **{key: found[key] for key in records if key in found},
     )
@@ -225,6 +234,7 @@ class MetricSet:
     fitness    : of any of values, agents, duration (s), q → named numbers, from the order parameters of one flight
     reports    : of what `fitness` gives: unit and meaning
     best       : the order parameter that is larger in a better flight; empty if none is
+    violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
     faults     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
     """
 
@@ -236,6 +246,7 @@ class MetricSet:
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     best: str = ""
     faults: Callable[..., list[str]] | None = None
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.metrics, self.fitness))

@@ -13,6 +13,7 @@ from airflock.metrics.parameters import Parameters
 COLLIDED = -1000.0
 CLOSE = 10.0  # lone powers per unit of crowding: half of r_safe costs 2.5
 UNSTABLE = 0.25  # lone powers for a formation that has not settled
+VIOLATES = {"units": "a collision costs COLLIDED, a number of watts"}
 REPORTS = {"fitness": ("W", "minus the mean power per bird, less penalties (metrics.fitness)")}
 
 

@@ -80,6 +80,7 @@ SETS: dict[str, MetricSet] = {
             parameters.Parameters,
             fitness=fitness_kidger.fitness,
             reports=fitness_kidger.REPORTS,
+            violates=fitness_kidger.VIOLATES,
             best="fitness",
         ),
         MetricSet(
@@ -88,6 +89,7 @@ SETS: dict[str, MetricSet] = {
             parameters.Parameters,
             fitness=fitness_dimock.fitness,
             reports=fitness_dimock.REPORTS,
+            violates=fitness_dimock.VIOLATES,
             best="fitness",
         ),
     )
@@ -123,7 +125,8 @@ def metric_set(namespace: Any, name: str = "") -> MetricSet:
         reports["fitness"] = ("", (fitness.__doc__ or "fitness").partition("\n")[0])
     best = str(found.get("BEST") or ("fitness" if "fitness" in reports else ""))
     record = _parameters(found.get("Parameters"), name)
-    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, found.get("faults"))
+    violates = dict(found.get("VIOLATES", {}))
+    return MetricSet(name, tuple(metrics), record, None, fitness, reports, best, found.get("faults"), violates)
 
 
 def as_set(what: Any) -> MetricSet:
