@@ -104,12 +104,20 @@ class Law:
         return solve([State(*row) for row in scene.states.tolist()])[0] if solve else None
 
 
-def check_model(law: Any, parameters: Mapping[str, Any] | None = None, *, dimensions: int = 3, seed: int = 0) -> Report:
+def check_model(
+    law: Any,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    dimensions: int = 3,
+    seed: int = 0,
+    compiled: bool = False,
+) -> Report:
     """Run the standing list of truths on a flocking law and return a report with one line a truth.
 
     law        : a Model, a module, a class, a mapping such as globals(), a name of ours, or a file that ends in .py
     parameters : values that differ from the defaults, by name
     dimensions : 2 or 3; seed: of the random scenes, in every fault
+    compiled   : also fly the law compiled, which takes some seconds, and compare
 
     Turned, shifted, renumbered and mirrored scenes must turn, shift, renumber and mirror the command; a lone agent
     flies straight on; two agents at any distance get finite commands; a halved time step halves the error; a flight in
@@ -142,6 +150,8 @@ def check_model(law: Any, parameters: Mapping[str, Any] | None = None, *, dimens
         "units": ("in metres and seconds of another length it is the same flight", lambda: _units(made, scenes, seed)),
         "single precision": ("no rule turns float32 into doubles", lambda: _single(made, scenes)),
     }
+    if compiled:
+        truths["compiled"] = ("compiled, it flies as in plain Python", lambda: _compiled(made, seed))
     return reported(f"model {found.name}", truths, found.violates)
 
 
@@ -327,6 +337,16 @@ def _units_in_flight(law: Law, seed: int) -> str:
                 f"{HIDDEN}"
             )
     return ""
+
+
+def _compiled(law: Law, seed: int) -> str:
+    """The same flight by a compiled driver, in double precision."""
+    start = _start(law, seed)
+    plain = _flown(law.scenario, start, seed)
+    driver = fly(law.scenario, seed, precision=64, record=True, start=start).frames
+    assert driver is not None
+    apart = np.abs(driver - plain).max(axis=(0, 2)) / (np.abs(plain).max(axis=(0, 2)) + 1e-9)
+    return "" if apart.max() <= CLOSE_IN_FLIGHT else f"seed {seed}: frames differ by {apart.max():.2g} of their size"
 
 
 def _single(law: Law, scenes: Sequence[Scene]) -> str:

@@ -75,9 +75,10 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
     """
     document: dict[str, Any] = plain(scenario.document)
     for section in ("model", "body", "metrics"):
-        own = Path(scenario.name).parent / str(document.get(section, {}).get("kind", ""))
-        if own.suffix == ".py" and own.is_file():
-            document[section]["kind"] = str(own.absolute())
+        kind = str(document.get(section, {}).get("kind", ""))
+        places = [place for place in (Path(scenario.name).parent / kind, Path(kind)) if place.is_file()]
+        if kind.endswith(".py") and places:
+            document[section]["kind"] = str(places[0].absolute())
     return document
 
 

@@ -8,11 +8,12 @@ from airflock.errors import RuleError, ScenarioError
 
 
 def own_code(key: str, name: str, folder: Path | None = None) -> ModuleType:
-    """Module from a user's Python file, relative to the scenario file; key: what named it, for faults.
+    """Module from a user's Python file, beside the scenario file or in the current folder; key: what named it.
 
     Raises ScenarioError where there is no such file, RuleError where it fails.
     """
-    path = Path(name) if Path(name).is_absolute() or folder is None else folder / name
+    beside = Path(name) if folder is None else folder / name
+    path = beside if beside.is_file() else Path(name)
     spec = util.spec_from_file_location(path.stem, path) if path.suffix == ".py" and path.is_file() else None
     if spec is None or spec.loader is None:
         raise ScenarioError([f"{key} = {name!r}: no such Python file"])
