@@ -1,6 +1,7 @@
 """The standing list: every shipped law, order parameter and body passes it, and it finds what is planted."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -13,7 +14,7 @@ from airflock.checking.models import check_model
 from airflock.checking.report import CheckError
 from airflock.checking.units import Units, factor
 from airflock.core.contract import body, metric, model
-from airflock.errors import RuleError
+from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import METRICS, SETS
 from airflock.models import vasarhelyi_2018, viragh_2014
 from airflock.models.vasarhelyi_2018 import Sums
@@ -47,6 +48,24 @@ def test_every_fitness_keeps_the_standing_list_or_says_what_it_breaks(name):
 @pytest.mark.parametrize("name", BODIES)
 def test_every_body_keeps_the_standing_list(name):
     assert not check_body(name).broken
+
+
+def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
+    assert not check_model(str(Path(__file__).parents[2] / "examples" / "own_rule.py")).broken
+
+
+@pytest.mark.parametrize(
+    ("check", "name", "words"),
+    [
+        (check_model, "vasarhely", "did you mean vasarhelyi_2018"),
+        (check_body, "multirotr", "did you mean multirotor"),
+        (check_metric, "ordr", "did you mean order"),
+        (check_metric, "nowhere.py", "no such Python file"),
+    ],
+)
+def test_a_wrong_name_is_one_line(check, name, words):
+    with pytest.raises(ScenarioError, match=words):
+        check(name)
 
 
 # ------------------------------------------------------------------------------------------------ what is planted

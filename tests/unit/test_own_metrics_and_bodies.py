@@ -10,6 +10,7 @@ from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import finish
 from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import SETS, metric_set, reports
+from airflock.recordings.flights import flown_document
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 
@@ -128,6 +129,17 @@ def test_a_recording_keeps_files_and_forgets_what_was_given_directly(files):
     recording = airflock.simulate(direct, 1, precision=64, device="python")
     again = scenario_of(recording)
     assert again.measures.name == "vasarhelyi" and again.vehicle.name == "multirotor"
+
+
+def test_code_in_the_current_folder_is_found_and_its_whole_path_is_kept(files, monkeypatch):
+    monkeypatch.chdir(files)
+    keys = {**SMALL, "metrics.kind": "spread.py", "body.kind": "half.py"}
+    document = load("kidger/final_2d", {"agents": 3, "metrics.kind": "spread.py"}).document
+    assert document["metrics"]["kind"] == "spread.py"
+    kept = flown_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}))
+    assert kept["metrics"]["kind"] == str(files / "spread.py")
+    with pytest.raises(ScenarioError, match="body.tau is no key"):  # the preset's keys are another body's
+        load("vasarhelyi_2018/4ms", keys)
 
 
 BAD = {

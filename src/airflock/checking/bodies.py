@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body.registry import BODIES
 from airflock.checking.report import Report, reported
 from airflock.checking.single import run
 from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled
@@ -16,6 +15,8 @@ from airflock.core.contract import Body, body
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.engine import law
+from airflock.errors import ScenarioError
+from airflock.scenarios import checks
 
 MOTIONS = 40  # random motions that each truth is tried on
 CLOSE = 1e-9
@@ -26,7 +27,7 @@ Motion = dict[str, NDArray[np.float64]]
 def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a body and return a report with one line a truth.
 
-    what       : a Body, a module, a class, a mapping such as globals(), or a name of ours
+    what       : a Body, a module, a class, a mapping such as globals(), a name of ours, or a file that ends in .py
     parameters : values that differ from the defaults, by name; seed: of the random motions, in every fault
 
     A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is finite; a halved time
@@ -34,7 +35,7 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     rightly breaks one of them says which and why: VIOLATES = {"mirror": "a propeller turns one way"}. Raises CheckError
     for any other.
     """
-    found = what if isinstance(what, Body) else BODIES[what] if what in list(BODIES) else body(what)
+    found = _named(what) if isinstance(what, str) else what if isinstance(what, Body) else body(what)
     b = found.Parameters(**dict(parameters or {}))
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
     rng = np.random.default_rng(seed)
@@ -51,6 +52,13 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
         "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, b, motions)),
     }
     return reported(f"body {found.name}", truths, found.violates)
+
+
+def _named(name: str) -> Body:
+    found, faults = checks.body_of({"kind": name}, None)
+    if faults:
+        raise ScenarioError(faults)
+    return found
 
 
 def _motion(found: Body, rng: np.random.Generator, speed: float) -> Motion:

@@ -14,7 +14,9 @@ from airflock.core.contract import Metric, MetricSet
 from airflock.engine import law
 from airflock.engine.plain_scores import Scores
 from airflock.engine.plain_world import Place
+from airflock.errors import ScenarioError
 from airflock.metrics.registry import as_set
+from airflock.scenarios import checks
 from airflock.scenarios.files import make
 from airflock.scenarios.scenario import Scenario
 
@@ -28,7 +30,7 @@ Flock = NDArray[np.float64]  # (instant, agent, component): position (m) and vel
 def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     """Run the standing list of truths on an order parameter and return a report with one line a truth.
 
-    what       : a Metric, a MetricSet, the name of a set, a list of metrics, or a namespace such as globals()
+    what       : a Metric, a MetricSet, its name or file (.py), a list of metrics, or a namespace such as globals()
     dimensions : 2 or 3; seed: of the random flocks, in every fault
 
     A flock that is turned, shifted, renumbered or seen in a mirror keeps its order parameters; one agent alone and two
@@ -36,7 +38,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     parameter that rightly breaks one of them says which and why: VIOLATES = {"mirror": "the sense of rotation"}.
     Raises CheckError for any other.
     """
-    found = as_set(what)
+    found = _named(what) if isinstance(what, str) else as_set(what)
     scenario = _scenario(found, dimensions)
     rng = np.random.default_rng(seed)
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
@@ -61,6 +63,13 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     }
     violates = {key: why for metric in found.metrics for key, why in metric.violates.items()}
     return reported(f"metrics {found.name}", truths, violates | dict(found.violates))
+
+
+def _named(name: str) -> MetricSet:
+    found, faults = checks.metrics_set({"kind": name})
+    if faults:
+        raise ScenarioError(faults)
+    return found
 
 
 def _scenario(found: MetricSet, dimensions: int) -> Scenario:
