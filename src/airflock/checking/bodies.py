@@ -1,6 +1,5 @@
 """The standing list for a body: symmetries, rest, time step, units, single precision."""
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.checking.report import Report, reported
+from airflock.checking.scenes import turn_about_vertical
 from airflock.checking.single import run
 from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled
 from airflock.core.agent import answer
@@ -40,8 +40,7 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
     rng = np.random.default_rng(seed)
     motions = [_motion(found, rng, speed) for _ in range(MOTIONS)]
-    c, s = math.cos(1.1), math.sin(1.1)
-    turn, flip = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.diag([1.0, -1.0, 1.0])
+    turn, flip = turn_about_vertical(1.1), np.diag([1.0, -1.0, 1.0])
     truths: dict[str, tuple[str, Callable[[], str]]] = {
         "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(found.move)[:1])),
         "rotation": ("a motion turned about the vertical turns", lambda: _turns(found, b, motions, turn, seed)),

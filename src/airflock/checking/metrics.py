@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.checking.report import Report, reported
+from airflock.checking.scenes import turn_about_vertical
 from airflock.checking.units import OTHERS, Units, factor, rescaled, rescaled_scenario
 from airflock.core.agent import State
 from airflock.core.contract import Metric, MetricSet
@@ -42,7 +43,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     scenario = _scenario(found, dimensions)
     rng = np.random.default_rng(seed)
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
-    turn = _turn(rng.uniform(0.5, 2.5))
+    turn = turn_about_vertical(rng.uniform(0.5, 2.5))
     flip = np.diag([1.0, -1.0, 1.0])
     order = rng.permutation(AGENTS)
     shift = np.array([37.0, -19.0, 8.0 * (dimensions == 3), 0.0, 0.0, 0.0])
@@ -89,11 +90,6 @@ def _flock(rng: np.random.Generator, dims: int) -> Flock:
     places = rng.uniform(-12.0, 12.0, (1, AGENTS, 3)) + np.cumsum(rng.normal(0.0, 2.0, (INSTANTS, AGENTS, 3)), axis=0)
     speeds = np.array([3.0, 1.0, 0.0]) + rng.normal(0.0, 2.0, (INSTANTS, AGENTS, 3))
     return np.concatenate([places * flat, speeds * flat], axis=2)
-
-
-def _turn(angle: float) -> NDArray[np.float64]:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _turned(flock: Flock, turn: NDArray[np.float64]) -> Flock:

@@ -1,107 +1,39 @@
 """The standing list for a flocking law: symmetries, a lone agent, two agents, time step, units, single precision."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.checking.report import Report, reported
+from airflock.checking.scenes import (
+    AGENTS,
+    Law,
+    Scene,
+    Turn,
+    directions,
+    in_units,
+    law_of,
+    shifted,
+    turn_about_vertical,
+    turned,
+)
 from airflock.checking.single import run
-from airflock.checking.units import COMMAND_UNITS, OTHERS, Units, factor, rescaled_scenario
-from airflock.core.agent import Heard, State, decide, first_memory, meet_neighbours, meet_surfaces, pair_percept
+from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled_scenario
+from airflock.core.agent import Heard, State, first_memory, meet_neighbours, meet_surfaces, pair_percept
 from airflock.core.contract import Model, model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
 from airflock.engine.simulate import fly, plan_of
-from airflock.scenarios.files import find_model, make
+from airflock.scenarios.files import find_model
 from airflock.scenarios.scenario import Scenario
 
 SCENES = 12  # random scenes that each symmetry is tried on
-AGENTS = 4  # in a flight
 CLOSE = 1e-9  # of the largest command: more than rounding
 CLOSE_IN_FLIGHT = 1e-6  # of the flock's extent and speed: guards such as TINY, and what rounding grows to
 HIDDEN = "a unit is declared wrong, or a number with a unit stands in a rule"
-Turn = NDArray[np.float64]
-
-
-class Walls(Percept):
-    """A percept that sees flat walls, as (distance, normal x y z)."""
-
-    surfaces: Sequence[tuple[float, float, float, float]] = ()
-
-    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
-        """Free distance along a unit vector, m."""
-        return self.cast(ux, uy, uz, length, 0.0)
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance of a sphere along a unit vector, m."""
-        free = length
-        for distance, nx, ny, nz in self.surfaces:
-            towards = -(ux * nx + uy * ny + uz * nz)
-            if towards > 0.0:
-                free = min(free, max(distance - radius, 0.0) / towards)
-        return free
-
-
-class Scene(NamedTuple):
-    """What one agent meets: positions and velocities (row 0 is its own), walls, its goal and the arena's centre."""
-
-    states: NDArray[np.float64]
-    walls: NDArray[np.float64]
-    goal: NDArray[np.float64]
-    centre: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Law:
-    """A law with what its scenes are made of: lengths (m) and speeds (m/s) at which it does something."""
-
-    model: Model
-    scenario: Scenario
-    length: float
-    speed: float
-
-    @property
-    def p(self) -> Any:
-        """Parameters."""
-        return self.scenario.parameters
-
-    def scene(self, rng: np.random.Generator, neighbours: int = 4) -> Scene:
-        """A random scene: neighbours from a hundredth to one and a half of its range, two walls, a goal."""
-        dims = self.scenario.dimensions
-        away = self.length * rng.uniform(0.01, 1.5, (neighbours, 1)) * _directions(rng, neighbours, dims)
-        speeds = self.speed * rng.uniform(0.2, 1.5, (neighbours + 1, 1)) * _directions(rng, neighbours + 1, dims)
-        own = self.length * rng.normal(0.0, 1.0, 3) * (1.0, 1.0, float(dims == 3))
-        states = np.hstack([np.vstack([own, own + away]), speeds])
-        walls = np.hstack([self.length * rng.uniform(0.05, 1.0, (2, 1)), _directions(rng, 2, dims)])
-        return Scene(states, walls, self.length * _directions(rng, 1, dims)[0], np.zeros(3))
-
-    def command(self, scene: Scene, order: Sequence[int] | None = None) -> NDArray[np.float64]:
-        """Command of agent 0; order: numbers that the agents go by, and the order in which it meets the others."""
-        numbers = list(order) if order is not None else list(range(len(scene.states)))
-        own = State(*scene.states[0].tolist())
-        heard = [Heard(numbers[j], State(*scene.states[j].tolist()), 0.0) for j in range(1, len(scene.states))]
-        heard.sort(key=lambda each: each.who)
-        walls = [(d, nx, ny, nz) for d, nx, ny, nz in scene.walls.tolist()]
-        period = self.scenario.sensors.period
-        percept = Walls(5.0 * period, *(scene.centre - scene.states[0, :3]).tolist(), *scene.goal.tolist())
-        percept.surfaces = walls
-        made = decide(
-            self.model, self.p, own, heard, walls, time=5.0 * period, period=period, index=numbers[0], percept=percept,
-            shared=self._solved(scene), wing=self.scenario.wing, aero=self.scenario.aero,
-        )  # fmt: skip
-        return np.array(made.command) * (1.0, 1.0, float(self.scenario.dimensions == 3))
-
-    def _solved(self, scene: Scene) -> Any:
-        """What the rule of the whole flock finds for agent 0."""
-        from airflock.engine.plain_flock import of_model
-
-        count = replace(self.scenario.flight, agents=float(len(scene.states)))
-        solve = of_model(replace(self.scenario, flight=count))
-        return solve([State(*row) for row in scene.states.tolist()])[0] if solve else None
 
 
 def check_model(
@@ -125,23 +57,23 @@ def check_model(
     and why: VIOLATES = {"mirror": "neighbours are passed on the right"}. Raises CheckError for any other.
     """
     found = law if isinstance(law, Model) else find_model(law) if isinstance(law, str) else model(law)
-    made = _law(found, dict(parameters or {}), dimensions)
+    made = law_of(found, dict(parameters or {}), dimensions)
     rng = np.random.default_rng(seed)
     scenes = [made.scene(rng) for _ in range(SCENES)]
-    turns = [_turn(rng.uniform(0.1, 6.2)) for _ in scenes]
+    turns = [turn_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
     flip = np.diag([1.0, -1.0, 1.0])
     truths: dict[str, tuple[str, Callable[[], str]]] = {
         "rotation": (
             "a scene turned about the vertical turns the command",
-            lambda: _same(made, scenes, [_turned(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
+            lambda: _same(made, scenes, [turned(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
         ),
         "translation": (
             "a scene shifted in space leaves the command",
-            lambda: _same(made, scenes, [_shifted(s, made.length) for s in scenes], [np.eye(3)] * SCENES, seed),
+            lambda: _same(made, scenes, [shifted(s, made.length) for s in scenes], [np.eye(3)] * SCENES, seed),
         ),
         "mirror": (
             "a scene seen in a mirror mirrors the command",
-            lambda: _same(made, scenes, [_turned(s, flip) for s in scenes], [flip] * SCENES, seed),
+            lambda: _same(made, scenes, [turned(s, flip) for s in scenes], [flip] * SCENES, seed),
         ),
         "renumbering": ("other numbers of the agents leave the command", lambda: _renumbered(made, scenes, rng, seed)),
         "lone agent": ("alone, an agent flies straight on at its preferred speed", lambda: _alone(made, rng)),
@@ -153,51 +85,6 @@ def check_model(
     if compiled:
         truths["compiled"] = ("compiled, it flies as in plain Python", lambda: _compiled(made, seed))
     return reported(f"model {found.name}", truths, found.violates)
-
-
-def _law(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
-    """A law in a scene of its own size: a square arena of a few ranges, decisions every fifth step."""
-    p = found.Parameters(**parameters)
-    known = found.interaction_range or found.reach
-    length = min(float(known(p)), 1e3) if known else 20.0
-    keys = {f"model.{name}": value for name, value in parameters.items()}
-    keys |= {"agents": AGENTS, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
-    keys |= {"world.arena": "none", "start.kind": "ball", "start.radius": length, "radio.range": 10.0 * length}
-    scenario = make({"model": {}}, f"check of {found.name}", keys, law=found)
-    speed = float(found.preferred_speed(p)) if found.preferred_speed else 0.0
-    speed = speed or min(float(getattr(scenario.body, "speed", getattr(scenario.body, "speed_max", 1.0))), 10.0)
-    period = min(0.2, 0.05 * length / speed)
-    dt = 0.2 * period
-    times = {"dt": dt, "duration": 8.0 * period, "sensors.period": period, "metrics.period": period}
-    side = {"world.arena": "square", "world.side": 4.0 * length, "world.height": 4.0 * length}
-    keys |= times | side | {"radio.delay": period, "metrics.collision_period": dt}
-    return Law(found, make({"model": {}}, f"check of {found.name}", keys, law=found), length, speed)
-
-
-# ---------------------------------------------------------------------------------------------------------- scenes
-
-
-def _directions(rng: np.random.Generator, count: int, dims: int) -> NDArray[np.float64]:
-    """Random unit vectors (vector, axis)."""
-    found = rng.normal(size=(count, 3)) * (1.0, 1.0, float(dims == 3))
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
-def _turn(angle: float) -> Turn:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _turned(scene: Scene, turn: Turn) -> Scene:
-    states = np.hstack([scene.states[:, :3] @ turn.T, scene.states[:, 3:] @ turn.T])
-    walls = np.hstack([scene.walls[:, :1], scene.walls[:, 1:] @ turn.T])
-    return Scene(states, walls, turn @ scene.goal, turn @ scene.centre)
-
-
-def _shifted(scene: Scene, length: float) -> Scene:
-    by = length * np.array([3.7, -1.9, 0.8])
-    states = scene.states + np.hstack([by, np.zeros(3)])
-    return scene._replace(states=states, centre=scene.centre + by)
 
 
 def _worst(
@@ -276,7 +163,7 @@ def _flown(scenario: Scenario, start: NDArray[np.float64], seed: int) -> NDArray
 def _start(law: Law, seed: int) -> NDArray[np.float64]:
     rng, dims = np.random.default_rng(seed), law.scenario.dimensions
     places = 0.6 * law.length * rng.uniform(-1.0, 1.0, (dims, AGENTS))
-    return np.vstack([places, law.speed * _directions(rng, AGENTS, dims)[:, :dims].T])
+    return np.vstack([places, law.speed * directions(rng, AGENTS, dims)[:, :dims].T])
 
 
 def _time_step(law: Law, seed: int) -> str:
@@ -306,17 +193,11 @@ def _units(law: Law, scenes: Sequence[Scene], seed: int) -> str:
     for units in OTHERS:
         other = replace(law, scenario=rescaled_scenario(law.scenario, units))
         by = factor(COMMAND_UNITS[law.model.command], units)
-        answers = [other.command(_in_units(scene, units)) / by for scene in scenes]
+        answers = [other.command(in_units(scene, units)) / by for scene in scenes]
         fault = _worst(answers, expected, seed, CLOSE_IN_FLIGHT)
         if fault:
             return f"{fault}: {HIDDEN}"
     return _units_in_flight(law, seed)
-
-
-def _in_units(scene: Scene, units: Units) -> Scene:
-    states = scene.states * np.repeat([units.metre, units.metre / units.second], 3)
-    walls = scene.walls * (units.metre, 1.0, 1.0, 1.0)
-    return Scene(states, walls, units.metre * scene.goal, units.metre * scene.centre)
 
 
 def _units_in_flight(law: Law, seed: int) -> str:
@@ -362,7 +243,7 @@ def _single(law: Law, scenes: Sequence[Scene]) -> str:
         given: dict[str, Any] = pair_percept(own, heard[0], 0) | {"p": law.p, "period": 0.2}
         given |= dict(zip(("distance", "nx", "ny", "nz"), wall, strict=True))
         given |= {"own": Own(*own[3:], *(f * v for v in own[3:])), "memory": first_memory(found)}
-        given |= {"sums": meet_neighbours(found, law.p, own, heard, 0), "shared": law._solved(scene)}
+        given |= {"sums": meet_neighbours(found, law.p, own, heard, 0), "shared": law.solved(scene)}
         given |= {"walls": meet_surfaces(found, law.p, own, [wall]), "wing": law.scenario.wing}
         given |= {"aero": law.scenario.aero, "percept": Percept(1.0, *(-scene.states[0, :3]).tolist())}
         for kind in ("neighbour", "boundary", "decide"):
