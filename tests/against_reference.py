@@ -1,6 +1,5 @@
 """One drawn flight by the driver text, interpreted, against the reference; and how much of a difference is chaos."""
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,7 +57,7 @@ def compared(draw: Draw) -> Verdict:
 def interpreted_flight(draw: Draw) -> cpu.Flown:
     """The flight by the text of its driver, every line of it."""
     scenario = draw.scenario.in_flight(draw.seed)
-    plan = replace(plan_of(scenario, precision=64, record=True, grid=False), given_start=draw.start is not None)
+    plan = plan_of(scenario, precision=64, record=True, grid=False).built(given_start=draw.start is not None)
     with_all_lines = interpreted.flight_driver(plan, exact=True)
     given = cpu.driver_of
     cpu.driver_of = lambda plan, device="cpu": with_all_lines

@@ -11,9 +11,15 @@ _WHERE = {
     "load": "airflock.scenarios.files",
     "presets": "airflock.scenarios.files",
     "model": "airflock.core.contract",
+    "body": "airflock.body",
+    "metric": "airflock.core.contract",
+    "metric_set": "airflock.metrics.registry",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",
     "Parameters": "airflock.core.parameters",
+    "check_model": "airflock.checking.models",
+    "check_metric": "airflock.checking.metrics",
+    "check_body": "airflock.checking.bodies",
     "simulate": "airflock.recordings.flights",
     "Flight": "airflock.engine.flight",
     "recording_of": "airflock.recordings.flights",
@@ -29,7 +35,7 @@ _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock impo
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         module = import_module(_WHERE[name])
-        if name == "evolve":
+        if name in ("evolve", "body"):
             return module  # which can be called
         return getattr(module, "Flight" if name == "open" else name)
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")

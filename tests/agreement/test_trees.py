@@ -6,7 +6,6 @@ that is meant: python tests/agreement/test_trees.py
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -79,17 +78,17 @@ def trees_of(make, *given, builder=building.Builder):
 def found_of(name):
     """Digests of the drivers of a scenario: in single precision, in double with a recording, of a GPU, by cells."""
     one = SCENARIOS[name]
-    plan = replace(plan_of(one, precision=32), grid=False)
+    plan = plan_of(one, precision=32).built(grid=False)
     shape = shape_of(one.agents, 1, sequential=plan.sequential, whole=bool(plan.model.flock))
-    found = {"32": trees_of(driver.flight, plan), "64": trees_of(driver.flight, replace(plan, bits=64, record=True))}
+    found = {"32": trees_of(driver.flight, plan), "64": trees_of(driver.flight, plan.built(bits=64, record=True))}
     if found["64"] == found["32"]:
         del found["64"]
     found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
     alone = not (plan.noisy or plan.delayed or plan.lossy or plan.links or plan.sequential)
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
-        found["grid"] = trees_of(driver.flight, replace(plan, grid=True))
+        found["grid"] = trees_of(driver.flight, plan.built(grid=True))
         if plan.start in ("arena", "ball") and not plan.model.flock:
-            found["cells"] = trees_of(cells.crowd, replace(plan, grid=True), builder=CudaBuilder)
+            found["cells"] = trees_of(cells.crowd, plan.built(grid=True), builder=CudaBuilder)
     return found
 
 
@@ -119,7 +118,7 @@ def test_one_changed_word_of_a_stage_is_seen(module, old, new, name, monkeypatch
     values._module.cache_clear()
     values.text_of.cache_clear()
     try:
-        plan = replace(plan_of(SCENARIOS[name], precision=32), grid=False)
+        plan = plan_of(SCENARIOS[name], precision=32).built(grid=False)
         assert trees_of(driver.flight, plan) != json.loads(RECORD.read_text())[name]["32"]
     finally:
         values._module.cache_clear()

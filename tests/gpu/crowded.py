@@ -3,7 +3,6 @@
 import json
 import sys
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +35,7 @@ def differ(name, seed):
     """Largest differences of a case."""
     kind, keys = CASES[name]
     found = load(kind, COMMON | keys)
-    plan = replace(plan_of(found, precision=64, record=True), grid=True)
+    plan = plan_of(found, precision=64, record=True).built(grid=True)
     known, flown = fly_plainly(found, seed), fly_crowd(found, plan, seed)
     flock, other = Crowd(found, plan, seed), Crowd(found, plan, seed)
     for each in (flock, other) if name in ("periodic", "plane") else ():

@@ -6,7 +6,6 @@ Run in a process of its own, with NUMBA_ENABLE_CUDASIM=1: python simulated.py CA
 import json
 import sys
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +100,7 @@ def build(name):
 def differ(name, seed):
     """Largest differences of a case: frames (m, m/s), order parameters, and how far anything moved."""
     found, shape = build(name)
-    plan = replace(plan_of(found, precision=64, record=True), grid=False)
+    plan = plan_of(found, precision=64, record=True, grid=False)
     one, two = fly_many(plan, [tables(found, plan, s) for s in (seed, seed + 1)], shape=shape)
     trusted = [fly_plainly(found, s) for s in (seed, seed + 1)]
     frames, values = 0.0, {}

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.body import radio, sensors, wind
+from airflock.checking.flock import of_model
 from airflock.core import random
 from airflock.core.agent import Heard, State, answer, decide
 from airflock.core.contract import Metric
@@ -19,10 +20,8 @@ from airflock.core.parameters import choices
 from airflock.engine.cpu import Flown
 from airflock.engine.place import Course, Place, Senses
 from airflock.engine.tables import clock
-from airflock.metrics.registry import metrics_of
 from airflock.scenarios.scenario import Scenario
 from reference.begin import ZERO, Vector, begin, given, normals
-from reference.flock import of_model
 from reference.scores import Scores
 
 LIMIT = 1e8  # m; no radio reaches farther
@@ -68,7 +67,7 @@ def fly_plainly(
     flock = [Agent(state) for state in begun]
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
-    chosen = metrics_of(scenario.metrics) if metrics is None else metrics
+    chosen = scenario.order_parameters if metrics is None else metrics
     scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
     solve = of_model(scenario)
     if len(flock) < scenario.agents:

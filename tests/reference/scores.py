@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from airflock.checking.flock import Survey, of_metric
 from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
 from airflock.engine.place import Place
-from reference.flock import Survey, of_metric
 
 Record = Any  # a NamedTuple of floats that a metric declares
 

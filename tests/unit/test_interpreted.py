@@ -2,7 +2,6 @@
 
 import bdb
 import sys
-from dataclasses import replace
 
 import pytest
 
@@ -67,7 +66,7 @@ def test_a_breakpoint_in_a_rule_stops_at_every_neighbour_and_nowhere_else():
 
 def test_a_breakpoint_in_a_stage_stops():
     found = small("viragh_2014")
-    plan = replace(plan_of(found, precision=64, record=True), grid=False)
+    plan = plan_of(found, precision=64, record=True).built(grid=False)
     file = interpreted.flight_driver(plan).__file__
     seen = Stops().stopped_at(file, line_of(file, "o = viragh_2014_decide("), lambda: flown(found, 1))
     assert [values["i"] for values in seen] == [0, 1, 2] * 3

@@ -13,7 +13,7 @@ from airflock.core.contract import model
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.engine import law
 from airflock.errors import RuleError
-from airflock.metrics.registry import COUNTS, SETS
+from airflock.metrics.registry import METRICS
 from airflock.scenarios.files import MODELS
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
@@ -130,7 +130,7 @@ def test_every_shipped_model_is_lawful(name):
 def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
         assert law.faults(body.move) == []
-    for metric in {metric for found in (*SETS.values(), COUNTS.values()) for metric in found}:
+    for metric in METRICS.values():
         for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
             if getattr(metric, kind) is not None:
                 assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)

@@ -30,7 +30,7 @@ def driver_of(name, bits=32, **layout):
 
     found = load(name)
     plan = plan_of(found, precision=bits)
-    plan = replace(plan, grid=False, meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
+    plan = replace(plan.built(grid=False), meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
     return flight_driver(plan, replace(layout_of(plan, found.agents, 1000), **layout)), plan
 
 

@@ -1,7 +1,5 @@
 """A replacement in generated text that finds nothing to replace is an error that names the text."""
 
-from dataclasses import replace
-
 import pytest
 
 from airflock.engine.cuda import cells
@@ -34,7 +32,7 @@ def respelled(lines):
 
 def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(monkeypatch):
     """The grid and the kernel of a large flock look for spellings of `neighbours`; none may be missed in silence."""
-    plan = replace(plan_of(load(LARGE), precision=32), grid=True)
+    plan = plan_of(load(LARGE), precision=32).built(grid=True)
     driver.flight(plan)
     cells.crowd(plan)
     meet, add = grid.neighbours, CudaBuilder.function

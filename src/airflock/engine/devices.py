@@ -1,7 +1,7 @@
 """Devices: on what flights run. `auto` picks by the size of the work and by what there is, and says what it picked."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -82,7 +82,7 @@ def no_room(scenario: Scenario, plan: Plan) -> str | None:
 
     if by_cells(scenario, plan, plan.given_start):
         return crowd.too_large(scenario, plan)
-    plan = replace(plan, grid=False)
+    plan = plan.built(grid=False)
     return launch.too_large(plan, tables(scenario, plan, 0))
 
 
@@ -109,7 +109,7 @@ def fly_one(
 ) -> Flown:  # plan: with or without recorded frames
     """Fly one world on a named device other than the CPU."""
     if device == "python":
-        plan = replace(plan, grid=False, bits=64)
+        plan = plan.built(grid=False, bits=64)
         return cpu.fly(plan, tables(scenario, plan, seed), start, device)
     return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
 
@@ -134,7 +134,7 @@ def fly_on_gpu(
             if done:
                 done()
         else:
-            groups.setdefault(replace(plan, grid=False), []).append(number)
+            groups.setdefault(plan.built(grid=False), []).append(number)
     for plan, members in groups.items():
         jobs = [tables(scenarios[m], plan, seeds[m]) for m in members]
         given = None if starts is None else [np.asarray(starts[m]) for m in members]

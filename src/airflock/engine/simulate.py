@@ -12,15 +12,12 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Plan, make_plan
+from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe
 from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
 from airflock.engine.threads import in_threads
 from airflock.errors import FlightError, ScenarioError
-from airflock.metrics import fitness_dimock, fitness_kidger
-from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
@@ -34,10 +31,12 @@ def plan_of(
     record: bool = False,
     metrics: tuple[Metric, ...] | None = None,
     grid: bool | None = None,
+    given_start: bool = False,
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid : neighbours by cells or all pairs; by default what is faster, and all pairs in a box too small for cells
+    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
+    given_start : the start is handed over with each flight
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -46,9 +45,15 @@ def plan_of(
     return make_plan(
         scenario.model,
         scenario.parameters,
-        metrics_of(scenario.metrics) if metrics is None else metrics,
+        scenario.order_parameters if metrics is None else metrics,
         scenario.world,
-        grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        scenario.numbers,
+        build=Build(
+            bits=precision,
+            record=record,
+            given_start=given_start,
+            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        ),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
@@ -58,7 +63,6 @@ def plan_of(
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
         sequential=scenario.flight.update == "sequential",
-        bits=precision,
         noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
@@ -67,13 +71,12 @@ def plan_of(
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
-        record=record,
     )
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
-    found = metrics_of(scenario.metrics) if metrics is None else metrics
+    found = scenario.order_parameters if metrics is None else metrics
     used = scenario.model.flock is not None or any(
         "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
     )
@@ -109,7 +112,7 @@ def fly(
     scenario = scenario.in_flight(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
-        plan = replace(plan, given_start=True)
+        plan = plan.built(given_start=True)
         start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
@@ -173,7 +176,7 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
     low, high = 0, clock(scenario)["steps"]
     if device != "cuda":
         return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), low, high)
-    plan = replace(plan_of(scenario, precision=precision), given_start=start is not None)
+    plan = plan_of(scenario, precision=precision).built(given_start=start is not None)
     while high - low > 1:
         middle = (low + high) // 2
         shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))
@@ -203,11 +206,11 @@ def opened(
     """
     plan = plan_of(scenario, precision=precision, record=record)
     if device == "python":
-        plan = replace(plan, grid=False, bits=64)
+        plan = plan.built(grid=False, bits=64)
     given = None
     if start is not None:
         given = sound_start(scenario, plan, start)
-    plan = replace(plan, given_start=given_start or start is not None)
+    plan = plan.built(given_start=given_start or start is not None)
     return State(plan, tables(scenario, plan, seed, world), cpu.driver_of(plan, device), given)
 
 
@@ -242,15 +245,9 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
     return finish(scenario, fly(scenario, seed, precision=precision).values)
 
 
-def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
-    """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
-    if scenario.metrics.kind == "dimock":
-        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
-    if scenario.metrics.kind == "kidger":
-        return {**values, **fitness_kidger.fitness(values, scenario.agents, scenario.flight.duration)}
-    if scenario.metrics.kind != "vasarhelyi":
-        return values
-    return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
+def finish(scenario: Scenario, values: dict[str, Any]) -> dict[str, Any]:
+    """Order parameters with what the scenario's metric set makes of them: partial fitnesses and fitness."""
+    return scenario.measures.judged(values, scenario.agents, scenario.flight.duration, scenario.measured_by())
 
 
 def compile_for(scenario: Scenario, *, precision: int = 32) -> None:

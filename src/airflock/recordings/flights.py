@@ -92,14 +92,16 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 
 
 def flown_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values; a law in a file of its own with its whole path, so that it is found from anywhere.
+    """The scenario as plain values; code in files of its own with whole paths, so that it is found from anywhere.
 
-    A law that was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
+    What was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
     """
     document: dict[str, Any] = plain(scenario.document)
-    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
-    if law.suffix == ".py" and law.is_file():
-        document["model"]["kind"] = str(law.absolute())
+    for section in ("model", "body", "metrics"):
+        kind = str(document.get(section, {}).get("kind", ""))
+        places = [place for place in (Path(scenario.name).parent / kind, Path(kind)) if place.is_file()]
+        if kind.endswith(".py") and places:
+            document[section]["kind"] = str(places[0].absolute())
     return document
 
 

@@ -4,7 +4,7 @@ import ast
 import builtins
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from textwrap import indent
 
 from airflock.core.contract import Metric
@@ -48,7 +48,7 @@ class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
     def __init__(self, plan: Plan, shape: Shape):
-        super().__init__(replace(plan, grid=False))
+        super().__init__(plan.built(grid=False))
         self.shape = shape
         self.stages: dict[str, Stage] = {}
         self.letters: set[str] = set()
