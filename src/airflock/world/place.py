@@ -142,6 +142,13 @@ class Place:
         for first, last in self._obstacles:
             yield arena.convex_obstacle(x, y, z, self._edges, first, last)
 
+    def solids(self, x: float, y: float, z: float) -> Iterator[Surface]:
+        """Distance (m) and unit normal of every obstacle and of the nearest of what stands in the scene."""
+        yield from self.obstacles(x, y, z)
+        found = bvh.nearest_of(x, y, z, AWAY, 0.0, *self._scene)
+        if found.distance < AWAY:
+            yield found
+
     def excursion(self, x: float, y: float, z: float) -> float:
         """Distance outside the arena or inside an obstacle or a shape, m; negative where flying is allowed."""
         out = self._beyond(x, y, z, *self._half, self._edges, self._corners)
