@@ -50,11 +50,12 @@ class Node:
     now, utc : the own clock (s) and Unix time (µs) at the start; both run alike from then on
     memory   : what outlived a restart
     radios   : periods (s) at which each radio sends the same packet
+    since    : µs of Unix time; nothing that was sent before is accepted. By default the start, so that no replay is
     """
 
     def __init__(
         self, card: Card, member: int, key: bytes, *, now: float, utc: int, memory: Memory | None = None,
-        radios: tuple[float, ...] | None = None,
+        radios: tuple[float, ...] | None = None, since: int | None = None,
     ):  # fmt: skip
         kept = memory or Memory()
         self.card, self.member, self.phase = card, member, Phase.BOOT
@@ -64,7 +65,8 @@ class Node:
         self._sign = Signer(key, member, last=kept.sent)
         others = [who for who in card.members if who != member]
         self._receive = Receiver(
-            key, member, {status.MESSAGE: others, orders.MESSAGE: (orders.OPERATOR,)}, started=utc, heard=kept.heard,
+            key, member, {status.MESSAGE: others, orders.MESSAGE: (orders.OPERATOR,)}, 
+            started=utc if since is None else since, heard=kept.heard,
             spread=card.safety.clock_spread + card.delay,
         )  # fmt: skip
         self.wire = Wire(card.autopilot, member, card.site)
@@ -285,13 +287,19 @@ class Node:
             self._asked_at = now
             out.autopilot.extend(self._questions())
         due = [k for k, at in enumerate(self._next_status) if now >= at - EPSILON]
-        own = self.wire.state
-        if not due or own is None:
+        if not due:
             return
-        datagram = self._sign(status.message(self._status(own, now), self.card.site), self.utc(now))
-        for k in due:
-            self._next_status[k] = max(self._next_status[k] + self._radios[k], now)
-            out.radios[k].append(datagram)
+        for datagram in self.say_status(now):
+            for k in due:
+                self._next_status[k] = max(self._next_status[k] + self._radios[k], now)
+                out.radios[k].append(datagram)
+
+    def say_status(self, now: float) -> list[bytes]:
+        """The own status as a signed datagram; nothing while no own position is known."""
+        own = self.wire.state
+        if own is None:
+            return []
+        return [self._sign(status.message(self._status(own, now), self.card.site), self.utc(now))]
 
     def _questions(self) -> list[bytes]:
         """What is still to be asked of the autopilot."""
