@@ -200,7 +200,7 @@ def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, ag
     if could_be_near(distance, age, s) and age + longer < s.forget:
         assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
     assert not could_be_near(distance, s.forget, s)
-    assert not could_be_near(s.keep, min(age, s.patience), s), "data younger than the patience stop nobody"
+    assert not could_be_near(distance, min(age, s.patience), s), "data younger than the patience stop nobody"
 
 
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():

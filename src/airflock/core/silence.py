@@ -36,5 +36,5 @@ def could_be_near(distance, age, s):
 
     Its reach grows from `s.patience` on at `s.closing`; it is given up at the age `s.forget`.
     """
-    reach = s.closing * max(age - s.patience, 0.0)
-    return 1.0 if (distance - s.keep < reach) & (age < s.forget) else 0.0
+    lost = (age > s.patience) & (age < s.forget)
+    return 1.0 if lost & (distance - s.keep < s.closing * (age - s.patience)) else 0.0

@@ -68,7 +68,9 @@ class Fleet:
         side = max(1, round(len(card.members) ** 0.5))
         at = (4.0 * (i % side) - 2.0 * (side - 1), 4.0 * (i // side) - 2.0 * (side - 1), 0.0)
         draw = self._draws(i) if "noise" in number_names(b) and b.noise > 0.0 else lambda step: (0.0, 0.0, 0.0)
-        return Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
+        made = Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
+        made.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
+        return made
 
     def _draws(self, i: int) -> Callable[[int], Vector]:
         """Outer noise of a drone at a motion step: the numbers that the simulated agent draws."""

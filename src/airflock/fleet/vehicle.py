@@ -11,9 +11,10 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.contract import Body
 from airflock.core.parameters import choices
+from airflock.core.vocabulary import asks
 from airflock.fleet import telemetry
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
@@ -36,6 +37,7 @@ VELOCITY_IGNORED = 0x0038
 LOCAL_NED, BODY_NED = 1, 8
 GROUND = 0.15  # m; lower is landed
 FRESH = 0.5  # s between setpoints that still are one stream
+GIVEN = (*(letter + axis for letter in "vmcgw" for axis in "xyz"), "dt", "b")  # what a body may ask for
 SINK = 1.0  # m/s, of a landing
 
 Vector = tuple[float, float, float]
@@ -65,6 +67,8 @@ class Vehicle:
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.lifting = False
+        self._asked = tuple(GIVEN.index(name) for name in asks(body.move, "move", body.name))
+        self._old = choices(b).get("integration", body.integration) == "old"
         self.frozen: State | None = None  # a navigation that stands still, if it does
 
     def frame(self, message: Any) -> bytes:
@@ -256,11 +260,9 @@ class Vehicle:
             return
         s, c = self.state, self.wish()
         command = c if self.motor else (s.vx, s.vy, s.vz - 5.0)
-        known = {"v": s[3:], "m": self.measured[3:], "c": command, "g": self._draw(number), "w": (0.0, 0.0, 0.0)}
-        given: dict[str, Any] = {a + axis: v[k] for a, v in known.items() for k, axis in enumerate("xyz")}
-        velocity = answer(self.body.move, "move", given | {"dt": dt, "b": self.b}, self.body.name)
-        old = choices(self.b).get("integration", self.body.integration) == "old"
-        vx, vy, vz = s[3:] if old else velocity
+        known = (*s[3:], *self.measured[3:], *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b)
+        velocity = self.body.move(*(known[k] for k in self._asked))
+        vx, vy, vz = s[3:] if self._old else velocity
         self.state = State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity)
         if self.state.z <= 0.0 and c[2] <= 0.0:
             self.state = State(self.state.x, self.state.y, 0.0, 0.0, 0.0, 0.0)

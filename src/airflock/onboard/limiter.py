@@ -39,14 +39,16 @@ def limit(
         wish = STILL
     vx, vy, _ = shorten(wish[0], wish[1], 0.0, s.speed_max)
     vz = clamp(wish[2], -s.climb_max, s.climb_max)
-    dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, s.accel * s.response)
+    # As far ahead of the own velocity as the drone can follow until the next setpoint, so that nothing is lost.
+    dx, dy, dz = shorten(vx - own.vx, vy - own.vy, vz - own.vz, s.accel * (s.response + s.tick))
     vx, vy, vz = own.vx + dx, own.vy + dy, own.vz + dz
     fenced = False
     walls = list(surfaces)
     for _ in range(2):  # a corner: what one side turns, another may have to turn again
         for distance, nx, ny, nz in walls:
             outward = -(vx * nx + vy * ny + vz * nz)
-            most = braking_curve(distance - s.soft_margin, s.brake, s.brake_gain)
+            lag = max(-(own.vx * nx + own.vy * ny + own.vz * nz), 0.0) * s.response  # flown before it slows down
+            most = braking_curve(distance - s.soft_margin - lag, s.brake, s.brake_gain)
             if outward > most:
                 k = outward - most
                 vx, vy, vz, fenced = vx + k * nx, vy + k * ny, vz + k * nz, True

@@ -16,7 +16,7 @@ class Safety(Record):
     climb_max: float = quantity(2.0, "m/s", low=0.1, high=10.0, source=OURS, meaning="largest vertical speed")
     accel: float = quantity(
         6.0, "m/s^2", low=0.1, high=50.0, source="Vásárhelyi et al. 2018, Table S5",
-        meaning="with `response`: a command differs from the own velocity by at most their product",
+        meaning="a command differs from the own velocity by at most accel (response + tick)",
     )  # fmt: skip
     response: float = quantity(
         1.0, "s", low=0.01, high=60.0, source="Vásárhelyi et al. 2018, Table S5", meaning="relaxation time of the drone"
