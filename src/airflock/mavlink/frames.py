@@ -90,6 +90,13 @@ class Stream:
 
     def __call__(self, data: bytes) -> list[Frame]:
         """Frames that are whole now."""
+        return [frame for frame, _ in self._whole(data)]
+
+    def raw(self, data: bytes) -> list[bytes]:
+        """The bytes of frames that are whole now, with their signatures."""
+        return [whole for _, whole in self._whole(data)]
+
+    def _whole(self, data: bytes) -> list[tuple[Frame, bytes]]:
         self._rest += data
         found, start = [], 0
         while start < len(self._rest):
@@ -97,7 +104,7 @@ class Stream:
             if taken == 0:
                 break
             if frame is not None:
-                found.append(frame)
+                found.append((frame, self._rest[start : start + taken]))
             start += taken
         self._rest = self._rest[start:]
         return found

@@ -26,6 +26,7 @@ from airflock.mavlink.coordinates import Site
 from airflock.onboard.safety import Safety
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, inward, polygon_fault
+from airflock.world.shapes import COLUMNS
 
 VERSION = 1
 KEYS = (
@@ -166,7 +167,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         faults.append(f"members = {members!r}: give system ids from 1 to {LARGEST_SYSTEM}")
     elif len(set(members)) < len(members):
         faults.append(f"members = {members}: a system id occurs twice")
-    if d["autopilot"] not in AUTOPILOTS:
+    if not isinstance(d["autopilot"], str) or d["autopilot"] not in AUTOPILOTS:
         faults.append(f"autopilot = {d['autopilot']!r} is none of {', '.join(AUTOPILOTS)}")
     corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
     if not _is_ring(corners):
@@ -179,9 +180,11 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     world = _record(arena.Parameters, d["world"], "world", faults)
     silence = _record(Silence, d["silence"], "silence", faults)
     safety = _record(Safety, d["safety"], "safety", faults)
+    rows = d["shapes"]
+    if not _are_shapes(rows):
+        faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
     if faults or law is None:
         return None
-    rows = d["shapes"]
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
         look=1e30 if law.wall_reach is None else float(law.wall_reach(parameters)), casts=law.sight is not None,
@@ -258,7 +261,7 @@ def _law(table: Any, faults: list[str]) -> tuple[Model | None, Any]:
 
 def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
     kind = table.get("kind") if isinstance(table, dict) else None
-    if kind not in BODIES:
+    if not isinstance(kind, str) or kind not in BODIES:
         faults.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
         return None, None
     return BODIES[kind], _record(
@@ -311,6 +314,21 @@ def _numbers(
         else:
             found[key] = value
     return found
+
+
+def _are_shapes(rows: Any) -> bool:
+    """Whether the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
+    if not isinstance(rows, dict) or set(rows) != {"shapes", "nodes", "links"}:
+        return False
+    wide = {"shapes": COLUMNS, "nodes": 6, "links": 3}
+    for name, width in wide.items():
+        for row in rows[name] if isinstance(rows[name], list) else [None]:
+            if not isinstance(row, list) or len(row) != width or not all(type(v) in (int, float) for v in row):
+                return False
+    count, last = len(rows["nodes"]), len(rows["shapes"])
+    if len(rows["links"]) != count:
+        return False
+    return all(k < s <= count and 0 <= a <= b <= last for k, (s, a, b) in enumerate(rows["links"]))
 
 
 def _is_ring(corners: Any) -> bool:

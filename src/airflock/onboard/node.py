@@ -59,14 +59,14 @@ class Node:
     ):  # fmt: skip
         kept = memory or Memory()
         self.card, self.member, self.phase = card, member, Phase.BOOT
-        self._zero = utc - round(now * 1e6)
+        self._zero, self.since = utc - round(now * 1e6), utc if since is None else since
         self._radios = radios or (card.safety.status_period,)
         self._say = Speaker(card.autopilot, member)
         self._sign = Signer(key, member, last=kept.sent)
         others = [who for who in card.members if who != member]
         self._receive = Receiver(
             key, member, {status.MESSAGE: others, orders.MESSAGE: (orders.OPERATOR,)}, 
-            started=utc if since is None else since, heard=kept.heard,
+            started=self.since, heard=kept.heard,
             spread=card.safety.clock_spread + card.delay,
         )  # fmt: skip
         self.wire = Wire(card.autopilot, member, card.site)
