@@ -88,9 +88,8 @@ class Fleet:
 
     def _begin(self, start: Sequence[State]) -> None:
         """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""
-        lift = self.card.height - self.card.law_state(State(0.0, 0.0, self.card.height, 0.0, 0.0, 0.0)).z
         for vehicle, node, s in zip(self.vehicles, self.nodes, start, strict=True):
-            vehicle.state = s._replace(z=s.z + (self.card.height if self.card.flat else lift))
+            vehicle.state = s._replace(z=s.z + (self.card.height if self.card.flat else self.lift))
             vehicle.armed, vehicle.mode, vehicle.target_at, vehicle.first_at = True, OURS, 0.0, -9.0
             node.phase, node.home = Phase.FLOCK, (*vehicle.home[:2], self.card.layer(node.member))
             node.autopilot(vehicle.frame_origin(), 0.0)
@@ -111,6 +110,11 @@ class Fleet:
     def now(self) -> float:
         """Virtual time, s."""
         return self.steps * self._dt
+
+    @property
+    def lift(self) -> float:
+        """Height (m) above the site at which the law counts zero."""
+        return -self.card.law_state(State(*(0.0,) * 6)).z
 
     def order(self, do: Do, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
         """Give an order as the operator's station would; it reaches every drone at once."""
