@@ -20,7 +20,8 @@ from airflock.scenarios.scenario import Scenario
 
 SITE = (47.5, 19.0, 120.0)  # somewhere; a fleet in software is nowhere
 EXPIRES = 2**39
-NUDGE = 0.01  # m
+NUDGE = 0.01  # m; what a packet resolves
+NUDGES = 8
 KEPT = ("x", "y", "z")
 
 
@@ -89,7 +90,7 @@ def fly(
 
 
 class Departure(NamedTuple):
-    """Largest distance (m) over agents to the simulated flight at some times (s), and that of a nudged simulation."""
+    """Largest distance (m) over agents to the simulated flight at some times (s), and that of nudged simulations."""
 
     times: list[float]
     fleet: list[float]
@@ -97,22 +98,29 @@ class Departure(NamedTuple):
 
 
 def departure(fleet: Fleet, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0)) -> Departure:
-    """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after a nudge of 1 cm."""
+    """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
+
+    A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges is told.
+    """
     scenario, dims, n = fleet.scenario, fleet.scenario.dimensions, fleet.scenario.agents
     states = first_states(scenario, fleet.seed)
     start = np.array([[*s[:dims], *s[3 : 3 + dims]] for s in states]).T
-    nudged = start.copy()
-    nudged[0, 0] += NUDGE
 
     def places(start: Any) -> Any:
         flown = simulate(scenario, fleet.seed, precision=64, start=start)
         return flown.position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
 
-    plain, other = places(start), places(nudged)
+    def nudged(number: int) -> Any:
+        angle = 2.4 * np.arange(n) * (number + 1) + number  # all directions, none twice
+        moved = start.copy()
+        moved[:2] += NUDGE * np.array([np.cos(angle), np.sin(angle)])
+        return places(moved)
+
+    plain = places(start)
     ours = recording(fleet).position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
     count = min(len(plain), len(ours))
     apart = np.linalg.norm(ours[:count] - plain[:count], axis=-1).max(axis=1)
-    chaos = np.linalg.norm(other - plain, axis=-1).max(axis=1)
+    chaos = np.max([np.linalg.norm(nudged(k) - plain, axis=-1).max(axis=1) for k in range(NUDGES)], axis=0)
     period = fleet.card.period
     kept = [t for t in times if round(t / period) < count]
     at = [round(t / period) for t in kept]

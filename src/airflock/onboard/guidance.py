@@ -9,6 +9,7 @@ from airflock.onboard.safety import Safety
 
 HEIGHT_GAIN = 1.0  # 1/s; our choice: a metre off is a metre per second
 KEEP_GAIN = 0.5  # 1/s; and half as fast back to a point that is kept
+APART = 0.8  # of the distance of two layers: farther above each other, two drones pass
 PUSH = 1.0  # 1/s; half a spring: a metre too near pushes with a metre per second
 
 
@@ -32,10 +33,12 @@ def make_for(own: State, point: tuple[float, float, float], s: Safety) -> Veloci
 
 
 def push(own: State, neighbours: Iterable[State], s: Safety) -> Velocity:
-    """Velocity away from all neighbours within s.yield_range, by distance in space, along the ground plan."""
+    """Velocity along the ground plan away from all neighbours within s.yield_range that are on no other layer."""
     x = y = 0.0
     for other in neighbours:
         dx, dy, dz = own.x - other.x, own.y - other.y, own.z - other.z
+        if abs(dz) > APART * s.layer:
+            continue
         near = PUSH * max(s.yield_range - norm(dx, dy, dz), 0.0) / norm(dx, dy, 0.0)
         x, y = x + near * dx, y + near * dy
     vx, vy, _ = shorten(x, y, 0.0, s.speed_max)

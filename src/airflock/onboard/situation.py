@@ -10,6 +10,7 @@ from airflock.onboard.operator import Operator
 from airflock.onboard.peers import FRESH, Peers
 from airflock.onboard.wire import Wire
 
+SLOW = 0.5  # m/s; faster than this a drone does not begin to land
 ALIVE = 3.0  # s; an autopilot that says nothing for longer is not there
 GATHERED = (Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD)
 BY_MODE = frozenset({Phase.RETURN, Phase.LAND, Phase.DONE})
@@ -146,7 +147,8 @@ def facts(
     layer = card.layer(member)
     at_home = False
     if own is not None and home is not None:
-        at_home = norm(own.x - home[0], own.y - home[1], 0.0) < s.home_radius and abs(own.z - layer) < 1.0
+        over = norm(own.x - home[0], own.y - home[1], 0.0) < s.home_radius and abs(own.z - layer) < 1.0
+        at_home = over and norm(own.vx, own.vy, 0.0) < SLOW
     return Facts(
         mode_ours=wire.mode == card.autopilot.ours, mode_land=wire.mode == card.autopilot.land,
         armed=bool(wire.armed), landed=bool(wire.landed), healthy=not (position_bad or gnss_for),
