@@ -305,7 +305,20 @@ def test_the_memory_of_a_node_is_read_or_refused(tmp_path):
 
 # ---------------------------------------------------------------------------------------------------- packaging
 
-REFUSED = ("numpy", "numba", "scipy", "pydantic", "typer", "rich", "xarray", "pandas", "shapely", "matplotlib", "lxml")
+REFUSED = (
+    "numpy",
+    "numba",
+    "scipy",
+    "pydantic",
+    "typer",
+    "rich",
+    "xarray",
+    "pandas",
+    "shapely",
+    "matplotlib",
+    "lxml",
+    "fastcrc",
+)
 ALONE = f"""
 import sys
 class Refuse:
