@@ -306,19 +306,9 @@ def test_the_memory_of_a_node_is_read_or_refused(tmp_path):
 # ---------------------------------------------------------------------------------------------------- packaging
 
 REFUSED = (
-    "numpy",
-    "numba",
-    "scipy",
-    "pydantic",
-    "typer",
-    "rich",
-    "xarray",
-    "pandas",
-    "shapely",
-    "matplotlib",
-    "lxml",
+    "numpy", "numba", "scipy", "pydantic", "typer", "rich", "xarray", "pandas", "shapely", "matplotlib", "lxml",
     "fastcrc",
-)
+)  # fmt: skip
 ALONE = f"""
 import sys
 class Refuse:
