@@ -51,6 +51,13 @@ def test_three_drones_fly_the_simulated_flight_for_a_minute():
     assert all(not any(node.refused.values()) for node in flown.nodes)
 
 
+@pytest.mark.parametrize("radio", [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}])
+def test_with_lossy_radios_they_lose_the_same_packets(radio):
+    """The ether throws the simulator's dice: after 5 s no more than a nudge of 1 cm makes."""
+    apart = compare.departure(in_the_air(3, 5.2, **radio), [5.0])
+    assert apart.fleet[0] < 0.01
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_ten_drones_leave_it_no_faster_than_the_simulation_leaves_itself(seed):
     """After 5 s at most 5 cm; or, where an agent turns round, no more than the simulation after nudges of 3 cm."""

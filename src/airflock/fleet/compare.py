@@ -11,7 +11,7 @@ import xarray as xr
 from airflock.core.agent import State
 from airflock.fleet.faults import Fault
 from airflock.fleet.lockstep import Fleet, start_states
-from airflock.fleet.prepare import card_document
+from airflock.fleet.prepare import card_document, limits_of
 from airflock.onboard.card import Card, card_of, hash_of
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import dataset
@@ -30,13 +30,16 @@ def software_card(
     as_simulated: bool = True,
 ) -> Card:  # fmt: skip
     """Card of a fleet in software: one tick and one packet per decision, as the simulated agents."""
-    period = min(max(scenario.sensors.period or scenario.flight.dt, 0.01), 0.2)
+    period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
+    limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
+    if scenario.dimensions == 3:
+        limits["climb_max"] = min(limits_of(scenario).speed_max, 10.0)  # the law climbs as fast as it flies
     made = card_document(
         scenario, site=SITE, members=members, mission=1, expires=EXPIRES, operator=operator, autopilot=vehicle,
         margin=margin, as_simulated=as_simulated, silent=silent,
-        safety={"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0},
+        safety=limits,
     )  # fmt: skip
     return card_of({**made, "hash": hash_of(made)})
 

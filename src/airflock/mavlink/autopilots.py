@@ -87,7 +87,7 @@ AUTOPILOTS = {
         guards=(
             Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes: 16 m at 4 m/s with 3 s"),
             Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence acts"),
-            Guard("FS_GCS_ENABLE", 1.0, 7.0, "returns or lands when the node's heartbeat ends"),
+            Guard("FS_GCS_ENABLE", 1.0, 7.0, "acts when heartbeats end; the node's if SYSID_MYGCS is its own id"),
         ),
     ),
 }  # fmt: skip

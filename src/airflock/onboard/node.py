@@ -207,6 +207,7 @@ class Node:
         if phase == Phase.LAND and not known.mode_land and self._try(now):
             out.autopilot.append(say.set_mode(self.card.autopilot.land))
         streams = phase in FLY or phase == Phase.ARMING or (phase == Phase.MANUAL and known.resume)
+        streams = streams or (phase == Phase.LAND and known.mode_ours)  # until the autopilot lands by itself
         if not streams:
             self._stream_since, self.command = None, STILL
             return

@@ -52,7 +52,7 @@ class Operator:
 
     def _obey(self, order: Order, utc: int) -> None:
         if order.do == Do.START:
-            self.start_at = order.at
+            self.start_at, self.held, self.resume = order.at, False, False
         elif order.do == Do.HOLD:
             self.held, self.resume = True, False
         elif order.do == Do.RESUME:

@@ -5,6 +5,7 @@ import asyncio
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TextIO
 
@@ -79,6 +80,8 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
     if not given.i_am_the_pilot and not given.check:
         faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
+    if card is not None and find_spec("cryptography") is None:
+        sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
     ports: list[Port] = []
     for text in (given.autopilot, *given.radio):
         try:
