@@ -100,7 +100,9 @@ class Departure(NamedTuple):
     nudged: list[float]
 
 
-def departure(fleet: Fleet, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0)) -> Departure:
+def departure(
+    fleet: Fleet, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0), device: str = "cpu"
+) -> Departure:  # fmt: skip
     """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
     A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges is told.
@@ -110,7 +112,7 @@ def departure(fleet: Fleet, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0
     start = np.array([[*s[:dims], *s[3 : 3 + dims]] for s in states]).T
 
     def places(start: Any) -> Any:
-        flown = simulate(scenario, fleet.seed, precision=64, start=start)
+        flown = simulate(scenario, fleet.seed, precision=64, start=start, device=device)
         return flown.position.transpose("time", "individual", "space", "keypoint").values.reshape(-1, n, dims)
 
     def nudged(number: int) -> Any:
