@@ -205,7 +205,8 @@ def test_a_law_that_fails_in_flight_holds_and_then_returns(monkeypatch):
     monkeypatch.setattr(node.pilot, "decide", lambda *a, **k: 1 / 0)
     f.advance(20.0)
     notes = [note for _, who, note in f.log if who == 1]
-    assert any("ZeroDivisionError" in n for n in notes) and any("HOLD: overloaded" in n for n in notes)
+    assert any("ZeroDivisionError" in n for n in notes)
+    assert sum("HOLD: overloaded" in n for n in notes) == 3 and any("RETURN: overloaded too often" in n for n in notes)
 
 
 # ------------------------------------------------------------------------------------------------ cards and logs
@@ -379,3 +380,11 @@ def test_a_goal_outside_the_fence_is_not_followed():
     f.advance(40.0)
     centre = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
     assert set(f.phases()) == {Phase.GOTO} and math.dist(centre, (25.0, 25.0)) < 12.0
+    f.order(Do.GOTO, point=Geodetic(*far))
+    f.order(Do.HOLD)
+    f.advance(6.0)
+    assert set(f.phases()) == {Phase.HOLD}, "ordered to hold, they hold"
+    f.order(Do.GOTO, point=CARD.site.geodetic(-25.0, 0.0, 20.0))
+    f.advance(20.0)
+    moved = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
+    assert set(f.phases()) == {Phase.GOTO} and moved[0] < centre[0] - 10.0

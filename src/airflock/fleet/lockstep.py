@@ -55,6 +55,7 @@ class Fleet:
         ]  # fmt: skip
         self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults)
         self._errors = [State(*(0.0,) * 6)] * len(card.members)
+        self._given = 0
         self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
         if start is not None:
             self._begin(start)
@@ -118,7 +119,8 @@ class Fleet:
 
     def order(self, do: Do, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
         """Give an order as the operator's station would; it reaches every drone at once."""
-        utc = STARTED + round(self.now * 1e6)
+        utc = max(STARTED + round(self.now * 1e6), self._given + 1)  # no two orders at one time
+        self._given = utc
         p = point or Geodetic(0.0, 0.0, 0.0)
         place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
         given = Order(do, target, self.card.mission, utc, STARTED + round(at * 1e6), place)

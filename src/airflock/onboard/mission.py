@@ -171,7 +171,7 @@ TABLE: tuple[Row, ...] = (
     Row("23", FLY - {P.RETURN}, "ordered to return, or the time is over",
         lambda f, s: (f.order == Do.RETURN or f.time_over) and f.navigates, P.RETURN),
     Row("23", FLY - {P.HOLD}, "ordered to hold", lambda f, s: f.order == Do.HOLD, P.HOLD),
-    Row("23", FLOCKING, "ordered to a point", lambda f, s: f.order == Do.GOTO, P.GOTO),
+    Row("23", FLOCKING | {P.HOLD}, "ordered to a point", lambda f, s: f.order == Do.GOTO and f.healthy, P.GOTO),
     Row("23", _of(P.GOTO), "ordered to flock on", lambda f, s: f.order == Do.RESUME, P.FLOCK),
     Row("24", FLOCKING, "a member joins", lambda f, s: f.joined, None),
     Row("25", _of(P.HOLD), "all is well again", lambda f, s: f.calm_for >= s.calm and not f.held, None),

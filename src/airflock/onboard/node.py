@@ -75,6 +75,7 @@ class Node:
         self.pilot = card.pilot(member)
         self._timers, self._since, self._before = Timers(), now, Phase.FLOCK
         self.home: tuple[float, float, float] | None = None
+        self._goal: tuple[float, float, float] | None = None
         self.command: Velocity = STILL
         self._wish: Velocity = STILL
         self._last_tick, self._next_law, self._next_status = now, now, [now] * len(self._radios)
@@ -151,9 +152,11 @@ class Node:
         if own is not None:
             self._lost_near = self.pilot.lost_near(self.card.law_state(own), now)
         order = self.operator.next()
-        if order == Do.GOTO and (self.operator.goal is None or self._goal_outside()):
+        if order == Do.GOTO and self._goal_outside():
             order = None
             self._notes.append("the point that was ordered lies outside the fence; not followed")
+        elif order == Do.GOTO:
+            self._goal, self.operator.held = self.operator.goal, False
         if order == Do.RESUME and self.phase != Phase.MANUAL:
             self.operator.resume = False
         return facts(
@@ -183,14 +186,14 @@ class Node:
             self.operator.start_at = None
             out.autopilot.append(self._say.arm(False))
         if was == Phase.ARMING and to == Phase.TAKEOFF:
-            self._flew_at = now
+            self._flew_at, self._overloads = now, 0
         if to == Phase.DONE and self.operator.killed:
             out.autopilot.append(self._say.arm(False, force=True))
         if to in (Phase.FLOCK, Phase.GOTO) and was not in (Phase.FLOCK, Phase.GOTO):
             self._next_law = now
         if to == Phase.RETURN and self.home is None and self.wire.state is not None:
             self.home = (self.wire.state.x, self.wire.state.y, self.card.layer(self.member))
-        self.phase, self._since, self._tried_at, self._overloads = to, now, -1e9, 0
+        self.phase, self._since, self._tried_at = to, now, -1e9
 
     def _tell(self, known: Facts) -> None:
         """Tell a person what is missing, when it changes."""
@@ -259,7 +262,7 @@ class Node:
 
     def _law(self, own: State, now: float) -> Velocity:
         """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
-        goal = self.operator.goal if self.phase == Phase.GOTO else None
+        goal = self._goal if self.phase == Phase.GOTO else None
         at = self.card.law_state(own)
         try:
             told = None if goal is None else self.card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]

@@ -60,13 +60,12 @@ class Operator:
         elif order.do == Do.GOTO:
             lat, lon, alt = order.point
             self.goal = self._card.site.local(lat * 1e-7, lon * 1e-7, alt * 1e-3)
-            self.held = False
         elif order.do == Do.KILL:
             self._kill_at = utc
         elif order.do == Do.CONFIRM_KILL:
             self.killed = utc - self._kill_at <= SECOND_STEP
         elif order.do in (Do.RETURN, Do.LAND):
-            self.start_at = None
+            self.start_at, self.held = None, False
         self._new.append(order.do)
 
     def next(self) -> Do | None:
