@@ -8,6 +8,7 @@ pymavlink's check keeps the stamp first, so that one forged datagram locks a nei
 
 import hashlib
 import hmac
+from collections import deque
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
@@ -34,7 +35,8 @@ def mission_key(fleet_secret: bytes, mission: int) -> bytes:
 class Signer:
     """Packs and signs messages of one sender.
 
-    last : stamp that was used last, kept from before a restart; stamps only ever grow, and no time is taken from others
+    last   : stamp that was used last, also before a restart; stamps only grow, and no time is taken from others
+    recent : the stamps that were used last, by which an echo of an own frame is known
     """
 
     def __init__(self, key: bytes, system: int, component: int = 191, last: int = 0):
@@ -42,10 +44,12 @@ class Signer:
         signing = self._mav.signing
         signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, 0
         self.last = last
+        self.recent: deque[int] = deque(maxlen=256)
 
     def __call__(self, message: Any, utc: int) -> bytes:
         """Signed bytes of a message of the dialect, sent at utc (µs of Unix time)."""
         self.last = max(stamp_at(utc), self.last + 1)
+        self.recent.append(self.last)
         self._mav.signing.timestamp = self.last
         data = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) & 0xFF
@@ -89,12 +93,15 @@ class Receiver:
         self.heard = {int(system): stamp for system, stamp in (heard or {}).items() if 0 <= stamp <= LAST_STAMP}
         self.refused = dict.fromkeys(REFUSALS, 0)
         self.accepted = 0
+        self.own_heard: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
 
     def __call__(self, datagram: bytes, utc: int) -> Received | None:
         """The message of a datagram that arrived at utc (µs of Unix time); None if it is refused."""
         fault = self._fault(datagram, utc)
         if fault:
             self.refused[fault] += 1
+            if fault == "own":
+                self.own_heard = _stamp_of(datagram)
             return None
         system, stamp, message = datagram[5], _stamp_of(datagram), message_number(datagram)
         self.heard[system] = stamp
@@ -113,9 +120,7 @@ class Receiver:
         length = data[1]
         if known is None or not 0 < length <= known.size or len(data) != HEADER + length + CHECKSUM + SIGNATURE:
             return "length"
-        if data[5] == self._own:
-            return "own"
-        if data[5] not in self._senders[message]:
+        if data[5] != self._own and data[5] not in self._senders[message]:
             return "stranger"
         tag = hashlib.sha256(self._key + data[:-6]).digest()[:6]
         if not hmac.compare_digest(tag, bytes(data[-6:])):
@@ -125,7 +130,7 @@ class Receiver:
             return "clock"
         if stamp <= max(self.heard.get(data[5], 0), self._floor):
             return "replay"
-        return ""
+        return "own" if data[5] == self._own else ""
 
 
 def _stamp_of(data: bytes) -> int:

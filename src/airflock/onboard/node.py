@@ -75,6 +75,7 @@ class Node:
         self.pilot = card.pilot(member)
         self._timers, self._since, self._before = Timers(), now, Phase.FLOCK
         self.home: tuple[float, float, float] | None = None
+        self._twin = False  # somebody else signs as this member
         self._goal: tuple[float, float, float] | None = None
         self.command: Velocity = STILL
         self._wish: Velocity = STILL
@@ -101,6 +102,10 @@ class Node:
         utc = self.utc(now)
         got = self._receive(datagram, utc)
         if got is None:
+            stamp = self._receive.own_heard
+            if stamp is not None and stamp not in self._sign.recent and not self._twin:
+                self._twin = True
+                self._notes.append(f"another sender signs as member {self.member}")
             return
         if got.message == orders.MESSAGE:
             self.operator.take(got.values, now, utc)
@@ -162,7 +167,7 @@ class Node:
         return facts(
             self.card, self.member, self.phase, self.wire, self.peers, self.operator, self._timers, self.utc(now), now,
             home=self.home, order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced,
-            lost_near=self._lost_near,
+            lost_near=self._lost_near, twin=self._twin,
             streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
             time_over=self._flew_at is not None and now - self._flew_at > s.mission_time, before=self._before,
         )  # fmt: skip

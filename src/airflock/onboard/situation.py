@@ -105,14 +105,14 @@ def apart(a: State, b: State) -> float:
     return float(norm(a.x - b.x, a.y - b.y, a.z - b.z))
 
 
-def boot_fault(card: Card, member: int, wire: Wire) -> str:
+def boot_fault(card: Card, member: int, wire: Wire, twin: bool) -> str:
     """What can never fit; empty if nothing is wrong."""
     if wire.kind is not None and wire.kind != card.autopilot.number:
         return f"the autopilot is of kind {wire.kind}; the card is for {card.autopilot.name} ({card.autopilot.number})"
     if wire.kind is None and wire.strangers:
         told = ", ".join(map(str, sorted(wire.strangers)))
         return f"the autopilot calls itself system {told}; this drone is member {member}"
-    return ""
+    return f"another sender signs as member {member}: two drones with one number?" if twin else ""
 
 
 def facts(
@@ -157,7 +157,7 @@ def facts(
         battery_home=battery < s.battery_low + s.battery_way * way * 1e-3,
         outside_for=timers("outside", out, now), deaf_for=deaf_for, few_for=few_for, clock_bad_for=clock_for,
         operator_lost=operator_lost, present=alive and wire.kind == card.autopilot.number and wire.armed is not None,
-        fault=boot_fault(card, member, wire), misses=told,
+        fault=boot_fault(card, member, wire, more.pop("twin")), misses=told,
         due=operator.due(utc, s.start_step * card.members.index(member)),
         at_layer=own is not None and abs(own.z - layer) < 0.5, climbing=own is not None and own.vz > 0.2,
         neighbour_near=neighbour_near,
