@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep
+from airflock.cli import display, evolve, fleet, fly, harden, inspect, look, paper, run, sweep
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -45,6 +45,8 @@ app.command("harden")(harden.harden)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("display")(display.display)
+app.command("fleet")(fleet.fleet)
+app.add_typer(fly.app, name="fly")
 app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
 app.command("validate")(inspect.validate)
