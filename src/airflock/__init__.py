@@ -18,6 +18,7 @@ _WHERE = {
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",
+    "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
 }
 __all__ = [*_WHERE, "__version__"]
