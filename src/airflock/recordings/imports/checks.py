@@ -45,15 +45,14 @@ def _repeated(track: Track, same: NDArray[Any], findings: Findings) -> None:
     """Rows with the time of the row before: the same row again, or another individual."""
     place = track.stack(POSITION, 2)
     apart = np.hypot(*(place[same + 1] - place[same]).T)
-    usual = np.hypot(*np.diff(place, axis=0).T)
-    usual = float(np.median(usual[np.diff(track.time) > 0.0])) if len(usual) > len(same) else 0.0
     row, where = int(track.rows[same[0] + 1]), f"{track.source}: column {track.label('t')}"
-    other = np.flatnonzero(apart > max(10.0 * usual, 1e-9))
-    if len(other) > 0.5 * len(same) and len(same) > 0.1 * len(track.time):
+    other = np.flatnonzero(apart > 1e-9)
+    if len(other) > 0.5 * len(same):
         first = same[other[0]]
         findings.fault(
             f"{where}: {track.name} is at two places at once, first row {track.rows[first + 1]} "
-            f"({apart[other[0]]:.3g} m apart): two individuals under one id; map another column: --map id:=COLUMN"
+            f"({apart[other[0]]:.3g} m apart): two individuals under one id; map another column: --map id:=COLUMN",
+            "duplicates",
         )
     else:
         findings.fault(

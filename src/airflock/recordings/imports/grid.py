@@ -115,7 +115,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
         if end - begin > 1:
             found[begin:end] = np.gradient(rows[begin:end], times[begin:end], axis=0)
-        elif begin > 0:
+        else:
             found[begin:end] = np.nan
     return found
 

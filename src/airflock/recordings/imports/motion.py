@@ -113,6 +113,15 @@ def check_jumps(track: Track, findings: Findings) -> None:
     surprise, scale = surprises(track)
     if not len(surprise):
         return
+    place = track.stack(POSITION, 2)
+    next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
+    if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
+        findings.fault(
+            f"{track.source}: {track.name} goes to and fro by {next_row:.3g} m, row {track.rows[0]} on: "
+            "two individuals under one id? Map another column: --map id:=COLUMN",
+            "jumps",
+        )
+        return
     size = np.linalg.norm(surprise, axis=1)
     limit = (SIGMAS if track.has(VELOCITY) else WILD) * scale
     known = np.isin(np.arange(1, len(track.time)), track.breaks)
@@ -165,5 +174,6 @@ def surprises(track: Track) -> tuple[NDArray[np.float64], float]:
     off[steps > 1.5 * step] = 0.0
     size = np.abs(off)
     scale = 1.4826 * float(np.median(size[steps <= 1.5 * step]))
-    quantum = float(np.median(np.abs(moved))) * 0.1
-    return off, max(scale, quantum, 1e-9)
+    steps_of = np.abs(moved[moved != 0.0])
+    quantum = float(steps_of.min()) if steps_of.size else 0.0  # of positions that come in steps
+    return off, max(scale, quantum, 0.1 * float(np.median(np.abs(moved))), 1e-9)

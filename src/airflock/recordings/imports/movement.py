@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -16,16 +17,22 @@ OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0
 
 def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
+    if path.suffix.lower() in (".h5", ".hdf5") and not _of_movement(path):
+        return read_idtracker(path, options, findings)
     try:
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
     except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
-        if path.suffix.lower() in (".h5", ".hdf5"):
-            return read_idtracker(path, options, findings)
         raise RecordingError(f"{path}: is no netCDF file: {str(fault).splitlines()[0]}") from fault
-    if "position" not in dataset and path.suffix.lower() in (".h5", ".hdf5"):
-        return read_idtracker(path, options, findings)
     return read_dataset(dataset, options, str(path))
+
+
+def _of_movement(path: Path) -> bool:
+    try:
+        with h5py.File(path, "r") as file:
+            return "position" in file
+    except OSError as fault:
+        raise RecordingError(f"{path}: is no HDF5 file: {str(fault).splitlines()[0]}") from fault
 
 
 def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:

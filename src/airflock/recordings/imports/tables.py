@@ -93,7 +93,7 @@ def _sniff(path: Path, options: Options) -> tuple[str, str, list[str]]:
     delimiter = options.delimiter or max(DELIMITERS, key=lambda d: (first.count(d), d == ","))
     delimiter = {"tab": "\t", "\\t": "\t"}.get(delimiter, delimiter)
     names = [name.strip().strip('"').strip() for name in first.split(delimiter)]
-    if len(names) > MOST_COLUMNS and not _wide(names):
+    if len(names) > MOST_COLUMNS:
         layout(str(path), names, options)
     if all(_numeric(name) for name in names):
         raise RecordingError(f"{path}: the first row holds numbers; add a row of names, for instance t,id,x,y")
