@@ -41,14 +41,20 @@ def fleet(seed, white, rate, duration, only_body):
     logger = synthetic.Disturbed(white=white, stamp_jitter=0.02)
     logs, heard, _ = synthetic.fly_logs(scenario, seed, logger, generator)
     begin = time.process_time()
-    found = body.fit_body(logs, scenario.flight.dt)
-    row = {"seed": seed, "saturated": found.saturated, "gain": found.gain, "second_tau": found.second_tau,
-           "white": found.value["white"], "dead_time": found.dead_time}  # fmt: skip
-    rows = {key: (found.value[n], found.interval[n], found.refused.get(n, "")) for n, key in KEYS.items()}
-    row["seconds_body"] = time.process_time() - begin
+    walk = scenario.sensors.noise * scenario.sensors.damping
     if not only_body:
         ground = synthetic.stand(seed + 1_000_000, 10, 120.0, scenario.sensors, logger, generator)
         still = sensors.fit_sensors(ground, scenario.sensors.period)
+        walk = still.value["noise"] * still.value["damping"]
+    middle = time.process_time()
+    found = body.fit_body(logs, scenario.flight.dt, walk)
+    row = {
+        "seed": seed, "saturated": found.saturated, "gain": found.gain, "second_tau": found.second_tau,
+        "white": found.value["white"], "dead_time": found.dead_time,
+    }  # fmt: skip
+    rows = {key: (found.value[n], found.interval[n], found.refused.get(n, "")) for n, key in KEYS.items()}
+    row["seconds_body"] = time.process_time() - middle
+    if not only_body:
         rows["sensors.noise"] = still.value["noise"], still.interval["noise"], still.refused.get("noise", "")
         delay, interval, reason, _ = packets.fit_delay(heard)
         rows["radio.delay"] = delay, interval, reason

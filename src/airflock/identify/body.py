@@ -94,10 +94,12 @@ def _kernel() -> Any:
     return kernel
 
 
-def fit_body(logs: Logs, dt: float = 0.0) -> BodyFit:
+def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     """Fit the body of `body.motion` to logs with commands.
 
-    dt : motion step of the scenario that the numbers are for, s; 0 for continuous time
+    dt   : motion step of the scenario that the numbers are for, s; 0 for continuous time
+    walk : what the sensor's own error adds to the noise of logged velocities, m²/s³: damping times noise of
+           `body.sensors`; it is taken off the outer noise
     """
     flying = logs.flying()
     if len(flying.time) < FEW:
@@ -128,6 +130,8 @@ def fit_body(logs: Logs, dt: float = 0.0) -> BodyFit:
     interval = {
         n: (float(np.exp(c - wide * s)), float(np.exp(c + wide * s))) for n, c, s in zip(NAMES, z, spread, strict=True)
     }
+    low, high = interval["noise"]
+    value["noise"], interval["noise"] = value["noise"] - walk, (max(low - walk, 0.0), max(high - walk, 0.0))
     gap = np.linalg.norm(flying.command - flying.velocity, axis=1)
     saturated = int((gap > value["a_max"] * value["tau"]).sum())
     free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
@@ -281,6 +285,8 @@ def _judge(found: BodyFit, logs: Logs) -> None:
             f"at least {found.seen:.2g} m/s^2: {found.saturated} rows at the limit (needs {SATURATED}), gain of "
             f"likelihood {found.gain:.0f} (needs {GAIN:.0f}); fly larger steps of velocity"
         )
+    if not found.value["noise"] > 0.0:
+        found.refused["noise"] = "no larger than the walk of the sensor's own error"
     if found.dead_time > 0.5 * tau:
         found.notes.append(f"commands act {found.dead_time:.2g} s late, more than half of tau: this body does not fit")
     elif found.dead_time > 1.5 * step:

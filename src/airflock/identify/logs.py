@@ -49,13 +49,14 @@ class Logs:
     def flying(self) -> "Logs":
         """Rows in flight that have a command; new where something was left out."""
         keep = np.isfinite(self.command).all(axis=1) & np.isfinite(self.velocity).all(axis=1) & ~self.standing
-        return self._only(keep)
+        return self.only(keep)
 
     def grounded(self) -> "Logs":
         """Rows on the ground."""
-        return self._only(self.standing)
+        return self.only(self.standing)
 
-    def _only(self, keep: NDArray[np.bool_]) -> "Logs":
+    def only(self, keep: NDArray[np.bool_]) -> "Logs":
+        """Some of the rows; a row that follows one left out is new."""
         left_out = np.concatenate([[False], ~keep[:-1]])
         new = (self.new | left_out)[keep]
         return Logs(

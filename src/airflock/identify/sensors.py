@@ -35,39 +35,42 @@ def _kernel() -> Any:
 
     @njit
     def kernel(q, u, new, h, noise, damping, scale, white, grain):  # type: ignore[no-untyped-def]
-        """Negative log-likelihood of all series; state (q, u, home), row by row."""
+        """Negative log-likelihood of all series; state: position error, velocity error, place (0, 1, 2)."""
         spring = np.sqrt(2.0 * damping * noise) / scale
-        # langevin: u' = u - spring h q - damping h u + push g, q' = q + h u'
-        a = np.array(
-            [[1.0 - spring * h * h, h - damping * h * h, 0.0], [-spring * h, 1.0 - damping * h, 0.0], [0.0, 0.0, 1.0]]
-        )
+        # langevin: u' = u - spring h q - damping h u + push, q' = q + h u'; the place stays
+        a10, a11 = -spring * h, 1.0 - damping * h
+        a00, a01 = 1.0 + h * a10, h * a11
         push = 2.0 * damping * h * noise
-        drive = np.array([[h * h * push, h * push, 0.0], [h * push, push, 0.0], [0.0, 0.0, 0.0]])
         # stationary variances (body.sensors): of u the noise, of q scale sqrt(noise / (2 damping))
         still = scale * np.sqrt(noise / (2.0 * damping))
         rq, ru, total = grain * grain, white * white + 1e-12, 0.0
-        x, p = np.zeros(3), np.zeros((3, 3))
+        x0, x1, x2 = 0.0, 0.0, 0.0
+        p00, p01, p02, p11, p12, p22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(len(q)):
             if new[k]:
-                x[:] = 0.0
-                x[2] = q[k]
-                p[:] = 0.0
-                p[0, 0], p[1, 1], p[2, 2] = still, noise, 100.0 * still + 1.0
+                x0, x1, x2 = 0.0, 0.0, q[k]
+                p00, p01, p02, p11, p12, p22 = still, 0.0, 0.0, noise, 0.0, 100.0 * still + 1.0
             else:
-                x = a @ x
-                p = a @ p @ a.T + drive
-            for seen in range(2):
-                if seen == 0:
-                    off, variance = q[k] - x[0] - x[2], p[0, 0] + 2.0 * p[0, 2] + p[2, 2] + rq
-                    gain = (p[:, 0] + p[:, 2]) / variance
-                    row = p[0] + p[2]
-                else:
-                    off, variance = u[k] - x[1], p[1, 1] + ru
-                    gain = p[:, 1] / variance
-                    row = p[1].copy()
-                total += 0.5 * np.log(variance) + 0.5 * off * off / variance
-                x = x + gain * off
-                p = p - np.outer(gain, row)
+                x0, x1 = a00 * x0 + a01 * x1, a10 * x0 + a11 * x1
+                b00, b01 = a00 * p00 + a01 * p01, a00 * p01 + a01 * p11
+                b10, b11 = a10 * p00 + a11 * p01, a10 * p01 + a11 * p11
+                p02, p12 = a00 * p02 + a01 * p12, a10 * p02 + a11 * p12
+                p00 = b00 * a00 + b01 * a01 + h * h * push
+                p01 = b00 * a10 + b01 * a11 + h * push
+                p11 = b10 * a10 + b11 * a11 + push
+            off = q[k] - x0 - x2  # the logged position: place and error
+            c0, c1, c2 = p00 + p02, p01 + p12, p02 + p22
+            variance = c0 + c2 + rq
+            total += 0.5 * np.log(variance) + 0.5 * off * off / variance
+            x0, x1, x2 = x0 + c0 * off / variance, x1 + c1 * off / variance, x2 + c2 * off / variance
+            p00, p01, p02 = p00 - c0 * c0 / variance, p01 - c0 * c1 / variance, p02 - c0 * c2 / variance
+            p11, p12, p22 = p11 - c1 * c1 / variance, p12 - c1 * c2 / variance, p22 - c2 * c2 / variance
+            off, variance = u[k] - x1, p11 + ru  # the logged velocity
+            total += 0.5 * np.log(variance) + 0.5 * off * off / variance
+            c0, c1, c2 = p01, p11, p12
+            x0, x1, x2 = x0 + c0 * off / variance, x1 + c1 * off / variance, x2 + c2 * off / variance
+            p00, p01, p02 = p00 - c0 * c0 / variance, p01 - c0 * c1 / variance, p02 - c0 * c2 / variance
+            p11, p12, p22 = p11 - c1 * c1 / variance, p12 - c1 * c2 / variance, p22 - c2 * c2 / variance
         return total
 
     return kernel
