@@ -56,8 +56,8 @@ def fleet(seed, white, rate, duration, only_body):
     row["seconds_body"] = time.process_time() - middle
     if not only_body:
         rows["sensors.noise"] = still.value["noise"], still.interval["noise"], still.refused.get("noise", "")
-        delay, interval, reason, _ = packets.fit_delay(heard)
-        rows["radio.delay"] = delay, interval, reason
+        late = packets.fit_delay(heard)
+        rows["radio.delay"] = late.value, late.interval, late.reason
         links = packets.fit_links(heard, scenario.sensors.period, scenario.radio)
         rows |= {f"radio.{n}": (links.value[n], links.interval[n], links.refused.get(n, "")) for n in packets.LINKS}
         row["seconds"] = time.process_time() - begin

@@ -18,6 +18,7 @@ _WHERE = {
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",
+    "identify": "airflock.identify",
     "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
 }
@@ -27,7 +28,7 @@ __all__ = [*_WHERE, "__version__"]
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         module = import_module(_WHERE[name])
-        return module if name == "evolve" else getattr(module, name)  # a module that can be called
+        return module if name in ("evolve", "identify") else getattr(module, name)  # modules that can be called
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 

@@ -116,5 +116,10 @@ def posterior(
         drawn = np.array([row[name] for row in rows if name in row])
         if len(drawn):
             found[name] = (value, float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975)))
-    band = np.nanquantile(np.array(courses), [0.025, 0.975], axis=0) if courses else np.empty((2, 0))
+    band = np.full((2, len(times)), np.nan)
+    if courses:
+        drawn = np.array(courses)
+        some = np.isfinite(drawn).any(axis=0)
+        band = np.full((2, drawn.shape[1]), np.nan)
+        band[:, some] = np.nanquantile(drawn[:, some], [0.025, 0.975], axis=0)
     return Check(found, times, course, band)

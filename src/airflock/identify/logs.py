@@ -1,6 +1,6 @@
 """Flight logs as estimators need them: rows of one drone after another, at their own times."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -52,8 +52,10 @@ class Logs:
         return self.only(keep)
 
     def grounded(self) -> "Logs":
-        """Rows on the ground."""
-        return self.only(self.standing)
+        """Rows on the ground, in stretches without a gap of more than 1 s: a log may be slower there."""
+        found = self.only(self.standing)
+        apart = np.concatenate([[True], (np.diff(found.time) > 1.0) | (np.diff(found.who) != 0)])[: len(found.time)]
+        return replace(found, new=apart)
 
     def only(self, keep: NDArray[np.bool_]) -> "Logs":
         """Some of the rows; a row that follows one left out is new."""

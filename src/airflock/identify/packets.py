@@ -1,6 +1,6 @@
 """Radio from packets that were heard: age and clocks by least squares, reception by distance by likelihood."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,8 +38,19 @@ def checked(heard: pd.DataFrame) -> pd.DataFrame:
     return heard
 
 
-def fit_delay(heard: pd.DataFrame) -> tuple[float, tuple[float, float], str, float]:
-    """Give radio.delay, its interval, a reason to refuse it, and the scatter of single packets, all s.
+@dataclass
+class DelayFit:
+    """radio.delay and its 95 % interval, a reason to refuse it, scatter of packets, clocks ahead by name, all s."""
+
+    value: float
+    interval: tuple[float, float]
+    reason: str = ""
+    scatter: float = float("nan")
+    ahead: dict[str, float] = field(default_factory=dict)
+
+
+def fit_delay(heard: pd.DataFrame) -> DelayFit:
+    """Fit the age of packets and the clocks of the drones by least squares.
 
     The age of a packet is delay + clock of the receiver - clock of the sender; with both directions of a pair the
     clocks cancel. An asymmetry of the two directions cannot be told from an offset of the clocks.
@@ -55,7 +66,7 @@ def fit_delay(heard: pd.DataFrame) -> tuple[float, tuple[float, float], str, flo
     both = np.isin(pairs % n * n + pairs // n, pairs)
     nan = float("nan")
     if not both.any():
-        return nan, (nan, nan), "packets of one direction only: clocks and delay cannot be told apart", nan
+        return DelayFit(nan, (nan, nan), "packets of one direction only: clocks and delay cannot be told apart")
     a, b = pairs[both] // n, pairs[both] % n
     design = np.zeros((both.sum() + 1, n + 1))
     rows = np.arange(both.sum())
@@ -71,12 +82,14 @@ def fit_delay(heard: pd.DataFrame) -> tuple[float, tuple[float, float], str, flo
     error = float(np.sqrt((count[both] * left**2).sum() / freedom / count[both].sum()))
     wide = 1.96 * max(error, scatter / np.sqrt(len(age)))
     delay = float(found[n])
-    return delay, (delay - wide, delay + wide), "", scatter
+    ahead = {str(name): float(offset) for name, offset in zip(names, found[:n], strict=True)}
+    return DelayFit(delay, (delay - wide, delay + wide), "", scatter, ahead)
 
 
 def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
     """Reception curve of `body.radio.received` from rows of got and not got per decision and pair.
 
+    heard  : receiver, sender, t, stamp, distance, got; if it is known, fast and slow: packets due on each link
     period : time between decisions, s; k: radio parameters whose rates of packets are kept
     """
     nan = float("nan")
@@ -88,22 +101,19 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         )
         empty.refused = dict.fromkeys(LINKS, reason)
         return empty
-    edges = np.floor(heard["distance"].to_numpy(float)).astype(int)
-    total = np.bincount(edges)
-    hits = np.bincount(edges, heard["got"].to_numpy(float))
-    summed = np.bincount(edges, heard["distance"].to_numpy(float))
-    used = total > 0
-    n, g, d = total[used], hits[used], summed[used] / total[used]
-    rates = [rate * period for rate in (k.fast_rate, k.slow_rate)]
+    due = _due(heard, period, k)
+    d, n, g = (due[name].to_numpy(float) for name in ("distance", "due", "got"))
+    where, at = np.unique(d, return_inverse=True)
+    fast, slow = due["fast"].to_numpy(float), due["slow"].to_numpy(float)
 
     def curve(z: Any) -> Any:
         p = SimpleNamespace(**dict(zip(LINKS, unpacked(z), strict=True)))
         missed = np.ones(len(d))
-        for slow, rate in enumerate(rates):
-            arrives = np.array([radio.received(x, float(slow), p) for x in d])
-            whole, part = int(rate + 1e-9), rate - int(rate + 1e-9)
-            # a packet that is sent in a share of the decisions, whose phase the log does not tell
-            missed *= (1.0 - arrives) ** whole * (1.0 - part * arrives)
+        for link, sent in ((0.0, fast), (1.0, slow)):
+            arrives = np.array([radio.received(x, link, p) for x in where])[at]
+            whole = np.floor(sent + 1e-9)
+            # a packet that is sent in a share of the decisions, where the log does not tell in which
+            missed = missed * (1.0 - arrives) ** whole * (1.0 - (sent - whole) * arrives)
         return np.clip(missed, 1e-9, 1.0 - 1e-9)
 
     def loss(z: Any) -> float:
@@ -112,20 +122,40 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         missed = curve(z)
         return float(-(g * np.log(1.0 - missed) + (n - g) * np.log(missed)).sum())
 
-    starts = ([2.7, 3.4, 3.0, -0.5], [2.3, 2.5, 1.0, 0.5], [3.3, 3.0, 2.0, -1.0])
-    options = {"maxiter": 1500, "xatol": 1e-3, "fatol": 1e-2}
-    best = min((minimize(loss, s, method="Nelder-Mead", options=options) for s in starts), key=lambda f: float(f.fun))
-    z = np.asarray(best.x)
+    starts = ([2.7, 3.4, 3.0, -0.5], [2.3, 2.5, 1.0, 0.5], [3.3, 3.0, 2.0, -1.0], [3.0, 3.7, 2.5, -1.5])
+    first = [minimize(loss, s, method="Nelder-Mead", options={"maxiter": 250}) for s in starts]
+    best = min(first, key=lambda f: float(f.fun))
+    options = {"maxiter": 1000, "xatol": 1e-3, "fatol": 1e-2}
+    z = np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
     value = dict(zip(LINKS, unpacked(z), strict=True))
     interval = _intervals(loss, z)
-    found = RadioFit(
-        value, interval, {}, [], pd.DataFrame({"distance": d, "due": n, "share": g / n, "model": 1.0 - curve(z)})
-    )
-    reach = float(d[n > 20].max()) if (n > 20).any() else 0.0
+    found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
+    reach = float(found.bins["distance"][found.bins["due"] > 20].max()) if (found.bins["due"] > 20).any() else 0.0
     if value["far"] > reach:
         for name in ("far", "received_far"):
             found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
     return found
+
+
+def _due(heard: pd.DataFrame, period: float, k: Any) -> pd.DataFrame:
+    """Packets due and got by metre of distance and by how many each link sent: distance, fast, slow, due, got."""
+    table = pd.DataFrame({"distance": heard["distance"].astype(float), "got": heard["got"].astype(float)})
+    for link, rate in (("fast", k.fast_rate), ("slow", k.slow_rate)):
+        table[link] = heard[link].astype(float) if link in heard else rate * period
+    table["metre"] = np.floor(table["distance"])
+    sums = table.groupby(["metre", "fast", "slow"]).agg(
+        distance=("distance", "mean"), due=("got", "size"), got=("got", "sum")
+    )
+    found = sums.reset_index()
+    means = (found["distance"] * found["due"]).groupby(found["metre"]).sum() / found.groupby("metre")["due"].sum()
+    return found.assign(distance=found["metre"].map(means))
+
+
+def _pictured(due: pd.DataFrame) -> pd.DataFrame:
+    """By metre: distance, packets due, share that came, share of the model."""
+    due = due.assign(expected=due["model"] * due["due"])
+    sums = due.groupby("distance")[["due", "got", "expected"]].sum().reset_index()
+    return sums.assign(share=sums["got"] / sums["due"], model=sums["expected"] / sums["due"])
 
 
 def unpacked(z: Any) -> tuple[float, float, float, float]:

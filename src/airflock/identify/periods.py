@@ -36,8 +36,11 @@ def decision_period(logs: Logs) -> tuple[float, tuple[float, float], str]:
     return period, (period - 1.96 * error, period + 1.96 * error), ""
 
 
-def largest_command(logs: Logs) -> tuple[float, str]:
-    """Give model.v_max as a plateau of commanded speeds, m/s, and a reason to refuse it."""
+def largest_command(logs: Logs, v_flock: float | None = None) -> tuple[float, str]:
+    """Give model.v_max as a plateau of commanded speeds, m/s, and a reason to refuse it.
+
+    v_flock : preferred speed of the law, m/s, at which commands have a plateau as well
+    """
     speed = np.linalg.norm(logs.flying().command, axis=1)
     if not len(speed):
         return float("nan"), "no commands"
@@ -48,4 +51,6 @@ def largest_command(logs: Logs) -> tuple[float, str]:
             most,
             f"at least {most:.3g} m/s: only {share:.2%} of the commands are within half a per cent of the largest",
         )
+    if v_flock is not None and abs(most / v_flock - 1.0) < 0.03:
+        return most, f"at least {most:.3g} m/s: the plateau is that of the preferred speed, the limit was never met"
     return most, ""

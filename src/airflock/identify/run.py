@@ -2,7 +2,7 @@
 
 import datetime
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -132,6 +132,10 @@ def identify(
         raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
     findings = Findings(frozenset(accept))
     logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
+    if heard is not None:
+        logs, aligned = _on_one_clock(logs, packets.checked(heard))
+        comparable = comparable or aligned
+        findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
     notes = list(findings.notes)
     numbers: dict[str, Number] = {}
 
@@ -152,7 +156,7 @@ def identify(
     period, interval, reason = periods.decision_period(logs)
     tell("sensors.period", period, interval, "times between commands", reason)
     links = _radio(heard, scenario, tell)
-    most, reason = periods.largest_command(logs)
+    most, reason = periods.largest_command(logs, _like(scenario, "model.v_flock"))
     if hasattr(scenario.parameters, "v_max"):
         tell("model.v_max", most, (0.995 * most, most), "largest command", reason)
     _in_range(numbers, scenario)
@@ -172,6 +176,15 @@ def _logs(
     return logs_of(tracks, standing), comparable, sources
 
 
+def _on_one_clock(logs: Logs, heard: pd.DataFrame) -> tuple[Logs, bool]:
+    """Logs on one clock, by packets in both directions, if these name the drones as the logs do."""
+    ahead = packets.fit_delay(heard).ahead
+    if not set(logs.names) <= set(ahead):
+        return logs, False
+    own = np.array([ahead[name] for name in logs.names])
+    return replace(logs, time=logs.time - own[logs.who]), True
+
+
 def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets.RadioFit | None:
     nan = float("nan")
     if heard is None:
@@ -180,8 +193,9 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
             tell(f"radio.{name}", nan, (nan, nan), "", reason)
         return None
     table = packets.checked(heard)
-    delay, interval, reason, scatter = packets.fit_delay(table)
-    tell("radio.delay", delay, interval, f"both directions, stamps scatter by {1e3 * scatter:.0f} ms", reason)
+    late = packets.fit_delay(table)
+    origin = f"both directions, stamps scatter by {1e3 * late.scatter:.0f} ms"
+    tell("radio.delay", late.value, late.interval, origin, late.reason)
     links = packets.fit_links(table, scenario.sensors.period, scenario.radio)
     lossy = scenario.radio.kind == "links"
     for name in packets.LINKS:

@@ -123,8 +123,8 @@ def fit_sensors(logs: Logs, period: float) -> SensorFit:
 def _series(ground: Logs, period: float) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Stretches of one drone and axis, one row per period: positions and velocities."""
     found = []
-    begins = np.flatnonzero(ground.new)
-    for begin, end in zip(begins, [*begins[1:], len(ground.time)], strict=True):
+    edges = [*np.flatnonzero(ground.new), len(ground.time)]
+    for begin, end in zip(edges[:-1], edges[1:], strict=True):
         own = ground.time[begin:end] - ground.time[begin]
         wanted = np.arange(0.0, own[-1] + 1e-9, period) if len(own) > 1 else np.empty(0)
         rows = begin + np.clip(np.searchsorted(own, wanted - 1e-3 * period), 0, max(len(own) - 1, 0))

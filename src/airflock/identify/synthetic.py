@@ -20,6 +20,9 @@ from airflock.scenarios.scenario import Scenario
 Array = NDArray[np.float64]
 
 
+WARM = 8.0  # times of decay that receivers have been on before they are logged
+
+
 @dataclass(frozen=True)
 class Disturbed:
     """What a logger does to a log.
@@ -81,7 +84,7 @@ def fly_logs(
     """Logs of one flight in the plane, its packets, and the recording.
 
     The scenario's metrics.period is the period of the log. Packets: receiver, sender, t (receiver's clock), stamp
-    (sender's clock), distance (m), got (0 or 1).
+    (sender's clock), distance (m), got (0 or 1), fast and slow (packets due on each link).
     """
     recording = simulate(scenario, seed)
     order = ("time", "space", "keypoint", "individual")
@@ -109,7 +112,10 @@ def fly_logs(
     time, position, velocity, command, who, new = (np.concatenate(part) for part in zip(*rows, strict=True))
     names = [str(name) for name in recording["individual"].values]
     logs = Logs(time, position, velocity, command, who, new.astype(bool), names, np.zeros(len(time), bool))
-    return logs, _packets(scenario, seed, times, place, clocks, disturbed, generator), recording
+    heard = _packets(scenario, seed, times, place, clocks, disturbed, generator)
+    for side in ("receiver", "sender"):
+        heard[side] = np.array(names)[heard[side]]
+    return logs, heard, recording
 
 
 def _packets(
@@ -134,15 +140,16 @@ def _packets(
             {
                 "receiver": i, "sender": j, "t": now * (1.0 + clocks[i, 1]) + clocks[i, 0] + jitter,
                 "stamp": sent * (1.0 + clocks[j, 1]) + clocks[j, 0], "distance": d, "got": got.astype(int),
+                "fast": np.full(len(i), fast), "slow": np.full(len(i), slow),
             }
         )  # fmt: skip
     return pd.DataFrame({name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 def stand(seed: int, agents: int, seconds: float, s: Any, disturbed: Disturbed, generator: np.random.Generator) -> Logs:
-    """Logs of drones that stand on the ground: only their sensors' errors move."""
-    count = round(seconds / s.period)
-    errors = own_errors(seed, count, agents, s.period, s)
+    """Logs of drones that stand on the ground: only their sensors' errors move, and have done so for a while."""
+    count, before = round(seconds / s.period), round(WARM / s.damping / s.period)
+    errors = own_errors(seed, before + count, agents, s.period, s)[before:]
     rows = []
     for i in range(agents):
         time = np.arange(count) * s.period
