@@ -201,7 +201,12 @@ def test_bursts_of_a_saw_come_back():
 def test_widths_that_cannot_be_meant_are_refused():
     place, speed = crowd(0)
     found = recording(place, speed)
-    for wrong in (lambda: correlation.velocity_correlation(found, 0.0), lambda: neighbours.pair_distances(found, 2.0, 1.0),
-                  lambda: surroundings.density_map(found, -1.0), lambda: bursts.bursts(found, 0.0)):  # fmt: skip
+    wrongs = [
+        lambda: correlation.velocity_correlation(found, 0.0),
+        lambda: neighbours.pair_distances(found, 2.0, 1.0),
+        lambda: surroundings.density_map(found, -1.0),
+        lambda: bursts.bursts(found, 0.0),
+    ]
+    for wrong in wrongs:
         with pytest.raises(ParameterError, match="must"):
             wrong()

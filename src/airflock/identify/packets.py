@@ -122,11 +122,7 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         missed = curve(z)
         return float(-(g * np.log(1.0 - missed) + (n - g) * np.log(missed)).sum())
 
-    starts = ([2.7, 3.4, 3.0, -0.5], [2.3, 2.5, 1.0, 0.5], [3.3, 3.0, 2.0, -1.0], [3.0, 3.7, 2.5, -1.5])
-    first = [minimize(loss, s, method="Nelder-Mead", options={"maxiter": 250}) for s in starts]
-    best = min(first, key=lambda f: float(f.fun))
-    options = {"maxiter": 1000, "xatol": 1e-3, "fatol": 1e-2}
-    z = np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
+    z = _lowest(loss, float(where[-1]))
     value = dict(zip(LINKS, unpacked(z), strict=True))
     interval = _intervals(loss, z)
     found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
@@ -135,6 +131,26 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         for name in ("far", "received_far"):
             found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
     return found
+
+
+def _lowest(loss: Any, farthest: float) -> Any:
+    """Best of several descents, near and far on a grid first: a longer far hides behind a smaller share there."""
+    first = []
+    for far in np.geomspace(0.15, 0.8, 6) * farthest:
+        for share in (0.15, 0.4, 0.7):
+            place = [np.log(share * far), np.log((1.0 - share) * far)]
+            found = minimize(
+                lambda y, own=place: loss(np.array([*own, *y])),
+                [2.5, 0.0],
+                method="Nelder-Mead",
+                options={"maxiter": 30},
+            )
+            first.append((float(found.fun), [*place, *found.x]))
+    first.sort(key=lambda pair: pair[0])
+    options = {"maxiter": 400, "xatol": 1e-3, "fatol": 1e-2}
+    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:3]]
+    best = min(seconds, key=lambda found: float(found.fun))
+    return np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
 
 
 def _due(heard: pd.DataFrame, period: float, k: Any) -> pd.DataFrame:
