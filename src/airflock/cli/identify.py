@@ -33,6 +33,7 @@ def identify(
         bool, typer.Option("--plan", help="Print the test flights that make every number identifiable.")
     ] = False,
     flights: Annotated[int, typer.Option("--check", min=0, help="Flights to compare with the log; 0: none.")] = 100,
+    changes: options.Set = None,
     map: imports.Map = None,
     unit: imports.Unit = "",
     time_unit: imports.TimeUnit = "",
@@ -58,7 +59,7 @@ def identify(
     with options.gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
     with options.gathering(faults):
-        scenario = load(like)
+        scenario = load(like, options.settings(changes))
     with options.gathering(faults):
         how = imports.mapped(map)
     with options.gathering(faults):
@@ -77,11 +78,9 @@ def identify(
         )
     check = _checked(found, flights, as_json)
     if out is not None:
-        import tomlkit
+        from airflock.evolve.folder import write
 
-        from airflock import atomic
-
-        atomic.write(out, tomlkit.dumps(found.document(conservative, uncertain=uncertain)))
+        write(out, found.document(conservative, uncertain=uncertain))
         tables.say(f"saved {out}")
     if plot is not None:
         from airflock.plots.identified import identified
@@ -141,13 +140,15 @@ def _table(found: Any) -> None:
         ("unit", "left"),
         ("like", "right"),
     ):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     table.add_column("from", style="dim")
     for key, number in found.numbers.items():
         if number.told:
             like = "" if number.like is None else tables.number(number.like)
             span = f"{number.low:.3g} to {number.high:.3g}"
-            table.add_row(key, tables.number(number.value), span, UNITS[key].removeprefix("1"), like, number.origin)
+            table.add_row(
+                key, tables.number(number.value), span, UNITS[key] if UNITS[key] != "1" else "", like, number.origin
+            )
     console = Console()
     console.print(table)
     console.print("not identified, kept from --like:")

@@ -1,8 +1,8 @@
 """Radio from packets that were heard: age and clocks by least squares, reception by distance by likelihood."""
 
 from dataclasses import dataclass, field
-from types import SimpleNamespace
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,38 @@ class RadioFit:
     refused: dict[str, str]
     notes: list[str]
     bins: pd.DataFrame
+
+
+class Curve(NamedTuple):
+    """What `body.radio.received` reads of the radio's parameters."""
+
+    near: float
+    far: float
+    received_near: float
+    received_far: float
+
+
+@cache
+def _kernel() -> Any:
+    """Probability that nothing arrives, by row, compiled from the rule itself."""
+    from numba import njit
+
+    received = njit(radio.received)
+
+    @njit
+    def kernel(distance, fast, slow, k):  # type: ignore[no-untyped-def]
+        missed = np.ones(len(distance))
+        for row in range(len(distance)):
+            for link in range(2):
+                sent = fast[row] if link == 0 else slow[row]
+                arrives = received(distance[row], float(link), k)
+                whole = np.floor(sent + 1e-9)
+                # a packet that is sent in a share of the decisions, where the log does not tell in which
+                missed[row] *= (1.0 - arrives) ** whole * (1.0 - (sent - whole) * arrives)
+            missed[row] = min(max(missed[row], 1e-9), 1.0 - 1e-9)
+        return missed
+
+    return kernel
 
 
 def checked(heard: pd.DataFrame) -> pd.DataFrame:
@@ -103,18 +135,11 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         return empty
     due = _due(heard, period, k)
     d, n, g = (due[name].to_numpy(float) for name in ("distance", "due", "got"))
-    where, at = np.unique(d, return_inverse=True)
     fast, slow = due["fast"].to_numpy(float), due["slow"].to_numpy(float)
+    kernel = _kernel()
 
     def curve(z: Any) -> Any:
-        p = SimpleNamespace(**dict(zip(LINKS, unpacked(z), strict=True)))
-        missed = np.ones(len(d))
-        for link, sent in ((0.0, fast), (1.0, slow)):
-            arrives = np.array([radio.received(x, link, p) for x in where])[at]
-            whole = np.floor(sent + 1e-9)
-            # a packet that is sent in a share of the decisions, where the log does not tell in which
-            missed = missed * (1.0 - arrives) ** whole * (1.0 - (sent - whole) * arrives)
-        return np.clip(missed, 1e-9, 1.0 - 1e-9)
+        return kernel(d, fast, slow, Curve(*unpacked(z)))
 
     def loss(z: Any) -> float:
         if np.abs(z).max() > 12.0:
@@ -122,11 +147,18 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         missed = curve(z)
         return float(-(g * np.log(1.0 - missed) + (n - g) * np.log(missed)).sum())
 
-    z = _lowest(loss, float(where[-1]))
+    z = _lowest(loss, float(d.max()))
     value = dict(zip(LINKS, unpacked(z), strict=True))
     interval = _intervals(loss, z)
     found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
     reach = float(found.bins["distance"][found.bins["due"] > 20].max()) if (found.bins["due"] > 20).any() else 0.0
+    flown = found.bins["distance"][found.bins["due"] > 20]
+    closest = float(flown.min()) if len(flown) else 0.0
+    if interval["near"][0] < closest:
+        for name in ("near", "received_near"):
+            found.refused[name] = (
+                f"nobody flew closer than {closest:.0f} m, and reception may be even only below: fly pairs"
+            )
     if value["far"] > reach:
         for name in ("far", "received_far"):
             found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
@@ -136,19 +168,15 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
 def _lowest(loss: Any, farthest: float) -> Any:
     """Best of several descents, near and far on a grid first: a longer far hides behind a smaller share there."""
     first = []
-    for far in np.geomspace(0.15, 0.8, 6) * farthest:
+    for far in np.geomspace(0.15, 0.8, 7) * farthest:
         for share in (0.15, 0.4, 0.7):
-            place = [np.log(share * far), np.log((1.0 - share) * far)]
-            found = minimize(
-                lambda y, own=place: loss(np.array([*own, *y])),
-                [2.5, 0.0],
-                method="Nelder-Mead",
-                options={"maxiter": 30},
-            )
-            first.append((float(found.fun), [*place, *found.x]))
+            for ratio in (1.0, -1.5):
+                start = [np.log(share * far), np.log((1.0 - share) * far), 2.5, ratio]
+                found = minimize(loss, start, method="Nelder-Mead", options={"maxiter": 150})
+                first.append((float(found.fun), list(found.x)))
     first.sort(key=lambda pair: pair[0])
     options = {"maxiter": 400, "xatol": 1e-3, "fatol": 1e-2}
-    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:3]]
+    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:5]]
     best = min(seconds, key=lambda found: float(found.fun))
     return np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
 

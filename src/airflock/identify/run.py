@@ -145,16 +145,16 @@ def identify(
 
     still = sensors.fit_sensors(logs, scenario.sensors.period)
     for name in ("noise", "damping", "scale"):
-        origin = f"{still.seconds:.0f} s on the ground"
+        origin = f"{still.seconds:.0f} s of standing"
         tell(f"sensors.{name}", still.value[name], still.interval[name], origin, still.refused.get(name, ""))
     told = {n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")}
     moving = body.fit_body(logs, scenario.flight.dt, told["noise"] * told["damping"])
-    rows = f"{moving.rows} rows, {moving.saturated} at the limit"
+    rows = f"{moving.rows} rows, {moving.saturated} limited"
     for name in ("tau", "a_max", "noise"):
         tell(f"body.{name}", moving.value[name], moving.interval[name], rows, moving.refused.get(name, ""))
     notes += moving.notes
     period, interval, reason = periods.decision_period(logs)
-    tell("sensors.period", period, interval, "times between commands", reason)
+    tell("sensors.period", period, interval, "changes of commands", reason)
     links = _radio(heard, scenario, tell)
     most, reason = periods.largest_command(logs, _like(scenario, "model.v_flock"))
     if hasattr(scenario.parameters, "v_max"):
@@ -194,13 +194,15 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
         return None
     table = packets.checked(heard)
     late = packets.fit_delay(table)
-    origin = f"both directions, stamps scatter by {1e3 * late.scatter:.0f} ms"
+    origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
     tell("radio.delay", late.value, late.interval, origin, late.reason)
     links = packets.fit_links(table, scenario.sensors.period, scenario.radio)
     lossy = scenario.radio.kind == "links"
     for name in packets.LINKS:
-        why = links.refused.get(name, "") or ("" if lossy else "radio.kind of --like has no reception curve")
-        tell(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets due", why)
+        why = links.refused.get(name, "") or (
+            "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
+        )
+        tell(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets", why)
     return links
 
 

@@ -84,9 +84,12 @@ def _corner(panel: Axes, flying: Logs, found: Identified) -> None:
     value = found.body.value
     asked = size / value["tau"]
     panel.plot(asked, pull, ".", color=style.SKY, markersize=1.5, alpha=0.4, rasterized=True)
-    edges = np.quantile(asked, np.linspace(0.0, 1.0, 15))
-    middle = [np.median(pull[(asked >= a) & (asked <= b)]) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    panel.plot(0.5 * (edges[1:] + edges[:-1]), middle, "o", color=style.BLUE, markersize=3.5, label="median of the log")
+    edges = np.linspace(0.0, float(np.quantile(asked, 0.998)), 15)
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        inside = (asked >= low) & (asked < high)
+        if inside.sum() >= 20 and 0.5 * (low + high) > 3.0 * value["white"] / value["tau"]:  # else noise hides the gap
+            panel.plot(0.5 * (low + high), np.median(pull[inside]), "o", color=style.BLUE, markersize=3.5)
+    panel.plot([], [], "o", color=style.BLUE, markersize=3.5, label="median of the log")
     line = np.linspace(0.0, float(edges[-1]), 100)
     panel.plot(line, np.minimum(line, value["a_max"]), color=style.RED, linewidth=1.0, label="fit")
     panel.set_ylim(*np.quantile(pull, [0.01, 0.99]))
