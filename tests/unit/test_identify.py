@@ -147,9 +147,7 @@ def test_the_curve_of_reception_comes_back():
         assert low - (high - low) < getattr(k, name) < high + (high - low)
     near = heard_by(k)[0]
     near = near[near["distance"] < 40.0]
-    assert "nobody flew farther apart" in packets.fit_links(near, 0.2, k).refused.get(
-        "far", "nobody flew farther apart"
-    )
+    assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
 
 
 def test_the_period_of_decisions_comes_back():
@@ -175,7 +173,7 @@ def fleet():
 def test_a_fleet_is_identified_from_its_logs(fleet):
     truth, found, _ = fleet
     bounds = {"body.tau": 0.05, "body.a_max": 0.15, "body.noise": 0.2, "radio.delay": 0.02, "sensors.period": 0.01,
-              "radio.near": 0.3, "radio.far": 0.15, "radio.received_far": 0.2}  # fmt: skip
+              "radio.near": 0.3, "radio.far": 0.2}  # fmt: skip
     for key, bound in bounds.items():
         section, name = key.split(".")
         assert found.numbers[key].told, found.numbers[key].reason

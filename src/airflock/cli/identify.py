@@ -141,7 +141,7 @@ def _table(found: Any) -> None:
         ("like", "right"),
     ):
         table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
-    table.add_column("from", style="dim")
+    origins: dict[str, None] = {}
     for key, number in found.numbers.items():
         if number.told:
             like = "" if number.like is None else tables.number(number.like)
@@ -151,6 +151,7 @@ def _table(found: Any) -> None:
             )
     console = Console()
     console.print(table)
+    console.print(f"from {'; '.join(origins)}", highlight=False, markup=False)
     console.print("not identified, kept from --like:")
     for key, number in found.numbers.items():
         if not number.told:

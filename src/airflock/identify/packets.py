@@ -13,6 +13,8 @@ from airflock.errors import RecordingError
 
 LINKS = ("near", "far", "received_near", "received_far")
 COLUMNS = ("receiver", "sender", "t", "stamp")
+ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
+WIDEST = 0.2  # half of an interval, relative, beyond which a number is not told
 FEW = 500  # rows below which no curve is fitted
 
 
@@ -147,9 +149,12 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         missed = curve(z)
         return float(-(g * np.log(1.0 - missed) + (n - g) * np.log(missed)).sum())
 
-    z = _lowest(loss, float(d.max()))
+    z, *others = _lowest(loss, float(d.max()))
     value = dict(zip(LINKS, unpacked(z), strict=True))
     interval = _intervals(loss, z)
+    for other in others:  # a second hill of the likelihood belongs to the interval as well
+        for name, (low, high) in _intervals(loss, other).items():
+            interval[name] = min(low, interval[name][0]), max(high, interval[name][1])
     found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
     reach = float(found.bins["distance"][found.bins["due"] > 20].max()) if (found.bins["due"] > 20).any() else 0.0
     flown = found.bins["distance"][found.bins["due"] > 20]
@@ -162,11 +167,20 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
     if value["far"] > reach:
         for name in ("far", "received_far"):
             found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
+    for name in LINKS:
+        half = 0.5 * (interval[name][1] - interval[name][0]) / value[name]
+        if half > WIDEST and name not in found.refused:
+            found.refused[name] = (
+                f"only known to ± {half:.0%} from {len(heard)} rows: fly more, and pairs farther apart"
+            )
     return found
 
 
-def _lowest(loss: Any, farthest: float) -> Any:
-    """Best of several descents, near and far on a grid first: a longer far hides behind a smaller share there."""
+def _lowest(loss: Any, farthest: float) -> list[Any]:
+    """Best of several descents, near and far on a grid first: a longer far hides behind a smaller share there.
+
+    Returns the best, and others that are nearly as likely.
+    """
     first = []
     for far in np.geomspace(0.15, 0.8, 7) * farthest:
         for share in (0.15, 0.4, 0.7):
@@ -176,9 +190,10 @@ def _lowest(loss: Any, farthest: float) -> Any:
                 first.append((float(found.fun), list(found.x)))
     first.sort(key=lambda pair: pair[0])
     options = {"maxiter": 400, "xatol": 1e-3, "fatol": 1e-2}
-    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:5]]
+    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:8]]
     best = min(seconds, key=lambda found: float(found.fun))
-    return np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
+    last = np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
+    return [last, *(np.asarray(found.x) for found in seconds if float(found.fun) < loss(last) + ALIKE)]
 
 
 def _due(heard: pd.DataFrame, period: float, k: Any) -> pd.DataFrame:
