@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ from airflock.errors import RecordingError
 LINKS = ("near", "far", "received_near", "received_far")
 COLUMNS = ("receiver", "sender", "t", "stamp")
 ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
-WIDEST = 0.2  # half of an interval, relative, beyond which a number is not told
+# half of an interval, relative, beyond which a number is not told
+WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
 
 
@@ -169,7 +171,7 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
             found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
     for name in LINKS:
         half = 0.5 * (interval[name][1] - interval[name][0]) / value[name]
-        if half > WIDEST and name not in found.refused:
+        if half > WIDEST[name] and name not in found.refused:
             found.refused[name] = (
                 f"only known to ± {half:.0%} from {len(heard)} rows: fly more, and pairs farther apart"
             )
@@ -181,16 +183,15 @@ def _lowest(loss: Any, farthest: float) -> list[Any]:
 
     Returns the best, and others that are nearly as likely.
     """
-    first = []
-    for far in np.geomspace(0.15, 0.8, 7) * farthest:
-        for share in (0.15, 0.4, 0.7):
-            for ratio in (1.0, -1.5):
-                start = [np.log(share * far), np.log((1.0 - share) * far), 2.5, ratio]
-                found = minimize(loss, start, method="Nelder-Mead", options={"maxiter": 150})
-                first.append((float(found.fun), list(found.x)))
-    first.sort(key=lambda pair: pair[0])
     options = {"maxiter": 400, "xatol": 1e-3, "fatol": 1e-2}
-    seconds = [minimize(loss, start, method="Nelder-Mead", options=options) for _, start in first[:8]]
+    seconds = []
+    for far, ratio in product(np.geomspace(0.12, 0.8, 8) * farthest, (0.0, -1.5)):  # hills differ in both
+        first = []
+        for share in (0.2, 0.5):
+            start = [np.log(share * far), np.log((1.0 - share) * far), 2.5, ratio]
+            first.append(minimize(loss, start, method="Nelder-Mead", options={"maxiter": 100}))
+        start = min(first, key=lambda found: float(found.fun)).x
+        seconds.append(minimize(loss, start, method="Nelder-Mead", options=options))
     best = min(seconds, key=lambda found: float(found.fun))
     last = np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
     return [last, *(np.asarray(found.x) for found in seconds if float(found.fun) < loss(last) + ALIKE)]
