@@ -47,6 +47,10 @@ def read_array(
 def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of a .npy or .npz file of plain numbers."""
     refuse_pickle(path)
+    with path.open("rb") as file:
+        start = file.read(6)
+    if start != b"\x93NUMPY" and start[:2] != b"PK":
+        raise RecordingError(f"{path}: is no array that NumPy wrote")
     try:
         with open(path, "rb") as file:
             loaded = np.load(file, allow_pickle=False)
