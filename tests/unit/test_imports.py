@@ -318,3 +318,9 @@ def test_notes_tell_what_was_done():
     own = circle().drop(columns=["vx", "vy", "cx", "cy"]).round({"x": 0, "y": 0})
     notes = json.loads(airflock.load_tracks(own).attrs["airflock_import"])["notes"]
     assert any("no velocity" in note for note in notes) and any("steps of 1 m" in note for note in notes)
+
+
+def test_tracks_that_are_scored_before_they_are_imported_are_told_how(tmp_path):
+    path = written(tmp_path, circle())
+    with pytest.raises(RecordingError, match="airflock import log.csv --save"):
+        airflock.load_recording(path)
