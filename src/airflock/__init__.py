@@ -26,6 +26,8 @@ _WHERE = {
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
     "save": "airflock.recordings.files",
+    "identify": "airflock.identify",
+    "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
 }
 __all__ = [*_WHERE, "__version__"]
@@ -35,7 +37,7 @@ _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock impo
 def __getattr__(name: str) -> Any:
     if name in _WHERE:
         module = import_module(_WHERE[name])
-        if name in ("evolve", "body"):
+        if name in ("evolve", "body", "identify"):
             return module  # which can be called
         return getattr(module, "Flight" if name == "open" else name)
     raise AttributeError(f"module 'airflock' has no attribute {name!r}")

@@ -15,6 +15,8 @@ from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
 from airflock.recordings.scores import scenario_of
 
+FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
+
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a recording as .nc: to a temporary name first, then renamed; raises RecordingError and leaves nothing.
@@ -42,6 +44,10 @@ def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
     source = Path(path)
     if not source.is_file():
         raise RecordingError(f"{source}: no such file")
+    if source.suffix.lower() in FOREIGN:
+        raise RecordingError(
+            f"{source}: holds tracks, but is no recording yet: airflock import {source.name} --save FILE.nc"
+        )
     try:
         with xr.open_dataset(source, engine="h5netcdf") as opened:
             recording = opened.load()
