@@ -19,7 +19,7 @@ GENERATION = """
 [[statement]]
 id = "timid"
 kind = "paper"
-quote = "took hold within 10 generations, causing over 75% of all controllers to have K_a < 2.0"
+quote = "avoidance gain took hold within 10 generations, causing over 75% of all controllers to have K_a < 2"
 where = "Results"
 quantity = "share of K_a below 2"
 at = "generation 10"
@@ -37,7 +37,7 @@ def test_a_statement_about_generation_10_is_read() -> None:
     ("old", "new", "said"),
     [
         ('at = "generation 10"', 'at = "generation 149"', "another generation than the quote's 10"),
-        ('"share of K_a below 2"', '"n_coll"', "not what the quote speaks of"),
+        ('"share of K_a below 2"', '"phi_corr"', "not what the quote speaks of"),
         ("published = 0.75", "published = 0.5", "does not stand in the quote"),
         ('"ours > published"', '"ours > published or ours <= published"', "holds whatever is measured"),
         ('"ours > published"', '"__import__(1)"', "neither a field, a number nor a comparison"),
@@ -106,7 +106,7 @@ def test_committed_claims_are_those_of_the_statements(path: Path) -> None:
     for claim in read_claims(path)[1]:
         told = statements[claim.id]
         for key, value in asdict(told).items():
-            if key not in ("published", "published_sd", "verdict"):
+            if key not in ("published", "published_sd", "verdict", "command"):
                 assert getattr(claim, key) == value, f"{claim.id}: {key}"
         assert claim.verdict == verdict_of(claim)
 

@@ -12,6 +12,7 @@ import airflock.papers
 from airflock.cli.main import app
 from airflock.papers import PAPERS
 from airflock.papers.paper import Paper
+from airflock.papers.sentences import PARTS, faults, first_words, letters, sentences
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,6 +31,17 @@ def test_the_committed_page_is_of_that_paper(name: str) -> None:
     header = tomllib.loads((folder / "claims.toml").read_text(encoding="utf-8"))
     assert header["command"].startswith(f"airflock paper {name}")
     assert {"paper", "command", "seeds", "version", "precision"} <= set(header)
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_every_claim_of_a_paper_has_a_sentence_and_every_sentence_a_claim_or_a_reason(name: str) -> None:
+    assert not faults(name, ROOT / "papers" / name, None)
+
+
+def test_a_list_of_sentences_is_checked_against_a_text() -> None:
+    text = "One sentence of five words here. (A second one, e.g. with a point inside.) 3\t4\n\nThe last of them ends."
+    found = [letters(first_words(sentence)) for sentence in sentences(text)]
+    assert found == ["onesentenceoffivewords", "asecondoneegwith", "thelastofthemends"]
 
 
 @pytest.mark.parametrize("name", PAPERS)

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -219,8 +220,10 @@ def remark(claim: Claim) -> str:
 
 
 def headline(claims: Sequence[Claim]) -> str:
-    """Count of the paper's own sentences by verdict."""
+    """Count of the paper's own sentences by verdict; empty if there is none."""
     paper = [claim for claim in claims if claim.kind == "paper"]
+    if not paper:
+        return ""
     count = [(verdict, sum(claim.verdict == verdict for claim in paper)) for verdict in COUNTED]
     return f"{len(paper)} sentences of the paper: " + ", ".join(f"{n} {verdict}" for verdict, n in count if n)
 
@@ -241,7 +244,10 @@ def print_claims(claims: Sequence[Claim]) -> None:
     for claim in claims:
         if told := remark(claim):
             console.print(f"{claim.id}: {told}", markup=False, highlight=False)
-    console.print(headline(claims))
+    told = ", ".join(f"{n} {verdict}" for verdict, n in Counter(c.verdict for c in claims if c.kind != "paper").items())
+    for line in (headline(claims), f"not of the paper: {told}" if told else ""):
+        if line:
+            console.print(line)
 
 
 def _lost(value: Any) -> bool:

@@ -54,7 +54,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "steps with the wrong sign, f_collision": ("collision",),
     # Dimock and Selig
     "power": ("HP", "power", "fitness", "drag"),
-    "share of K_a below 2": ("collision avoidance gain",),
+    "share of K_a below 2": ("avoidance gain",),
     "share in a V": ("V",),
     "swing": ("oscillate",),
     "power over time": ("drag",),

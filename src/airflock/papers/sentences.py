@@ -1,7 +1,7 @@
 """Sentences of a paper: papers/NAME/sentences.csv holds one row for each, and this checks it against the text.
 
-The texts are not part of this project. `python -m airflock.papers.sentences FOLDER` takes a folder with NAME.txt of each
-paper and tells which sentences have no row, which rows and quotes are in no text, and which claims do not exist.
+The texts are not part of this project. `python -m airflock.papers.sentences FOLDER` takes a folder with NAME.txt of
+each paper and tells which sentences have no row, which rows and quotes are in no text, and which claims do not exist.
 """
 
 import csv
@@ -37,11 +37,17 @@ PARTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("Fig. 8. Probability distribution", "SUPPLEMENTARY MATERIALS\n"),
         ("Table S1: Optimized model parameter", "Table S5: Environmental parameters"),
     ),
-    "zapotecatl_2016": (("Measurements of coordinated motion", "Introduction"), ("model was implemented and run", "Acknowledgements")),
+    "zapotecatl_2016": (
+        ("Measurements of coordinated motion", "Introduction"),
+        ("model was implemented and run", "Acknowledgements"),
+    ),
     "dimock_2003": (("Natural aggregation processes", "Introduction"), ("The fitness evaluation simulation", "\x00")),
-    "kidger": (("The management of drone swarms", "2 – Introduction"), ("Without any underlying rules", "8 – References"),
-               ("Throughout development, I ran", "\x00")),
-}  # fmt: skip
+    "kidger": (
+        ("The management of drone swarms", "2 – Introduction"),
+        ("Without any underlying rules", "8 – References"),
+        ("Throughout development, I ran", "\x00"),
+    ),
+}
 SHORT = 4  # words: shorter pieces are captions' numbers, cells and code
 ABBREVIATIONS = ("fig", "figs", "eq", "eqs", "i.e", "e.g", "ie", "et al", "ref", "vs", "approx", "no", "min")
 

@@ -32,6 +32,7 @@ SECTIONS = (
         "The genetic algorithm, Figs 5-8",
         "Three seeds of each reading of Eq. 2 and of the start; gradients with the others' circulations held. "
         "Intervals are the least and the greatest of the seeds. Figures are of the first seed with 1/(n-1) weights.",
+        ("fig5", "fig6", "fig7", "fig8"),
     ),
     Section(
         "robust.",
@@ -39,6 +40,7 @@ SECTIONS = (
         "CMA-ES on V, tight, wide, column and random starts in the plane in which the paper's birds stay, and a V in "
         "space; 60 s, noise at the start and in flight; penalties for closeness, collisions, unrest, no formation. "
         "Judged on flights that no search has seen.",
+        ("pareto",),
     ),
 )
 

@@ -96,8 +96,9 @@ def measured(flown: Flown) -> list[Measured]:
         found.append(
             Measured(f"conduct.n_coll.{name}", "n_coll", f"{name}, final set", statistics.mean(rows["n_coll"]), note)
         )
-        contacts = statistics.mean(rows["n_env_coll"])
-        found.append(Measured(f"conduct.n_env_coll.{name}", "n_env_coll", f"{name}, final set", contacts))
+        if name != "open_air":  # where there is nothing to meet
+            contacts = statistics.mean(rows["n_env_coll"])
+            found.append(Measured(f"conduct.n_env_coll.{name}", "n_env_coll", f"{name}, final set", contacts))
     few, many = ("method 1, 3 boids", "method 1, 40 boids")
     found.append(
         Measured(

@@ -51,9 +51,9 @@ def measured(data: Data) -> list[Measured]:
     worst = safe.groupby(level=["range", "delay"]).mean()
     where = worst.idxmax()
     note = (
-        f"largest of {len(worst)} bins: {worst.max():.2f} at {where[0]:g} m and {where[1]:g} s; {(safe == 0).mean():.0%}"
-        f" of these flights have none; {early['n_coll'].mean():.2f} of the {safe.mean():.2f} fall into the first "
-        f"{EARLY:g} s from random places"
+        f"largest of {len(worst)} bins: {worst.max():.2f} at {where[0]:g} m and {where[1]:g} s; "
+        f"{(safe == 0).mean():.0%} of these flights have none; {early['n_coll'].mean():.2f} of the {safe.mean():.2f} "
+        f"fall into the first {EARLY:g} s from random places"
     )
     outside = (
         ("late", "delay of 1 s and more, range above 240 m", late),

@@ -11,8 +11,7 @@ from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.papers.vasarhelyi_2018.published import COLUMNS, EVALUATIONS, REFIT, SPEEDS, optimum, program_runs
 
-PROGRAM = {"phi_vel": 0.01, "r_min_mean": 0.02, "f_corr": 0.006, "f_speed": 0.012}  # against the program
-RELATIVE = ("phi_vel", "r_min_mean")
+PROGRAM = ("phi_vel", "r_min_mean", "f_corr", "f_speed")  # compared with the authors' program
 PARTIAL = ("f_disc", "f_coll", "f_wall", "f_cluster", "f_corr", "f_speed")
 
 Tables = Mapping[int, pd.DataFrame]

@@ -46,12 +46,14 @@ class Case(NamedTuple):
 
 
 S1, S4 = "{v}ms", "real_{v}ms"
+# free space, the first minute
+OPEN = {"world.arena": "none", "world.walls": "every_edge", "start.kind": "box", "start.side": 250.0, "duration": 60.0}
 CASES = {
     "s1": Case(S1),
     "r0_rep": Case(S1, factors={"model.r0_rep": 1.25}),
     "p_rep": Case(S1, factors={"model.p_rep": 2.0}),
-    "open": Case(S1, {"world.arena": "none", "duration": 60.0}),
-    "open, p_rep": Case(S1, {"world.arena": "none", "duration": 60.0}, {"model.p_rep": 2.0}),
+    "open": Case(S1, OPEN),
+    "open, p_rep": Case(S1, OPEN, {"model.p_rep": 2.0}),
     "c_frict": Case(S1, {"model.c_frict": 0.5}),
     "v_frict 0": Case(S1, {"model.v_frict": 0.0}),
     "v_frict large": Case(S1, factors={"model.v_frict": 10.0}),
@@ -67,7 +69,6 @@ CASES = {
     "s4, p_rep of s1": Case(S4, factors={"model.p_rep": 0.5}),
     "s4, c_frict of s1": Case(S4, {"model.c_frict": 0.05}),
     "s4, r0_shill of s1": Case(S4, {"model.r0_shill": 0.0}),
-    "s1, delay": Case(S1, {"radio.delay": 0.8}),
 }
 # statement: the changed case, what it is compared with, and the measures in which they differ
 PAIRS = {
