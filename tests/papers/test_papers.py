@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import airflock.papers
 from airflock.cli.main import app
-from airflock.papers import PAPERS
+from airflock.papers import PAPERS, programs
 from airflock.papers.paper import Paper
 from airflock.papers.sentences import PARTS, faults, first_words, letters, sentences
 
@@ -55,3 +55,7 @@ def test_a_mistyped_paper_is_told_its_name() -> None:
     said = CliRunner().invoke(app, ["paper", "vicsek_1996"])
     assert said.exit_code != 0
     assert "did you mean vicsek_1995?" in f"{said.output}{said.exception}"
+
+
+def test_the_page_of_the_programs_is_that_of_the_committed_claims() -> None:
+    assert (ROOT / "papers" / "programs.md").read_text(encoding="utf-8") == programs.page(ROOT / "papers")

@@ -10,7 +10,7 @@ from typing import Any
 
 from airflock.errors import AirflockError
 
-NAMES = ("ours", "sd", "low", "high", "p", "runs", "published", "published_sd")
+NAMES = ("ours", "sd", "low", "high", "p", "runs", "published", "published_sd", "reference", "reference_sd")
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -44,8 +44,9 @@ def names(bound: str) -> set[str]:
 
 
 def refutable(bound: str, published: Mapping[str, float | None]) -> bool:
-    """Whether some measurement would break a bound; published: what it is compared with, which does not change."""
-    fixed = {name: 0.5 if value is None else value for name, value in published.items()}
+    """Whether some measurement would break a bound; published: what is printed, which does not change."""
+    fixed = dict.fromkeys(("published", "published_sd", "reference", "reference_sd"), 0.5)
+    fixed |= {name: value for name, value in published.items() if value is not None}
     free = sorted(names(bound) - set(fixed))
     return any(not holds(bound, {**fixed, **dict.fromkeys(free, value)}) for value in EXTREMES)
 

@@ -31,7 +31,7 @@ class Measured:
     quantity, at : what was measured and where, made from the numbers that were used; they must be the statement's
     value        : our value with its SD and 95 % interval; p: of the test that the bound asks for
     note         : what else was seen
-    published    : what it is compared with and no paper prints (runs of a program): value and SD
+    reference    : what it is compared with and no paper prints (runs of a program, theory): value and SD
     """
 
     id: str
@@ -40,7 +40,7 @@ class Measured:
     value: Estimate
     note: str = ""
     p: float | None = None
-    published: tuple[float, float | None] | None = None
+    reference: tuple[float, float | None] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +56,8 @@ class Claim(Statement):
     high: float | None = None
     runs: int = 0
     p: float | None = None
+    reference: float | None = None
+    reference_sd: float | None = None
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -68,15 +70,16 @@ class Claim(Statement):
         return {key: value for key, value in asdict(self).items() if value not in (None, "") and not _lost(value)}
 
 
-def verdict_of(claim: "Claim | Statement") -> str:
+def verdict_of(claim: "Claim") -> str:
     """Verdict that a claim's fields give."""
     holds, fails, none = VERDICTS[claim.kind]
+    measured = isinstance(claim, Claim) and claim.ours is not None
+    if claim.quantity and not measured and claim.verdict in ("", UNFLOWN, *VERDICTS[claim.kind]):
+        if not claim.command:
+            raise AirflockError(f"claim {claim.id}: has no measurement and no command that would fly it")
+        return UNFLOWN
     if not claim.bound:
         return claim.verdict or none
-    if not isinstance(claim, Claim) or claim.ours is None:
-        if not claim.command:
-            raise AirflockError(f"claim {claim.id}: has a bound, no measurement and no command that would fly it")
-        return UNFLOWN
     return holds if bounds.holds(claim.bound, asdict(claim)) else fails
 
 
@@ -101,7 +104,7 @@ def unflown(statements: Mapping[str, Statement], claims: Iterable[Claim], comman
     """Claims of the statements that were not measured this time, with the command that would measure them."""
     flown = {claim.id for claim in claims}
     rest = [s for s in statements.values() if s.id not in flown and s.quantity]
-    return [Claim(**asdict(s) | {"verdict": UNFLOWN if s.bound else verdict_of(s), "command": command}) for s in rest]
+    return [Claim(**asdict(s) | {"verdict": s.verdict or UNFLOWN, "command": command}) for s in rest]
 
 
 def _judged(statement: Statement, found: Measured) -> Claim:
@@ -110,11 +113,8 @@ def _judged(statement: Statement, found: Measured) -> Claim:
         if told != used:
             raise AirflockError(f"claim {statement.id}: is about {key} {told!r}, but {used!r} was measured")
     values = asdict(statement)
-    if found.published is not None:
-        if statement.kind == "paper":
-            raise AirflockError(f"claim {statement.id}: only the statement may say what the paper prints")
-        values["published"], values["published_sd"] = found.published
     values |= {**found.value._asdict(), "p": found.p, "note": found.note}
+    values["reference"], values["reference_sd"] = found.reference or (None, None)
     holds, fails, none = VERDICTS[statement.kind]
     if not statement.bound:
         return Claim(**values | {"verdict": statement.verdict or none})
@@ -195,14 +195,15 @@ def asked(claim: Claim) -> str:
 
 def cells(claim: Claim) -> tuple[str, ...]:
     """Claim as the cells of a table: see HEADINGS."""
-    published, ours = _spread(claim.published, claim.published_sd), _spread(claim.ours, claim.sd)
+    ours, published = _spread(claim.ours, claim.sd), _spread(claim.published, claim.published_sd)
+    published = published or _spread(claim.reference, claim.reference_sd)
     unit = f" {claim.unit}" if claim.unit and ours else ""
     interval = "" if claim.low is None or claim.high is None else f"{number(claim.low)} … {number(claim.high)}"
     about = f"{sentence(claim)} ({claim.where})"
     return claim.id, about, asked(claim), published, ours + unit, interval, str(claim.runs or ""), claim.verdict
 
 
-HEADINGS = ("claim", "sentence", "judged by", "published", "ours", "95 % interval", "runs", "verdict")
+HEADINGS = ("claim", "sentence", "judged by", "printed or reference", "ours", "95 % interval", "runs", "verdict")
 
 
 def markdown(claims: Sequence[Claim]) -> str:

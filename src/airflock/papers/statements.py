@@ -39,7 +39,7 @@ class Statement:
     where     : page, section, table or figure; of a program: which, and how it was run
     quantity  : what is measured, a name of `airflock.papers.quantities`
     at        : where and when: speed, generation, configuration, number of flights
-    bound     : condition on ours, sd, low, high, p, published, published_sd that is asked for
+    bound     : condition that is asked for, on the names of `airflock.papers.bounds`
     published, published_sd : what the quote prints, and nothing else
     unit      : of the numbers, if not SI
     fails_if  : a change of a rule, a number or a time under which the bound is missed

@@ -107,7 +107,7 @@ def against_program(v: int, column: str, ours: pd.DataFrame) -> Measured:
         at,
         found,
         f"z = {z:+.1f}; {len(runs)} runs of the program",
-        published=(theirs, sd),
+        reference=(theirs, sd),
     )
 
 

@@ -68,7 +68,7 @@ def of_noise(flown: pd.DataFrame) -> list[Measured]:
         Measured(
             "noise.size", "polarisation", f"eta = {last:g}, N = 40 less 400", _gap(flown, (40, last), (400, last))
         ),
-        Measured("noise.random", "polarisation", "N = 400, eta = 2 pi", v_a[(400, TURN)], published=(random, None)),
+        Measured("noise.random", "polarisation", "N = 400, eta = 2 pi", v_a[(400, TURN)], reference=(random, None)),
     ]
 
 
