@@ -25,7 +25,7 @@ SECTIONS = (
     Section(
         "fig2.",
         "Fig. 2: range and delay of the radio at 32 m/s",
-        "40 flights a bin; dashed: the caption's safe region.",
+        "The map is of 20 flights a bin, the safe region (dashed) of 40.",
         ("fig2",),
     ),
     Section(
