@@ -230,25 +230,32 @@ def headline(claims: Sequence[Claim]) -> str:
 
 
 def print_claims(claims: Sequence[Claim]) -> None:
-    """Print claims as a table, then what is to be said of them and the headline."""
+    """Print each claim with its verdict, what was measured and what is to be said of it; then the headline."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.padding import Padding
+    from rich.text import Text
 
     good, bad = ({verdicts[k] for verdicts in VERDICTS.values()} for k in (0, 1))
-    table = Table(*HEADINGS)
+    console = Console(highlight=False)
     for claim in claims:
-        *most, verdict = (cell.replace("[", r"\[") for cell in cells(claim))
-        colour = "green" if verdict in good else "red" if verdict in bad else "yellow"
-        table.add_row(*most, f"[{colour}]{verdict}[/]")
-    console = Console()
-    console.print(table)
-    for claim in claims:
-        if told := remark(claim):
-            console.print(f"{claim.id}: {told}", markup=False, highlight=False)
+        colour = "green" if claim.verdict in good else "red" if claim.verdict in bad else "yellow"
+        console.print(Text.assemble((claim.id, "bold"), "  ", (claim.verdict, colour)))
+        for line in (f"{sentence(claim)} ({claim.where})", _numbers(claim), remark(claim)):
+            if line:
+                console.print(Padding(Text(line), (0, 0, 0, 2)))
     told = ", ".join(f"{n} {verdict}" for verdict, n in Counter(c.verdict for c in claims if c.kind != "paper").items())
     for line in (headline(claims), f"not of the paper: {told}" if told else ""):
         if line:
             console.print(line)
+
+
+def _numbers(claim: Claim) -> str:
+    """What was measured, in one line: nothing of a sentence that nothing tests."""
+    _, _, question, printed, ours, interval, runs, _ = cells(claim)
+    if not ours:
+        return ""
+    against = f"; {'printed' if claim.published is not None else 'reference'} {printed}" if printed else ""
+    return f"{question}; ours {ours}" + f" ({interval})" * bool(interval) + f", {runs} runs" * bool(runs) + against
 
 
 def _lost(value: Any) -> bool:
