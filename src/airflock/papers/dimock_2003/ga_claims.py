@@ -6,7 +6,7 @@ import numpy as np
 
 from airflock.papers.claims import Measured
 from airflock.papers.dimock_2003.flights import Flight, holds_vee, spacing
-from airflock.papers.dimock_2003.ga import READINGS, Evolution, Run
+from airflock.papers.dimock_2003.ga import EARLY, GENERATIONS, READINGS, Evolution, Run
 from airflock.papers.dimock_2003.static import Air
 from airflock.papers.dimock_2003.units import FT_LBF, SPAN
 from airflock.papers.statistics import Estimate
@@ -34,20 +34,7 @@ def measured(found: Evolution) -> list[Measured]:
         ),
         *(_timid(name, runs) for name, runs in found.runs.items()),
         *(_vee(name, runs) for name, runs in found.runs.items()),
-        Measured(
-            "ga.early",
-            "disorder",
-            "generation 5 less generation 149, swing in ft",
-            _spread(
-                [spacing(run.flights["early"])[1] - spacing(run.flights["final"])[1] for run in found.runs["mean"]]
-            ),
-        ),
-        Measured(
-            "ga.drag",
-            "power over time",
-            "generation 149, last second over first",
-            _spread([_course(run.flights["final"]) for run in found.runs["mean"]]),
-        ),
+        *_course_of_the_search(found.runs["mean"]),
         *(
             Measured(
                 f"ga.range.{name}",
@@ -60,6 +47,19 @@ def measured(found: Evolution) -> list[Measured]:
         ),
         _full(every),
         _cmaes(found),
+    ]
+
+
+def _course_of_the_search(runs: Sequence[Run]) -> list[Measured]:
+    """The early controller against the last, and the last over its flight; a quick search ends before the paper's."""
+    last = len(runs[0].best) - 1
+    if last != GENERATIONS - 1:
+        return []
+    swings = [spacing(run.flights["early"])[1] - spacing(run.flights["final"])[1] for run in runs]
+    courses = [_course(run.flights["final"]) for run in runs]
+    return [
+        Measured("ga.early", "disorder", f"generation {EARLY} less generation {last}, swing in ft", _spread(swings)),
+        Measured("ga.drag", "power over time", f"generation {last}, last second over first", _spread(courses)),
     ]
 
 

@@ -132,6 +132,4 @@ def _open(data: Data) -> Measured:
         f"{points['phi_vel'].max():.2f} m/s"
     )
     value = statistics.mean(data.points.loc[best]["phi_corr"])
-    return Measured(
-        "fig1.a.open", "phi_corr", f"algorithm A, best of {len(points)} sets of open constants", value, note
-    )
+    return Measured("fig1.a.open", "phi_corr", "algorithm A, best set of open constants", value, note)
