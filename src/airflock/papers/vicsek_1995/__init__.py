@@ -11,9 +11,9 @@ from typing import Any
 import pandas as pd
 
 from airflock.papers import statistics
-from airflock.papers.claims import Claim, judged
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
-from airflock.papers.paper import Found, Paper
+from airflock.papers.paper import Flown, Paper
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -25,17 +25,17 @@ NUMBERS = (50, 100, 200, 400)  # in a box of side 10: 0.5 to 4 per unit area
 AT = 3.0  # eta of the part density: our choice, because it lies between order and disorder
 
 
-def fly(wanted: Sequence[str], flights: Flights) -> Found:
+def fly(wanted: Sequence[str], flights: Flights) -> Flown:
     """Fly the parts that are wanted."""
-    claims: list[Claim] = []
+    measured: list[Measured] = []
     flown: dict[str, Any] = {}
     if "noise" in wanted:
         flown["noise"] = _fly(flights, "Fig. 2 a", noisy())
-        claims += noise_claims(flown["noise"])
+        measured += of_noise(flown["noise"])
     if "density" in wanted:
         flown["density"] = _fly(flights, "Fig. 2 b", dense())
-        claims += density_claims(flown["density"])
-    return claims, flown
+        measured += of_density(flown["density"])
+    return measured, flown
 
 
 def noisy() -> dict[Any, Scenario]:
@@ -53,65 +53,37 @@ def _fly(flights: Flights, title: str, scenarios: dict[Any, Scenario]) -> pd.Dat
     return flights.score(title, scenarios, flights.count(10, 3)).sort_index()
 
 
-def noise_claims(flown: pd.DataFrame) -> list[Claim]:
+def of_noise(flown: pd.DataFrame) -> list[Measured]:
     """Order at low noise, none at high noise, and a steady fall between them."""
     v_a = {key: statistics.mean(group["polarisation"]) for key, group in flown.groupby(level=[0, 1])}
     curve = [v_a[(400, eta)].ours for eta in NOISES]
-    course = ", ".join(f"{value:.3f} at {eta:g}" for eta, value in zip(NOISES, curve, strict=True))
-    random = math.sqrt(math.pi / (4.0 * 400.0))
-    last = NOISES[-1]
+    course = "v_a: " + ", ".join(f"{value:.3f} at {eta:g}" for eta, value in zip(NOISES, curve, strict=True))
+    rises = sum(a <= b for a, b in zip(curve, curve[1:], strict=False))
+    random, last = math.sqrt(math.pi / (4.0 * 400.0)), NOISES[-1]
     return [
-        Claim(
-            id="noise.ordered",
-            statement="as eta goes to 0, all particles fly alike (v_a near 1)",
-            source="Fig. 2 a, N = 400",
-            test="v_a at eta = 0.1 at least 0.95, the time of ordering included",
-            published=1.0,
-            **v_a[(400, NOISES[0])].fields(),
-            **judged(v_a[(400, NOISES[0])].ours >= 0.95, f"v_a: {course}"),
+        Measured("noise.ordered", "polarisation", f"N = 400, eta = {NOISES[0]:g}", v_a[(400, NOISES[0])], course),
+        Measured(
+            "noise.falls", "polarisation", "N = 400, steps of eta at which it rises", statistics.one(rises), course
         ),
-        Claim(
-            id="noise.falls",
-            statement="v_a falls steadily as the noise grows",
-            source="Fig. 2 a, N = 400",
-            test="each of eta = 0.1, 1, 2, 3, 4, 5 below the one before",
-            **judged(all(a > b for a, b in zip(curve, curve[1:], strict=False)), f"v_a: {course}"),
+        Measured(
+            "noise.size", "polarisation", f"eta = {last:g}, N = 40 less 400", _gap(flown, (40, last), (400, last))
         ),
-        Claim(
-            id="noise.size",
-            statement="in disorder v_a is smaller in a larger system",
-            source=f"Fig. 2 a, N = 40 and 400 at eta = {last:g}",
-            test="95 % interval of the difference above 0",
-            **(gap := _gap(flown, (40, last), (400, last))).fields(),
-            **judged(gap.low > 0.0, f"v_a {v_a[(40, last)].ours:.3f} and {v_a[(400, last)].ours:.3f}"),
-        ),
-        Claim(
-            id="noise.random",
-            statement="with eta = 2 pi headings are drawn afresh: v_a is the mean length of a random walk",
-            source="theory: sqrt(pi / (4 N)), N = 400",
-            test="within 3 %",
-            published=random,
-            **v_a[(400, TURN)].fields(),
-            **judged(abs(v_a[(400, TURN)].ours / random - 1.0) <= 0.03, "a check of the noise, not of the paper"),
-        ),
+        Measured("noise.random", "polarisation", "N = 400, eta = 2 pi", v_a[(400, TURN)], reference=(random, None)),
     ]
 
 
-def density_claims(flown: pd.DataFrame) -> list[Claim]:
+def of_density(flown: pd.DataFrame) -> list[Measured]:
     """Order grows with the density."""
     means = flown["polarisation"].groupby(level=0).mean()
     course = ", ".join(f"{means[n]:.3f} at {n / 100.0:g}" for n in NUMBERS)
+    falls = sum(means[a] >= means[b] for a, b in zip(NUMBERS, NUMBERS[1:], strict=False))
     gap = _gap(flown, (NUMBERS[-1], AT), (NUMBERS[0], AT))
-    rising = all(means[a] < means[b] for a, b in zip(NUMBERS, NUMBERS[1:], strict=False))
+    at = f"eta = {AT:g}"
     return [
-        Claim(
-            id="density.rises",
-            statement="v_a rises with the density at constant noise",
-            source="Fig. 2 b (there in a larger box)",
-            test="each of 0.5, 1, 2, 4 per unit area above the one before; 95 % interval of last minus first above 0",
-            **gap.fields(),
-            **judged(rising and gap.low > 0.0, f"v_a: {course} per unit area, eta = {AT:g}"),
-        )
+        Measured(
+            "density.rises", "polarisation", f"{at}, steps of density at which it falls", statistics.one(falls), course
+        ),
+        Measured("density.gap", "polarisation", f"{at}, 4 less 0.5 per unit area", gap, course),
     ]
 
 
@@ -121,6 +93,7 @@ def _gap(flown: pd.DataFrame, a: Any, b: Any) -> statistics.Estimate:
 
 PAPER = Paper(
     "Vicsek et al. 1995, Novel type of phase transition in a system of self-driven particles",
+    __name__,
     ("noise", "density"),
     fly,
 )
