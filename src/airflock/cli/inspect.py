@@ -1,11 +1,11 @@
 """Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
+from airflock.doors import from_outside, is_file, read_text
 from airflock.errors import AirflockError
 
 
@@ -31,8 +31,10 @@ def presets(
         typer.echo(starting_set(for_speed), nl=False)
         return
     if name is not None:
-        files.load(name)  # complains about a wrong name
-        typer.echo((known.get(name) or Path(name)).read_text(encoding="utf-8"), nl=False)
+        if name not in known and not is_file(name):
+            files.load(name)  # complains about a wrong name
+        with from_outside(name):
+            typer.echo(read_text(known.get(name) or name), nl=False)
         return
     found = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
@@ -48,6 +50,8 @@ def validate(
         list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets, studies or recordings.")
     ],
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
 ) -> None:
     """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
 
@@ -58,16 +62,16 @@ def validate(
     for name in files:
         found: list[str] = []
         with options.gathering(found):
-            _validate(name, changed)
+            _validate(name, changed, law, trust)
         faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
     options.refuse(faults)
 
 
-def _validate(name: str, changed: dict[str, Any]) -> None:
+def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> None:
     if name.lower().endswith(".nc"):
         from airflock.recordings.files import fly_again, load_recording
 
-        same, differences = fly_again(load_recording(name))
+        same, differences = fly_again(load_recording(name), law)
         for line in differences:
             tables.say(f"note: {name}: {line}")
         if not same:
@@ -80,12 +84,12 @@ def _validate(name: str, changed: dict[str, Any]) -> None:
     from airflock.scenarios.files import load
 
     if is_study(name):
-        study = load_study(name, settings=changed)
+        study = load_study(name, settings=changed, trust=trust)
         plan_of(study.scenario)
         what = f"{len(study.space.axes)} parameters of {study.scenario.name} vary"
         typer.echo(f"{name}: valid study; {what}; begin it with airflock evolve {name} --out DIR")
         return
-    found = load(name, changed)
+    found = load(name, changed, law, trust=trust)
     plan_of(found)  # probes the rules
     for note in found.notes:
         tables.say(f"note: {name}: {note}")

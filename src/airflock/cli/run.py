@@ -14,6 +14,8 @@ def run(
     seeds: options.Seeds = 1,
     first_seed: options.FirstSeed = 0,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
     threads: options.Threads = None,
@@ -36,7 +38,7 @@ def run(
         options.writable((save, RECORDINGS), (plot, PICTURES))
     with options.gathering(faults):
         changed = options.settings(changes, agents, duration)
-        found = load(scenario, changed)
+        found = load(scenario, changed, law, trust=trust)
     options.refuse(faults)
     for note in found.notes:
         tables.say(f"note: {note}")

@@ -5,7 +5,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import PurePath
 from typing import Any
 
 import xarray as xr
@@ -17,7 +17,8 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.recordings.layout import dataset
-from airflock.scenarios.files import loaded
+from airflock.scenarios.files import MODELS, loaded
+from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
@@ -55,6 +56,7 @@ def simulate(
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
     text = flight(plan_of(scenario, precision=precision, record=True))
+    own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
         "airflock_scenario": json.dumps(flown_document(scenario)),
         "airflock_name": scenario.name,
@@ -65,18 +67,16 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
         "airflock_sources": hashlib.sha256(text.encode()).hexdigest(),
         "airflock_toolchain": toolchain(),
         "airflock_processor": processor(),
+        **({"airflock_law": law_hash(scenario.model)} if own else {}),
     }
 
 
 def flown_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values; a law in a file of its own with its whole path, so that it is found from anywhere.
-
-    A law that was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
-    """
+    """The scenario as plain values, of which a law of the user's own is its bare name: no file, and no place of one."""
     document: dict[str, Any] = plain(scenario.document)
-    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
-    if law.suffix == ".py" and law.is_file():
-        document["model"]["kind"] = str(law.absolute())
+    kind = document.get("model", {}).get("kind")
+    if isinstance(kind, str) and kind.endswith(".py"):
+        document["model"]["kind"] = PurePath(kind).stem
     return document
 
 

@@ -1,6 +1,5 @@
 """Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
 
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -10,6 +9,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from airflock.doors import from_outside
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
 from airflock.engine.plan import WHOLE
@@ -17,6 +17,7 @@ from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
 from airflock.metrics import nearest
+from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
 from airflock.scenarios.files import MODELS, loaded, make
 from airflock.scenarios.scenario import Scenario
@@ -87,7 +88,7 @@ def aero_settings(recording: xr.Dataset, changed: Mapping[str, Any] | None = Non
 
     A flock of birds was flown in a frame that moves with the air; elsewhere forward is the flock's mean heading.
     """
-    document = json.loads(str(recording.attrs.get("airflock_scenario") or "{}"))
+    document = scenario_document(recording) or {}
     birds = document.get("model", {}).get("kind") == "dimock_2003"
     frame = {} if birds else {"wing.frame": "ground"}
     return {"metrics.kind": "dimock", "metrics.fitness": "sound", **frame, **(changed or {})}
@@ -98,20 +99,16 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
 
     A log brings no arena and no model: its arena is open unless settings name one, and v_flock is its mean speed.
     """
-    text = recording.attrs.get("airflock_scenario")
-    if text:
-        try:
-            document = json.loads(text)
-        except json.JSONDecodeError as fault:
-            raise RecordingError(f"recording: attribute airflock_scenario is damaged: {fault}") from fault
+    check_format(recording)
+    document = scenario_document(recording)
+    if document is not None:
         name = str(recording.attrs.get("airflock_name", "recording"))
-        kind = document.get("model", {}).get("kind", "")
-        if kind in MODELS or str(kind).endswith(".py"):
-            return make(document, name, settings)
-        # flown with a law that was given directly: its parameters are gone, what it is measured by is kept
-        measured = json.loads(str(recording.attrs.get("airflock_metrics", "{}")))
-        stand_in = {**document, "model": {"kind": MODELS[0]}, "metrics": measured}
-        return make(stand_in, name, {k: v for k, v in (settings or {}).items() if not k.startswith("model.")})
+        with from_outside(name, RecordingError):
+            if not flown_with_own_law(recording):
+                return make(document, name, settings)
+            # a law of the user's own is not in the recording: what it is measured by is kept, and needs no law
+            stand_in = {**document, "model": {"kind": MODELS[0]}, "metrics": measured_by(recording)}
+            return make(stand_in, name, {k: v for k, v in (settings or {}).items() if not k.startswith("model.")})
     frames, period = frames_of(recording)
     dims = frames.shape[1] // 2
     speed = float(np.linalg.norm(frames[:, dims:], axis=1).mean())

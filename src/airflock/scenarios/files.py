@@ -1,17 +1,18 @@
 """Scenario files: TOML with units and sources, presets by name, and keys changed from outside."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
-from importlib import import_module, resources, util
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Any
 
 from airflock.core.contract import Model, model
-from airflock.errors import AirflockError, RuleError, ScenarioError
-from airflock.scenarios import checks, geometry, places, schema, wings
+from airflock.doors import from_outside, is_file, read_toml
+from airflock.errors import AirflockError, ScenarioError
+from airflock.scenarios import checks, formats, geometry, places, schema, wings
+from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
@@ -28,39 +29,49 @@ def presets() -> dict[str, Path]:
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
 
-def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None) -> Scenario:
+def load(
+    name: str | os.PathLike[str],
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    *,
+    trust: bool = False,
+) -> Scenario:
     """Scenario from a preset's name or a file.
 
     settings : keys like "model.p_rep" with the values that replace the file's
     law      : a flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead
                of the file's, or one by its name or its file; its parameters start from their defaults
+    trust    : whether code that the file names, such as a law in a Python file, may run
     Raises ScenarioError with one line per fault.
     """
     known = presets()
     text = str(name)
     path = known.get(text) or Path(text)
     where = text if text in known else str(path)
-    if not path.is_file():
+    if not is_file(path):
         near = get_close_matches(text, known, n=1, cutoff=0.4)
         hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
         raise ScenarioError([f"{text}: no such file or preset{hint}"])
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
-        raise ScenarioError([f"{where}: {fault}"]) from fault
-    if tells_of_study(document) and "model" not in document:
-        raise ScenarioError([f"{where}: is a study, not a scenario; check it with airflock validate, or evolve it"])
-    if law is None:
-        return make(document, where, settings, folder=path.parent)
+    with from_outside(where):
+        document: Mapping[str, Any] = read_toml(path)
+        if tells_of_study(document) and "model" not in document:
+            raise ScenarioError([f"{where}: is a study, not a scenario; check it with airflock validate, or evolve it"])
+        if law is None:
+            return make(document, where, settings, folder=path.parent, trust=trust)
+        own = given_law(law)
+        kind = str(Path(law).absolute()) if str(law).endswith(".py") else own.name
+        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings, law=own)
+
+
+def given_law(law: Any) -> Model:
+    """Model of a law that the caller gives: which is consent to run it."""
+    if isinstance(law, Model):
+        return law
     if isinstance(law, (str, os.PathLike)):
-        kind = str(Path(law).absolute()) if str(law).endswith(".py") else str(law)
-        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings)
-    if not isinstance(law, (Model, Mapping)) and not hasattr(law, "__dict__"):
-        raise ScenarioError(
-            [f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
-        )
-    own = law if isinstance(law, Model) else model(law)
-    return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own)
+        return find_model(str(law), told="law", trust=True)
+    if isinstance(law, Mapping) or hasattr(law, "__dict__"):
+        return model(law)
+    raise ScenarioError([f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"])
 
 
 def loaded(what: Any) -> Scenario:
@@ -84,15 +95,19 @@ def make(
     *,
     folder: Path | None = None,
     law: Model | None = None,
+    trust: bool = False,
 ) -> Scenario:
-    """Scenario from a nested dict. `where` names it in faults; `law` is a model given directly instead of by name."""
-    merged, faults = _merged(document, settings or {})
+    """Scenario from a nested dict. `where` names it in faults; `law` is a model given directly instead of by name.
+
+    trust : whether code that the document names may run
+    """
+    merged, faults = _merged(formats.current(document, where), settings or {})
     table, more = _model_table(merged)
     faults += more
     found = law
     if found is None:
         try:
-            found = find_model(table.get("kind"), folder)
+            found = find_model(table.get("kind"), folder, trust=trust)
         except AirflockError as fault:
             faults += str(fault).splitlines()
     if found is not None and "aero" in merged:
@@ -114,7 +129,7 @@ def make(
 
 def _beside(scene: Any, folder: Path | None) -> Any:
     """A scene whose mesh file is looked for beside the scenario file, if it is not where the name says."""
-    if scene.kind != "mesh" or folder is None or Path(scene.file).is_file() or not (folder / scene.file).is_file():
+    if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
 
@@ -188,34 +203,31 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None) -> list[str]:
     return faults
 
 
-def find_model(kind: Any, folder: Path | None = None) -> Model:
-    """Model by name, or from a user's own Python file (relative to the scenario file)."""
+def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
+    """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
     if not isinstance(kind, str):
-        raise ScenarioError([f"model.kind = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
+        raise ScenarioError([f"{told} = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
         path = Path(kind) if Path(kind).is_absolute() or folder is None else folder / kind
-        spec = util.spec_from_file_location(path.stem, path)
-        if spec is None or spec.loader is None or not path.is_file():
-            raise ScenarioError([f"model.kind = {kind!r}: no such file"])
-        module = util.module_from_spec(spec)
-        try:
-            spec.loader.exec_module(module)
-        except Exception as fault:  # the user's own file may fail in any way
-            raise RuleError(f"{path}: {type(fault).__name__}: {fault}") from fault
-        return model(module, path.stem)
+        return model(own_module(path, f"{told} = {kind!r}", trust=trust), path.stem)
     near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
-    raise ScenarioError([f"model.kind = {kind!r} is no model; {hint}"])
+    raise ScenarioError([f"{told} = {kind!r} is no model; {hint}"])
 
 
 def _published(table: Any) -> dict[str, tuple[float, float | None]]:
-    found = {}
+    """Numbers of a paper by name: mean, and standard deviation where it is given; what is no number is left out."""
+
+    def number(value: Any) -> bool:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+
+    found: dict[str, tuple[float, float | None]] = {}
     for key, entry in (table if isinstance(table, Mapping) else {}).items():
-        if isinstance(entry, Mapping) and isinstance(entry.get("mean"), (int, float)):
+        if isinstance(entry, Mapping) and number(entry.get("mean")):
             spread = entry.get("sd")
-            found[key] = (float(entry["mean"]), float(spread) if spread is not None else None)
+            found[key] = (float(entry["mean"]), float(spread or 0.0) if number(spread) else None)
     return found
 
 

@@ -1,0 +1,63 @@
+"""Python files of the user's own: run only by consent, and whatever goes wrong in one is one line.
+
+A scenario or a study is data; a file of code that it names runs with all rights of the one who opens it. So it is
+imported only if the caller says so: `trust=True`, `--trust`, or by giving the law itself (`law=`, `--law`).
+"""
+
+import hashlib
+import inspect
+import json
+from importlib import util
+from pathlib import Path
+from types import FunctionType, ModuleType
+
+from airflock.core.contract import Model
+from airflock.doors import is_file
+from airflock.errors import RuleError, ScenarioError, bounded
+
+
+def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
+    """Module of a Python file that a scenario or study names.
+
+    told  : key and value that name it, for faults
+    trust : whether the caller consents to running it
+    Raises ScenarioError without consent or without the file, and RuleError for what its import raises.
+    """
+    if not is_file(path):
+        raise ScenarioError([f"{told}: no such file"])
+    if not trust:
+        raise ScenarioError(
+            [f"{told}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
+        )
+    spec = util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ScenarioError([f"{told}: is no Python file"])
+    module = util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
+        reason = bounded(" ".join(str(fault).split()))
+        raise RuleError(f"{path}: {type(fault).__name__}: {reason}") from fault
+    return module
+
+
+def law_hash(law: Model) -> str:
+    """Hash of the text of a law's rules and of the functions of its own that they call."""
+    texts: dict[str, str] = {}
+    left = [value for value in vars(law).values() if isinstance(value, FunctionType)]
+    while left:
+        rule = left.pop()
+        if rule.__qualname__ in texts:
+            continue
+        try:
+            texts[rule.__qualname__] = inspect.cleandoc(inspect.getsource(rule))
+        except (OSError, TypeError):  # typed at a prompt: there is only its code
+            texts[rule.__qualname__] = rule.__code__.co_code.hex()
+        inside = [cell.cell_contents for cell in rule.__closure__ or ()]
+        called = [rule.__globals__.get(name) for name in rule.__code__.co_names]
+        left += [
+            found
+            for found in (*inside, *called)
+            if isinstance(found, FunctionType) and found.__module__ == rule.__module__
+        ]
+    return hashlib.sha256(json.dumps(sorted(texts.items())).encode()).hexdigest()[:16]
