@@ -47,7 +47,7 @@ def anything(rng, depth=0):
         return rng.choice([True, False])
     if kind == 4:
         return rng.choice([
-            "", "x", "aaa" * 200, "mine.py", "a" * 300 + ".py", "../../etc/passwd", "/dev/zero", "\0", "é\u202e\n\x1b[2J",
+            "", "x", "aaa" * 200, "mine.py", "a" * 300 + ".py", "../../etc/passwd", "/dev/zero", "\0", "é\u202e\n\x1b[",
             "none", "square", "cap", "vicsek_1995", "kidger", "points", "mesh", "periodic", "fitness", "nsga2", "1",
         ])  # fmt: skip
     if kind == 5:
@@ -256,22 +256,28 @@ def recording(seed, number, folder, tell=False):
 
 
 VERBS = ("run", "score", "sweep", "plot", "video", "presets", "validate", "display", "paper", "evolve", "harden")
-OPTIONS = (
-    "--set", "--agents", "--duration", "--seeds", "--first-seed", "--precision", "--device", "--over", "--show",
-    "--threads", "--save", "--plot", "--out", "--kind", "--fps", "--speed", "--begin", "--end", "--series", "--table",
-    "--population", "--generations", "--algorithm", "--timeout", "--sensitivity", "--for-speed", "--failing", "--law",
-    "--resume", "--trust", "--aero", "--json", "--only", "--seed", "--drones", "--points", "--spacing", "-o", "--nope",
-)  # fmt: skip
 VALUES = (
     "", "0", "-1", "1e400", "nan", "inf", "9" * 50, "9" * 4400, "x", "model.p_rep=1", "model.p_rep=[[[[", "=1", "a=b=c",
-    "model.p_rep={value=0.1}", "agents=" + "9" * 400, "model." + "x" * 5000 + "=1", "a" + ".a" * 50000 + "=1", "é=\u202e",
+    "model.p_rep={value=0.1}", "agents=" + "9" * 400, "model." + "x" * 5000 + "=1", "a" + ".a" * 50000 + "=1", "é=",
     "radio.delay=0:2:3", "radio.delay=0:2:1000000000", "radio.delay=::", "model.p_rep=" + "[" * 3000, "/dev/full",
     "/nowhere/x.nc", "a" * 300 + ".nc", "flight.png", "flight.txt", "x.toml", "vasarhelyi_2018/4ms", "mine.py", "cuda",
     "fitness", "sobol", "\x1b[2J", "kidger/city", "../..", "model.kind=evil.py", "scene.file=/etc/passwd", "16", "33",
 )  # fmt: skip
 
 
-class Flown(Exception):
+@cache
+def options_of(verb):
+    """Options of a verb, and whether each takes a value; and one that there is not."""
+    import typer
+
+    from airflock.cli.main import app
+
+    group = typer.main.get_command(app)
+    found = [p for p in group.commands[verb].params if p.param_type_name == "option"]
+    return [(p.opts[0], not p.is_flag) for p in found] + [("--nope", True)]
+
+
+class Flown(BaseException):
     """A command got as far as a flight: that is not what is tested."""
 
 
@@ -283,8 +289,8 @@ def command(seed, number, folder, tell=False):
              str(GOLDEN), "/dev/zero", "a" * 300, "AIR", "vicsek_1995", str(GOLDEN / "scores.json"))  # fmt: skip
     words += [rng.choice(names) for _ in range(rng.choice([0, 1, 1, 1, 2]))]
     for _ in range(rng.randrange(5)):
-        words.append(rng.choice(OPTIONS))
-        words += [rng.choice(VALUES)] if rng.random() < 0.8 else []
+        option, takes = rng.choice(options_of(words[0]))
+        words += [option, rng.choice(VALUES)] if takes == (rng.random() < 0.95) else [option]
     if tell:
         sys.stdout.write(f"{[word[:60] for word in words]}\n")
     return _commanded([word.replace("\0", "") for word in words], folder, tell)
@@ -312,7 +318,7 @@ def _commanded(words, folder, tell=False):
     if tell:
         sys.stdout.write(f"{status}: {said[:2000]}\n")
     assert status in (0, 2, None), f"status {status}: {said[:300]}"
-    assert "Traceback" not in said and "unexpected" not in said and LAST_RESORT not in said, said[:300]
+    assert "Traceback" not in said and "airflock: unexpected" not in said and LAST_RESORT not in said, said[:300]
     assert max(map(len, said.splitlines() or [""])) <= LONGEST + 20, "a long line"
     return status in (0, None)
 

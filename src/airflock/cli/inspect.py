@@ -8,6 +8,9 @@ from airflock.cli import options, tables
 from airflock.doors import from_outside, is_file, read_text
 from airflock.errors import AirflockError
 
+PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
+EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
+
 
 def presets(
     name: Annotated[
@@ -96,11 +99,25 @@ def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) 
     typer.echo(f"{name}: valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s")
 
 
-def doctor(as_json: options.Json = False) -> None:
-    """Show versions, processor, GPUs and cache, and fly a ten-second self-check on each device.
+def doctor(
+    clear: Annotated[
+        bool, typer.Option("--clear-cache", help="Remove all compiled drivers, and do nothing else.")
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Show versions, cores, extras, GPUs and cache, and fly a ten-second self-check on each device.
 
     Example: airflock doctor
     """
+    if clear:
+        from airflock.engine.store import clear_cache, usual_folder
+
+        count, size = clear_cache()
+        if as_json:
+            tables.emit_json({"cache": str(usual_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)})
+        else:
+            typer.echo(f"{usual_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
+        return
     import platform
     import shutil
     import time
@@ -109,14 +126,18 @@ def doctor(as_json: options.Json = False) -> None:
     from airflock import __version__
     from airflock.engine.cpu import cores
     from airflock.engine.simulate import score_flight
-    from airflock.engine.store import cache_folder
+    from airflock.engine.store import cache_folder, cache_trouble, drivers, usual_folder
     from airflock.recordings.flights import processor
     from airflock.scenarios.files import load
 
     found: dict[str, Any] = {"airflock": __version__, "python": platform.python_version(), "processor": processor()}
     found |= {"cores": cores(), "cache": str(cache_folder())}
+    trouble = cache_trouble(usual_folder())
+    found |= {"cache_note": f"for this process only: {trouble}"} if trouble else {}
+    kept = drivers(cache_folder())
+    found |= {"cache_drivers": len(kept), "cache_mb": round(sum(size for _, size, _ in kept) / 1e6, 1)}
     found["cache_free_gb"] = round(shutil.disk_usage(cache_folder()).free / 1e9, 1)
-    for name in ("numba", "llvmlite", "numpy", "xarray", "matplotlib", "numba-cuda"):
+    for name in (*PACKAGES, *EXTRAS):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
