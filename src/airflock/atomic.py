@@ -45,9 +45,12 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
-    """Write text (UTF-8) or bytes; an OSError leaves the old file, or none, in place."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place."""
+    try:
+        with atomic(path) as temporary:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    except OSError as fault:
+        raise OSError(fault.errno, fault.strerror, str(path)) from fault
 
 
 @cache

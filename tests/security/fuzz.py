@@ -4,6 +4,8 @@ python tests/security/fuzz.py scenarios 1000000 --seed 7
 python tests/security/fuzz.py studies 100000
 python tests/security/fuzz.py recordings 10000
 python tests/security/fuzz.py commands 3000
+python tests/security/fuzz.py caches 200
+python tests/security/fuzz.py disks 1000
 
 Cases run in forked children of one warm process, many in each, so that a hang or a crash costs one child and is told
 with its number. A case is a function of the seed and its number alone: --only NUMBER repeats one with its traceback.
@@ -21,10 +23,12 @@ import time
 import traceback
 from pathlib import Path
 
+import damages
 import mutations
 
 HANG = 20.0  # s
 BATCH = 400  # cases of a child
+CASES = mutations.CASES | damages.CASES
 
 
 def attack(case, count, seed, *, folder, begin=0, say=None):
@@ -95,13 +99,13 @@ def _watch(pid, pipe, number, stop):
 def main():
     """Exit status 0 if nothing failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=sorted(mutations.CASES))
+    parser.add_argument("what", choices=sorted(CASES))
     parser.add_argument("count", type=int, nargs="?", default=1000)
     parser.add_argument("--seed", type=int, default=2018)
     parser.add_argument("--begin", type=int, default=0, help="number of the first case")
     parser.add_argument("--only", type=int, help="repeat one case in this process, with its traceback")
     asked = parser.parse_args()
-    case = mutations.CASES[asked.what]
+    case = CASES[asked.what]
     mutations.warm(asked.what)
     with tempfile.TemporaryDirectory() as folder:
         if asked.only is not None:

@@ -293,10 +293,10 @@ def command(seed, number, folder, tell=False):
         words += [option, rng.choice(VALUES)] if takes == (rng.random() < 0.95) else [option]
     if tell:
         sys.stdout.write(f"{[word[:60] for word in words]}\n")
-    return _commanded([word.replace("\0", "") for word in words], folder, tell)
+    return commanded([word.replace("\0", "") for word in words], folder, tell)
 
 
-def _commanded(words, folder, tell=False):
+def commanded(words, folder, tell=False):
     """Status 0 or flown: accepted. Status 2: refused, in lines that begin with the command's name or typer's usage."""
     import os
 
@@ -348,6 +348,10 @@ def warm(what):
         import airflock.evolve.run
         import airflock.plots.trajectories
         import airflock.recordings.files  # noqa: F401
+    elif what == "disks":
+        import damages
+
+        damages.results()
     else:
         scenarios()
 

@@ -49,11 +49,10 @@ def read(path: str, most: int) -> tuple[dict[str, Any], list[Any]]:
     import h5netcdf
     import numpy as np
 
+    total = _inside(path)
+    if total > most:
+        raise ValueError(f"its arrays take {total / 1e9:.3g} GB; there is room for {most / 1e9:.3g} GB")
     with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
-        _stay_inside(file._h5file)
-        total = sum(int(np.prod(v.shape, dtype=float)) * max(_size(v), 1) for v in file.variables.values())
-        if total > most:
-            raise ValueError(f"its arrays take {total / 1e9:.3g} GB; there is room for {most / 1e9:.3g} GB")
         found, arrays = [], []
         for name, variable in file.variables.items():
             values = np.asarray(variable[...])
@@ -70,19 +69,23 @@ def read(path: str, most: int) -> tuple[dict[str, Any], list[Any]]:
         return {"attributes": _attributes(file.attrs), "variables": found}, arrays
 
 
-def _stay_inside(file: Any) -> None:
-    """Refuse links to other files, and arrays whose bytes or parts lie in other files."""
+def _inside(path: str) -> float:
+    """Bytes of all arrays; refuses links to other files, and arrays whose bytes or parts lie in other files."""
+    import math
+
     import h5py
 
-    for name in file:
-        if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
-            raise ValueError(f"{name} is a link to another file")
-        if isinstance(file[name], h5py.Dataset) and (file[name].external or file[name].is_virtual):
-            raise ValueError(f"{name} keeps its values in another file")
-
-
-def _size(variable: Any) -> int:
-    return int(getattr(variable.dtype, "itemsize", 0) or 16)
+    total = 0.0
+    with h5py.File(path, "r") as file:
+        for name in file:
+            if isinstance(file.get(name, getlink=True), h5py.ExternalLink):
+                raise ValueError(f"{name} is a link to another file")
+            found = file[name]
+            if isinstance(found, h5py.Dataset):
+                if found.external or found.is_virtual:
+                    raise ValueError(f"{name} keeps its values in another file")
+                total += math.prod(map(float, found.shape or ())) * found.dtype.itemsize
+    return total
 
 
 def _word(value: Any) -> str:
