@@ -23,7 +23,7 @@ from airflock.evolve.study import load_study
         ("a = " + "1" * 5000, "more than 400 letters"),
         ("a = 0x" + "f" * 5000, "more than 400 letters"),
         ("a = 0b" + "1" * 300, "beyond 2^64"),
-        ("a = 1" + "0" * 30, "a = c9f2c9cd04674edea40000000 (hexadecimal) is beyond 2^64"),
+        ("a = 1" + "0" * 30, "(hexadecimal) is beyond 2^64"),
         ("\n".join(f"k{i} = 1" for i in range(20_000)), "more than 10000 keys"),
         ("k" * 300 + " = 1", "has 300 letters, more than 200"),
         ("a = [" + "1," * 1_100_000 + "]", "more than 1000000 values"),

@@ -39,6 +39,7 @@ def packed(tmp_path):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The same with recordings; one names the law by its whole path, as version 0.1 wrote them."""
+    mutations.warm("commands")
     tmp_path = packed(tmp_path_factory.mktemp("stranger"))
     recording = airflock.load_recording(mutations.GOLDEN / "recording.nc")
     document = json.loads(recording.attrs["airflock_scenario"])

@@ -59,10 +59,12 @@ def test_arrays_that_lie_outside_the_file_are_refused(tmp_path):
 
 
 def test_a_small_file_of_enormous_arrays_is_refused(tmp_path):
-    import h5py
+    import h5netcdf
 
-    with h5py.File(tmp_path / "bomb.nc", "w") as file:
-        file.create_dataset("position", (10**7, 10**7), "f8", chunks=(1000, 1000), compression="gzip")
+    with h5netcdf.File(tmp_path / "bomb.nc", "w") as file:
+        file.dimensions = {"time": 10**7, "individual": 10**7}
+        chunks = {"chunks": (1000, 1000), "compression": "gzip"}
+        file.create_variable("position", ("time", "individual"), "f8", **chunks)
     with pytest.raises(RecordingError, match="its arrays take 8e.05 GB; there is room for"):
         airflock.load_recording(tmp_path / "bomb.nc")
 
