@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import traceback
+import warnings
 from typing import Any, NoReturn
 
 import typer
@@ -11,7 +12,7 @@ from typer.core import TyperGroup
 
 from airflock import __version__
 from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep
-from airflock.errors import AirflockError, bounded_lines, printable
+from airflock.errors import AirflockError, bounded, bounded_lines, printable
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
@@ -72,6 +73,7 @@ def _options(
 def main() -> None:
     """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
     signal.signal(signal.SIGTERM, _stop)
+    warnings.showwarning = _note
     try:
         try:
             app(standalone_mode=True)
@@ -90,6 +92,12 @@ def main() -> None:
         _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
     except Exception as fault:  # the border: whatever else goes wrong is one line, too
         _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
+
+
+def _note(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """What Airflock warns of, as a line; what libraries say to programmers is not for who gives commands."""
+    if category is UserWarning:
+        sys.stderr.write(f"note: {bounded(printable(str(message)))}\n")
 
 
 def _stop(number: int, _: Any) -> NoReturn:
