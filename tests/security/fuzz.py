@@ -28,17 +28,18 @@ import mutations
 
 HANG = 20.0  # s
 BATCH = 400  # cases of a child
+SLOW = ("recordings", "caches", "disks")
 CASES = mutations.CASES | damages.CASES
 
 
-def attack(case, count, seed, *, folder, begin=0, say=None):
+def attack(case, count, seed, *, folder, begin=0, say=None, batch=BATCH):
     """Run case(seed, number, folder) for `count` numbers; the failures as (number, reason), and how many were refused.
 
     A case returns whether it was accepted, and raises for anything else than that or an AirflockError.
     """
     failures, accepted, number = [], 0, begin
     while number < begin + count:
-        stop = min(number + BATCH, begin + count)
+        stop = min(number + batch, begin + count)
         reading, writing = os.pipe()
         pid = os.fork()
         if pid == 0:
@@ -119,7 +120,8 @@ def main():
                 told = time.monotonic()
                 sys.stderr.write(f"{done} of {asked.count}, {len(failures)} failures, {told - began:.0f} s\n")
 
-        failures, accepted = attack(case, asked.count, asked.seed, folder=Path(folder), begin=asked.begin, say=say)
+        how = {"begin": asked.begin, "say": say, "batch": 25 if asked.what in SLOW else BATCH}
+        failures, accepted = attack(case, asked.count, asked.seed, folder=Path(folder), **how)
         for number, reason in failures:
             sys.stdout.write(f"case {number}: {reason}\n")
         sys.stdout.write(

@@ -58,6 +58,32 @@ def test_brackets_dots_and_digits_inside_strings_and_comments_do_not_count():
     assert doors.toml(text)["c"] == "[[."
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[space.model]\np_rep = { above = [1] }\n", "space.model.p_rep.above = [1] is no number"),
+        ("search = 1.5\n", "search = 1.5 is no table of keys"),
+        ("[objective]\nover_seeds = [[]]\n", "objective.over_seeds = [[]] is none of mean, worst, quantile"),
+        ("[set]\nagents = 1" + "0" * 500 + "\n", "more than 400 letters"),
+    ],
+)
+def test_what_the_fuzz_found_in_studies_is_one_line(tmp_path, text, words):
+    (tmp_path / "a.toml").write_text('scenario = "vasarhelyi_2018/4ms"\n' + text)
+    with pytest.raises(ScenarioError) as fault:
+        load_study(tmp_path / "a.toml")
+    assert len(fault.value.faults) == 1 and words in fault.value.faults[0]
+
+
+@pytest.mark.parametrize(
+    "published",
+    ['{ mean = 1.0, sd = "x" }', "{ mean = 1.0, sd = [1] }", "{ mean = 1.0, sd = 2018-07-18 }", "{ mean = true }", "5"],
+)
+def test_a_published_number_that_is_none_is_left_out(tmp_path, published):
+    text = f"[published]\nphi_vel = {published}\n[model]\nkind = 'vicsek_1995'\n"
+    (tmp_path / "a.toml").write_text(text)
+    assert airflock.load(tmp_path / "a.toml").published in ({}, {"phi_vel": (1.0, None)})
+
+
 def test_a_byte_order_mark_is_read(tmp_path):
     (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbfagents = 5\n[model]\nkind = 'vicsek_1995'\n")
     assert airflock.load(tmp_path / "a.toml").agents == 5
