@@ -87,6 +87,8 @@ def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) 
     from airflock.scenarios.files import load
 
     if is_study(name):
+        if law is not None:
+            raise AirflockError(f"{name}: is a study; --law is for scenarios and recordings")
         study = load_study(name, settings=changed, trust=trust)
         plan_of(study.scenario)
         what = f"{len(study.space.axes)} parameters of {study.scenario.name} vary"

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 import traceback
 import warnings
 from typing import Any, NoReturn
@@ -72,7 +73,8 @@ def _options(
 
 def main() -> None:
     """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
-    signal.signal(signal.SIGTERM, _stop)
+    if threading.current_thread() is threading.main_thread():  # only there are signals heard
+        signal.signal(signal.SIGTERM, _stop)
     warnings.showwarning = _note
     try:
         try:

@@ -9,6 +9,7 @@ import select
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +41,17 @@ class Opening:
         # one thread, and no filter of HDF5 from outside its own library
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        if not sys.executable:  # a program that has Python inside
+            raise RecordingError(
+                f"{self.path}: no process can be started to open it: Python does not know its own path"
+            )
         try:
             self.process = subprocess.Popen(command, env=environment, bufsize=0, **pipes)
-            assert self.process.stdin is not None
-            with self.process.stdin as question:
-                question.write(json.dumps(asked).encode())
         except OSError as fault:
             raise RecordingError(f"{self.path}: no process can be started to open it: {fault.strerror}") from fault
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError), self.process.stdin as question:  # if it has ended, `answer` says so
+            question.write(json.dumps(asked).encode())
         self.until = time.monotonic() + self.limit
 
     def __enter__(self) -> "Opening":
