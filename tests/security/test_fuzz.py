@@ -11,5 +11,5 @@ import pytest
 )
 def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed, tmp_path):
     mutations.warm(what)
-    failures, _ = fuzz.attack(fuzz.CASES[what], count, seed, folder=tmp_path)
+    failures, _ = fuzz.attack(fuzz.CASES[what], count, seed, folder=tmp_path, hang=fuzz.PATIENCE.get(what, fuzz.HANG))
     assert failures == [], f"repeat with: python tests/security/fuzz.py {what} --seed {seed} --only NUMBER"

@@ -34,7 +34,7 @@ def test_a_recording_that_hangs_is_given_up():
     opening = Opening(path, limit=3.0)
     with pytest.raises(RecordingError, match="could not be opened within 3 s; it may be damaged"):
         opening.answer()
-    assert opening.process.returncode == -signal.SIGKILL
+    assert opening.process.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
 
 
 def test_arrays_that_lie_outside_the_file_are_refused(tmp_path):

@@ -4,8 +4,10 @@
 """
 
 import json
+import math
 import os
 import select
+import signal
 import subprocess
 import sys
 import time
@@ -16,7 +18,8 @@ from typing import Any
 from airflock.doors import from_outside, is_file
 from airflock.errors import RecordingError
 
-LEAST_TIME = 20.0  # s that a file of any size may take
+LEAST_TIME = 15.0  # s of a processor that a file of any size may take
+WAIT = 4.0  # times as long it may take where processors are busy with other things
 PACE = 5e6  # bytes per second that a file of any size is read at
 MOST_ABOUT = 200_000_000  # bytes of names and attributes
 READER = Path(__file__).with_name("reader.py")
@@ -26,7 +29,7 @@ class Opening:
     """A netCDF file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
 
     def __init__(self, path: str | os.PathLike[str], *, limit: float | None = None):
-        """Start the process; limit (s) is otherwise 20 s and a second for each 5 MB of the file.
+        """Start the process; limit (s of a processor) is otherwise 15 s and a second for each 5 MB of the file.
 
         Raises RecordingError where there is no such file or no process can be started.
         """
@@ -36,15 +39,14 @@ class Opening:
         self.limit = LEAST_TIME + self.path.stat().st_size / PACE if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
         asked = {"paths": [p for p in sys.path if os.path.isabs(p)], "file": str(self.path.absolute()), "most": most}
+        asked["seconds"] = math.ceil(self.limit)
         # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
         command = [sys.executable, "-I", "-S", str(READER)]
         # one thread, and no filter of HDF5 from outside its own library
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
         if not sys.executable:  # a program that has Python inside
-            raise RecordingError(
-                f"{self.path}: no process can be started to open it: Python does not know its own path"
-            )
+            raise RecordingError(f"{self.path}: cannot be opened: Python does not know its own path")
         try:
             self.process = subprocess.Popen(command, env=environment, bufsize=0, **pipes)
         except OSError as fault:
@@ -52,7 +54,7 @@ class Opening:
         assert self.process.stdin is not None
         with suppress(BrokenPipeError), self.process.stdin as question:  # if it has ended, `answer` says so
             question.write(json.dumps(asked).encode())
-        self.until = time.monotonic() + self.limit
+        self.until = time.monotonic() + WAIT * self.limit
 
     def __enter__(self) -> "Opening":
         return self
@@ -96,6 +98,9 @@ class Opening:
         raw = xr.Dataset(variables, attrs=_attributes(about["attributes"]))
         return xr.decode_cf(raw)
 
+    def _late(self) -> RecordingError:
+        return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
+
     def _take(self, into: Any) -> Any:
         """Fill a buffer from the pipe, in time."""
         assert self.process.stdout is not None
@@ -103,10 +108,12 @@ class Opening:
         while len(view):
             left = self.until - time.monotonic()
             if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
-                raise RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")
+                raise self._late()
             count = os.readv(pipe, [view[: 1 << 20]])
             if not count:
                 code = self.process.wait(timeout=10.0)
+                if code in (-signal.SIGXCPU, -signal.SIGKILL):
+                    raise self._late()
                 how = f"signal {-code}" if code < 0 else f"status {code}"
                 raise RecordingError(f"{self.path}: is damaged: the process that opened it ended with {how}")
             view = view[count:]

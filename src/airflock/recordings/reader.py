@@ -4,7 +4,8 @@ HDF5 is a large library in C that a damaged file can stop, crash or keep busy fo
 So it works here, on borrowed time and memory, and whoever asked reads plain bytes from a pipe. This file imports
 nothing of Airflock, so that it starts quickly.
 
-Asked on standard input, one JSON object: paths (of modules), file, most (bytes of all arrays).
+Asked on standard input, one JSON object: paths (of modules), file, most (bytes of all arrays), seconds (of
+a processor).
 Answers on standard output: 8 bytes, the length of a JSON object; the object; then the arrays in its order.
 The object holds attributes and variables; of each variable name, dims, attributes, shape, and either dtype (its array
 follows) or strings; or instead of all this the one key fault.
@@ -21,7 +22,7 @@ def main() -> None:
     """Read the question, answer it."""
     asked = json.load(sys.stdin)
     sys.path[:] = asked["paths"]
-    _limit(asked["most"])
+    _limit(asked["most"], asked["seconds"])
     try:
         about, arrays = read(asked["file"], asked["most"])
     except Exception as fault:  # a damaged file may raise anything
@@ -35,11 +36,12 @@ def main() -> None:
     out.flush()
 
 
-def _limit(most: int) -> None:
-    """No core file, no file written, no more memory than the arrays may need."""
+def _limit(most: int, seconds: int) -> None:
+    """No core file, no file written, no more memory than the arrays may need, so many seconds of a processor."""
     import resource
 
-    for kind, value in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_FSIZE, 0), (resource.RLIMIT_AS, 3 * most + SPARE)):
+    limits = ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_FSIZE, 0), (resource.RLIMIT_AS, 3 * most + SPARE))
+    for kind, value in (*limits, (resource.RLIMIT_CPU, seconds)):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
 
