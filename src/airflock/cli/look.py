@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -31,6 +31,14 @@ Begin = Annotated[float | None, typer.Option(help="First instant shown, s.", sho
 End = Annotated[float | None, typer.Option(help="Last instant shown, s.", show_default="the end")]
 
 
+class Asked(NamedTuple):
+    """How a scenario is loaded: keys to change, the caller's own law, consent to code that the file names."""
+
+    changed: dict[str, Any]
+    law: str | None
+    trust: bool
+
+
 def plot(
     what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
     kind: Annotated[Kind, typer.Option(help="What to draw.")] = Kind.TRAJECTORIES,
@@ -39,6 +47,8 @@ def plot(
     begin: Begin = None,
     end: End = None,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
@@ -51,20 +61,21 @@ def plot(
     options.writable((out, PICTURES))
     from airflock.plots.save import save_figure
 
-    save_figure(_figure(what, kind, seed, begin, end, options.settings(changes, agents, duration)), out)
+    asked = Asked(options.settings(changes, agents, duration), law, trust)
+    save_figure(_figure(what, kind, seed, begin, end, asked), out)
     tables.say(f"saved {out}")
 
 
-def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | None, changed: dict[str, Any]) -> Any:
+def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | None, asked: Asked) -> Any:
     if kind is Kind.TRANSFER:
         from airflock.plots.transfer import transfer
 
-        return transfer(_scenario(what, changed))
+        return transfer(_scenario(what, asked))
     if kind is Kind.RULES:
         from airflock.plots.rules import rules
 
-        return rules(_scenario(what, changed))
-    recording = _recording(what, seed, changed)
+        return rules(_scenario(what, asked))
+    recording = _recording(what, seed, asked)
     if kind in (Kind.SCENE, Kind.SPACE):
         from airflock.plots.through import through
 
@@ -90,27 +101,27 @@ def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | 
     return trajectories(recording, start=begin, stop=end)
 
 
-def _scenario(what: str, changed: dict[str, Any]) -> Any:
+def _scenario(what: str, asked: Asked) -> Any:
     if what.lower().endswith(".nc"):
         from airflock.recordings.files import load_recording
         from airflock.recordings.scores import scenario_of
 
-        return scenario_of(load_recording(what), changed)
+        return scenario_of(load_recording(what), asked.changed)
     from airflock.scenarios.files import load
 
-    return load(what, changed)
+    return load(what, asked.changed, asked.law, trust=asked.trust)
 
 
-def _recording(what: str, seed: int, changed: dict[str, Any]) -> Any:
+def _recording(what: str, seed: int, asked: Asked) -> Any:
     if what.lower().endswith(".nc"):
-        if changed:
-            raise AirflockError(f"{what}: is a recording; --set, --agents and --duration need a scenario to fly")
+        if asked.changed or asked.law:
+            raise AirflockError(f"{what}: is a recording; --set, --agents, --duration and --law need a scenario to fly")
         from airflock.recordings.files import load_recording
 
         return load_recording(what)
     from airflock.recordings.flights import simulate
 
-    return simulate(_scenario(what, changed), seed)
+    return simulate(_scenario(what, asked), seed)
 
 
 def video(
@@ -122,6 +133,8 @@ def video(
     fps: Annotated[int, typer.Option(min=1, max=120, help="Pictures per second.")] = 25,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Times real time.")] = 10.0,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
@@ -133,7 +146,7 @@ def video(
     from airflock.plots.video import frame_count
     from airflock.plots.video import video as make_video
 
-    recording = _recording(what, seed, options.settings(changes, agents, duration))
+    recording = _recording(what, seed, Asked(options.settings(changes, agents, duration), law, trust))
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, **choice)

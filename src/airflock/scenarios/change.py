@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from airflock.body.registry import BODIES
 from airflock.errors import ScenarioError
+from airflock.metrics.registry import SETS
 from airflock.scenarios.files import MODELS, make
 from airflock.scenarios.scenario import Scenario
 
@@ -22,7 +24,12 @@ def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     shipped = document.get("model", {}).get("kind") in MODELS
     if not shipped and scenario.descends:
         raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
-    new = make(document, scenario.name, settings, law=None if shipped else scenario.model)
+    own = {
+        name: getattr(scenario, name)
+        for name, section, known in (("measures", "metrics", SETS), ("vehicle", "body", BODIES))
+        if f"{section}.kind" not in settings and document.get(section, {}).get("kind", "") not in ("", *known)
+    }
+    new = make(document, scenario.name, settings, law=None if shipped else scenario.model, **own)
     faults = [
         f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"
         for key, what in LASTING.items()
