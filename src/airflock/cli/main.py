@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep
+from airflock.cli import display, evolve, harden, inspect, keys, look, paper, run, sweep
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -47,6 +47,7 @@ app.command("video")(look.video)
 app.command("display")(display.display)
 app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
+app.command("keys")(keys.keys)
 app.command("validate")(inspect.validate)
 app.command("doctor")(inspect.doctor)
 

@@ -11,7 +11,9 @@ from typing import Any
 
 from airflock.core.contract import Model, model
 from airflock.errors import AirflockError, RuleError, ScenarioError
-from airflock.scenarios import checks, geometry, places, schema, wings
+from airflock.scenarios import checks, geometry, places, schema, short_keys, units, wings
+from airflock.scenarios.advice import advice
+from airflock.scenarios.extends import extended
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
@@ -36,22 +38,12 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
                of the file's, or one by its name or its file; its parameters start from their defaults
     Raises ScenarioError with one line per fault.
     """
-    known = presets()
-    text = str(name)
-    path = known.get(text) or Path(text)
-    where = text if text in known else str(path)
-    if not path.is_file():
-        near = get_close_matches(text, known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
-        raise ScenarioError([f"{text}: no such file or preset{hint}"])
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
-        raise ScenarioError([f"{where}: {fault}"]) from fault
-    if tells_of_study(document) and "model" not in document:
-        raise ScenarioError([f"{where}: is a study, not a scenario; check it with airflock validate, or evolve it"])
+    where = str(name)
+    document, folder = _read(where, None)
+    document, base = extended(document, where, folder, _read)
+    notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
     if law is None:
-        return make(document, where, settings, folder=path.parent)
+        return make(document, where, settings, folder=folder, notes=notes)
     if isinstance(law, (str, os.PathLike)):
         kind = str(Path(law).absolute()) if str(law).endswith(".py") else str(law)
         return make({**document, "model": {"kind": kind}, "published": {}}, where, settings)
@@ -61,6 +53,23 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
         )
     own = law if isinstance(law, Model) else model(law)
     return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own)
+
+
+def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
+    """Document of a preset or of a file, looked for in a folder, and the folder that it lies in."""
+    known = presets()
+    path = known.get(name) or (Path(name) if folder is None else folder / name)
+    if not path.is_file():
+        near = get_close_matches(name, known, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
+        raise ScenarioError([f"{name}: no such file or preset{hint}"])
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
+        raise ScenarioError([f"{name}: {fault}"]) from fault
+    if tells_of_study(document) and not {"model", "extends"} & set(document):
+        raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
+    return document, path.parent
 
 
 def loaded(what: Any) -> Scenario:
@@ -84,9 +93,14 @@ def make(
     *,
     folder: Path | None = None,
     law: Model | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Scenario:
-    """Scenario from a nested dict. `where` names it in faults; `law` is a model given directly instead of by name."""
-    merged, faults = _merged(document, settings or {})
+    """Scenario from a nested dict.
+
+    where : names it in faults; law : a model given directly instead of by name; notes : what is known of it already
+    """
+    short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
+    merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
     found = law
@@ -99,7 +113,14 @@ def make(
         more = wings.descent_faults(found)
         faults += more
         found = found if more else wings.descending(found)
-    parts, more = _parts(merged, table, found)
+    body, more = checks.body_record(merged.get("body", {}), found)
+    faults += more
+    records = ({"model": found.Parameters} if found else {}) | SECTIONS | {"body": body}
+    named, told, more = short_keys.whole_keys(short, records, TOP)
+    faults += more
+    merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
+    faults += more
+    parts, more = _parts(merged, merged.get("model", {}), found, body)
     faults += more + _faults_between(parts, found)
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -109,7 +130,8 @@ def make(
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    return replace(scenario, notes=(*_notes(scenario), *places.place_notes(scenario)))
+    notes = (*notes, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    return replace(scenario, notes=notes)
 
 
 def _beside(scene: Any, folder: Path | None) -> Any:
@@ -145,12 +167,10 @@ def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str
     return {}, [f"model = {table!r} is no table; write model.kind = {table!r}"]
 
 
-def _parts(
-    merged: Mapping[str, Any], table: Mapping[str, Any], found: Model | None
-) -> tuple[dict[str, Any], list[str]]:
+def _parts(merged: Mapping[str, Any], table: Any, found: Model | None, body: type) -> tuple[dict[str, Any], list[str]]:
     """The records of a scenario by section, None where one is faulty; and all their faults."""
     parts: dict[str, Any] = {}
-    body, faults = checks.body_record(merged.get("body", {}), found)
+    faults: list[str] = []
     for section, record in (SECTIONS | {"body": body}).items():
         given = merged.get(section, {})
         if section == "body" and isinstance(given, Mapping):
@@ -160,7 +180,7 @@ def _parts(
     top: dict[str, Any] = {key: merged[key] for key in ("agents", "duration", "dt", "update") if key in merged}
     parts["flight"], more = schema.check("", top, Flight)
     faults += more
-    if found is not None:
+    if found is not None and isinstance(table, Mapping):
         keys = {key: value for key, value in table.items() if key != "kind"}
         parts["parameters"], more = schema.check("model", keys, found.Parameters)
         faults += more
