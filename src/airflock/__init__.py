@@ -1,7 +1,34 @@
 """Airflock: decentralised flocks of drones and birds. The public names below load on first use."""
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getattr__ below loads each on first use
+    from airflock import plots as plots
+    from airflock.core.contract import model as model
+    from airflock.core.parameters import Parameters as Parameters
+    from airflock.core.parameters import choice as choice
+    from airflock.core.parameters import quantity as quantity
+    from airflock.display.displays import display as display
+    from airflock.errors import AirflockError as AirflockError
+    from airflock.evolve.harden import harden as harden
+    from airflock.evolve.run import evolve as evolve
+    from airflock.evolve.validation import validate as validate
+    from airflock.papers.recompute import paper as paper
+    from airflock.plots.picture import plot as plot
+    from airflock.plots.video import video as video
+    from airflock.recordings.files import load_recording as load_recording
+    from airflock.recordings.files import save as save
+    from airflock.recordings.flights import simulate as simulate
+    from airflock.recordings.health import doctor as doctor
+    from airflock.recordings.scores import over_time as over_time
+    from airflock.recordings.scores import score as score
+    from airflock.recordings.sweeps import sweep as sweep
+    from airflock.scenarios.files import load as load
+    from airflock.scenarios.files import presets as presets
+    from airflock.scenarios.keys import keys as keys
+    from airflock.scenarios.scaling import starting_set as starting_set
+    from airflock.scenarios.scenario import Scenario as Scenario
 
 __version__ = "0.1.0"
 
@@ -10,24 +37,39 @@ _WHERE = {
     "Scenario": "airflock.scenarios.scenario",
     "load": "airflock.scenarios.files",
     "presets": "airflock.scenarios.files",
+    "keys": "airflock.scenarios.keys",
+    "starting_set": "airflock.scenarios.scaling",
+    "validate": "airflock.evolve.validation",
     "model": "airflock.core.contract",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",
     "Parameters": "airflock.core.parameters",
     "simulate": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
+    "over_time": "airflock.recordings.scores",
+    "sweep": "airflock.recordings.sweeps",
     "evolve": "airflock.evolve",
+    "harden": "airflock.evolve.harden",
+    "display": "airflock.display",
+    "plot": "airflock.plots.picture",
+    "plots": "airflock.plots",
+    "video": "airflock.plots.video",
     "save": "airflock.recordings.files",
     "load_recording": "airflock.recordings.files",
+    "paper": "airflock.papers.recompute",
+    "doctor": "airflock.recordings.health",
 }
+_MODULES = ("evolve", "display", "plots")  # packages; the first two can be called (docs/decisions/0010)
 __all__ = [*_WHERE, "__version__"]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _WHERE:
-        module = import_module(_WHERE[name])
-        return module if name == "evolve" else getattr(module, name)  # a module that can be called
-    raise AttributeError(f"module 'airflock' has no attribute {name!r}")
+if not TYPE_CHECKING:  # a type checker shall tell names that do not exist
+
+    def __getattr__(name: str) -> Any:
+        if name in _WHERE:
+            module = import_module(_WHERE[name])
+            return module if name in _MODULES else getattr(module, name)
+        raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

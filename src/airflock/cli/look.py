@@ -8,7 +8,6 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.endings import PICTURES, VIDEOS
-from airflock.errors import AirflockError
 
 
 class Kind(StrEnum):
@@ -49,68 +48,12 @@ def plot(
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
     options.writable((out, PICTURES))
+    from airflock.plots.picture import plot as picture
     from airflock.plots.save import save_figure
 
-    save_figure(_figure(what, kind, seed, begin, end, options.settings(changes, agents, duration)), out)
+    settings = options.settings(changes, agents, duration)
+    save_figure(picture(what, kind, seed=seed, start=begin, stop=end, settings=settings), out)
     tables.say(f"saved {out}")
-
-
-def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | None, changed: dict[str, Any]) -> Any:
-    if kind is Kind.TRANSFER:
-        from airflock.plots.transfer import transfer
-
-        return transfer(_scenario(what, changed))
-    if kind is Kind.RULES:
-        from airflock.plots.rules import rules
-
-        return rules(_scenario(what, changed))
-    recording = _recording(what, seed, changed)
-    if kind in (Kind.SCENE, Kind.SPACE):
-        from airflock.plots.through import through
-
-        return through(recording, start=begin, stop=end, space=kind is Kind.SPACE)
-    if kind is Kind.RAYS:
-        from airflock.plots.rays import rays
-
-        return rays(recording, start=begin)
-    if kind is Kind.FLOCKED:
-        from airflock.plots.flocked import flocked
-
-        return flocked(recording, start=begin, stop=end)
-    if kind is Kind.SERIES:
-        from airflock.plots.series import series
-
-        return series(recording, start=begin, stop=end)
-    if kind is Kind.EXPOSURE:
-        from airflock.plots.exposure import exposure
-
-        return exposure(recording, start=begin, stop=end)
-    from airflock.plots.trajectories import trajectories
-
-    return trajectories(recording, start=begin, stop=end)
-
-
-def _scenario(what: str, changed: dict[str, Any]) -> Any:
-    if what.lower().endswith(".nc"):
-        from airflock.recordings.files import load_recording
-        from airflock.recordings.scores import scenario_of
-
-        return scenario_of(load_recording(what), changed)
-    from airflock.scenarios.files import load
-
-    return load(what, changed)
-
-
-def _recording(what: str, seed: int, changed: dict[str, Any]) -> Any:
-    if what.lower().endswith(".nc"):
-        if changed:
-            raise AirflockError(f"{what}: is a recording; --set, --agents and --duration need a scenario to fly")
-        from airflock.recordings.files import load_recording
-
-        return load_recording(what)
-    from airflock.recordings.flights import simulate
-
-    return simulate(_scenario(what, changed), seed)
 
 
 def video(
@@ -130,10 +73,11 @@ def video(
     Example: airflock video vasarhelyi_2018/obstacles --duration 120 --out flight.mp4
     """
     options.writable((out, VIDEOS))
+    from airflock.plots.picture import flight_of
     from airflock.plots.video import frame_count
     from airflock.plots.video import video as make_video
 
-    recording = _recording(what, seed, options.settings(changes, agents, duration))
+    recording = flight_of(what, seed, options.settings(changes, agents, duration))
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, **choice)

@@ -17,9 +17,35 @@ from airflock.recordings.scores import scenario_of
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a recording as .nc: to a temporary name first, then renamed; raises RecordingError and leaves nothing.
+    """Write a recording as netCDF: to a temporary name first, then renamed.
 
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        position (time, space, keypoint, individual) in m, and whatever else there is.
+    path : str or path
+        Ends in .nc.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    RecordingError
+        If it is no recording or cannot be written; then nothing is left behind.
+
+    Notes
+    -----
     The file is made in memory, because the HDF5 library crashes the process when the disk is full.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.save(airflock.simulate(short), "flight.nc").name
+    'flight.nc'
     """
     check(recording, str(path))
     target = Path(path)
@@ -38,7 +64,30 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a recording; raises RecordingError with everything that it lacks."""
+    """Read a recording.
+
+    Parameters
+    ----------
+    path : str or path
+        A netCDF file with position (time, space, keypoint, individual), m, and the time in s.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `airflock.simulate` returns it.
+
+    Raises
+    ------
+    RecordingError
+        With everything that the file lacks.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.load_recording("nowhere.nc")
+    Traceback (most recent call last):
+    airflock.errors.RecordingError: nowhere.nc: no such file
+    """
     source = Path(path)
     if not source.is_file():
         raise RecordingError(f"{source}: no such file")

@@ -25,7 +25,19 @@ TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "t
 
 
 def presets() -> dict[str, Path]:
-    """Name → file of every preset shipped with the package."""
+    """Name and file of every preset that comes with the package.
+
+    Returns
+    -------
+    dict
+        Name such as "vasarhelyi_2018/4ms" → path of its file.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> "vicsek_1995/ordered" in airflock.presets()
+    True
+    """
     root = Path(str(resources.files("airflock"))) / "presets"
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
@@ -33,10 +45,37 @@ def presets() -> dict[str, Path]:
 def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None) -> Scenario:
     """Scenario from a preset's name or a file.
 
-    settings : keys like "model.p_rep" with the values that replace the file's
-    law      : a flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead
-               of the file's, or one by its name or its file; its parameters start from their defaults
-    Raises ScenarioError with one line per fault.
+    Parameters
+    ----------
+    name : str or path
+        A preset's name or a scenario file (TOML).
+    settings : mapping, optional
+        Keys with the values that replace the file's: whole keys such as "model.p_rep", or their last word where only
+        one section has it. A value may carry a unit: {"delay": "400 ms"}. What is read otherwise than it is written
+        stands in the scenario's `notes`.
+    law : optional
+        A flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead of the
+        file's, or one by its name or its file. Its parameters start from their defaults.
+
+    Returns
+    -------
+    Scenario
+        Everything about a flight but the seed, in SI units.
+
+    Raises
+    ------
+    ScenarioError
+        With one line per fault: file, key, value, unit, allowed range, and the nearest right key.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> scenario = airflock.load("vasarhelyi_2018/4ms", {"delay": "400 ms", "agents": 30})
+    >>> scenario.radio.delay, scenario.agents
+    (0.4, 30)
+    >>> airflock.load("vasarhelyi_2018/4ms", {"radio.delay": 60.0})
+    Traceback (most recent call last):
+    airflock.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
     where = str(name)
     document, folder = _read(where, None)
