@@ -21,6 +21,7 @@ range = "150 m"
 
 [world]
 arena = "polygon"
+walls = "every_edge"
 corners = [[-150, -120], [150, -120], [150, 120], [-150, 120]]
 obstacles = [[[-25, -20], [25, -20], [25, 20], [-25, 20]]]
 """)
