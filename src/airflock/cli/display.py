@@ -31,7 +31,8 @@ def display(
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
-    from airflock.display.displays import display as fly
+    from airflock.display.displays import plan
+    from airflock.display.show import fly_show
 
     faults: list[str] = []
     with options.gathering(faults):
@@ -39,10 +40,11 @@ def display(
     settings: dict[str, Any] = {}
     with options.gathering(faults):
         settings = options.settings(changes)
+    found = []
+    with options.gathering(faults):
+        found = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
     options.refuse(faults)
-    show = fly(
-        shapes, drones, failing=failing, failure=failure, points=points, spacing=spacing, seed=seed, settings=settings
-    )
+    show = fly_show(found, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]
     if save is not None:
         from airflock.display.show import recording_of

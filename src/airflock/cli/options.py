@@ -93,10 +93,12 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
 
 
 def compile_aloud(scenario: Any, precision: int, device: str) -> None:
-    """Compile what flies a scenario on the processor before anything flies; say so once it takes over a second."""
-    if device != "cpu":
-        return
+    """Compile what flies a scenario on the processor before anything flies; tell a terminal if it takes over 1 s."""
+    import sys
     from threading import Timer
+
+    if device != "cpu" or not sys.stderr.isatty():
+        return
 
     from airflock.cli.tables import say
     from airflock.engine.simulate import compile_for

@@ -31,6 +31,7 @@ def run(
     from airflock.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound
     from airflock.scenarios.files import load
+    from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
     with options.gathering(faults):
@@ -41,7 +42,7 @@ def run(
     options.refuse(faults)
     for note in found.notes:
         tables.say(f"note: {note}")
-    numbers, flights = list(range(first_seed, first_seed + seeds)), [found] * seeds
+    numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     device = picked(flights, device, precision=precision, say=tables.say)
     options.compile_aloud(found, precision, device)
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:

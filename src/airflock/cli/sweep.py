@@ -45,6 +45,7 @@ def sweep(
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
     from airflock.recordings.sweeps import flown, grid, scenarios_at, shown
+    from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
     with options.gathering(faults):
@@ -66,7 +67,7 @@ def sweep(
     options.refuse(faults)
     for note in dict.fromkeys(note for found in scenarios for note in found.notes):
         tables.say(f"note: {note}")
-    numbers = range(first_seed, first_seed + seeds)
+    numbers = sound_seeds(range(first_seed, first_seed + seeds))
     options.compile_aloud(scenarios[0], precision, device)
     with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}

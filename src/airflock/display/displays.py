@@ -3,6 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from airflock.display.shapes import points_of
 from airflock.display.show import FAILURES, Show, fly_show, scenario_of
 from airflock.errors import AirflockError, ScenarioError
@@ -61,14 +64,31 @@ def display(
     >>> show.formed[0].drones, show.formed[0].collisions
     (4, 0)
     """
+    planned = plan(shapes, drones, failing, failure, points, spacing, settings)
+    return fly_show(planned, drones, failing, failure, seed, dict(settings or {}))
+
+
+def plan(
+    shapes: Sequence[str],
+    drones: int,
+    failing: float,
+    failure: str,
+    points: int | None,
+    spacing: float,
+    settings: Mapping[str, Any] | None,
+    dash: str = "",
+) -> list[NDArray[np.float64]]:
+    """Points (point, 3) of each shape, m; raises ScenarioError with all faults. `dash` goes before names in faults."""
     faults = []
     if not 0.0 <= failing <= 0.9:
-        faults.append(f"failing = {failing:g} lies outside [0, 0.9]")
+        faults.append(f"{dash}failing = {failing:g} lies outside [0, 0.9]")
     if failure not in FAILURES:
-        faults.append(f"failure = {failure!r} is none of {', '.join(FAILURES)}")
+        faults.append(f"{dash}failure = {failure!r} is none of {', '.join(FAILURES)}")
     count = drones if points is None else points
     if drones > count:
-        faults.append(f"drones = {drones} are more than points = {count}; give each drone a point, or fly fewer")
+        faults.append(
+            f"{dash}drones = {drones} are more than {dash}points = {count}; give each drone a point, or fly fewer"
+        )
     try:
         scenario_of(drones, dict(settings or {}))
     except AirflockError as fault:
@@ -81,4 +101,4 @@ def display(
             faults += str(fault).splitlines()
     if faults:
         raise ScenarioError(faults)
-    return fly_show(found, drones, failing, failure, seed, dict(settings or {}))
+    return found
