@@ -24,6 +24,11 @@ PAPERS = {
     "vicsek_1995": "vicsek_1995", "couzin_2002": "couzin_2002", "kidger": "kidger", "dimock_2003": "dimock_2003",
     "formation": "kidger",
 }  # fmt: skip
+PICTURES = {
+    "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
+    "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "kidger": "30_city", "formation": "40_display",
+    "dimock_2003": "51_formation_flight",
+}  # fmt: skip
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -119,7 +124,8 @@ def models() -> None:
         if missing:
             raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
-        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`.\n")
+        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`. ")
+        pieces.append(f"[A picture of it](/generated/gallery/{PICTURES[name]}) is in the gallery.\n")
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():
             code = functions[rule]

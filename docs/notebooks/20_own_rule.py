@@ -104,7 +104,7 @@ class Wrong:
     COMMAND, Parameters, Sums = "velocity", Parameters, Sums
     decide = staticmethod(decide)
 
-    def neighbour(dx, dy, dz, distanse, p):
+    def neighbour(dx, dy, dz, dvxx, p):
         """Never called."""
 
 
