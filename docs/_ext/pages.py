@@ -42,6 +42,7 @@ def write_all() -> None:
     models()
     order_parameters()
     robots()
+    vocabulary()
     keys()
     commands()
     presets()
@@ -233,6 +234,44 @@ def robots() -> None:
                 pieces.append(f"```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(keys_of(name)))
     put("robots.md", "".join(pieces))
+
+
+def vocabulary() -> None:
+    """What each kind of rule may ask for, by name."""
+    from airflock.core.vocabulary import VOCABULARY, Percept
+
+    told = {
+        "reach": "of a model: the largest distance at which a neighbour matters, m",
+        "sight": "of a model: how far `percept.cast` looks, m",
+        "wall_reach": "of a model: the distance beyond which a surface says nothing, m",
+        "neighbour": "of a model: asked for each neighbour that is heard; returns Sums",
+        "boundary": "of a model: asked for each wall and obstacle; returns Walls",
+        "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
+        "decide": "of a model: returns the command, and its Memory where it has one",
+        "move": "of a body: returns the velocity after a step",
+        "pair": "of an order parameter: asked for each pair of agents",
+        "linked": "of an order parameter: whether two agents belong to one cluster",
+        "agent": "of an order parameter: asked for each agent",
+        "member": "of an order parameter: asked for each member of a cluster",
+        "cluster": "of an order parameter: asked for each cluster",
+        "sample": "of an order parameter: the values of one instant",
+        "survey": "of an order parameter: asked once for the whole flock",
+        "within": "of an order parameter: distance beyond which it contributes nothing, m",
+    }
+    wrong = sorted(set(told) ^ set(VOCABULARY))
+    if wrong:
+        raise ExtensionError(f"the page of the vocabulary does not know the rules {', '.join(wrong)}")
+    pieces = [
+        "# What a rule may ask for\n\nA rule is a plain function of floats. Its argument names, in any order, say what it "
+        "wants to know; a flight computes only what is asked for. A difference is always neighbour minus own.\n"
+    ]
+    for kind, names in VOCABULARY.items():
+        rows = ((f"`{name}`", plain(text)) for name, text in names.items())
+        pieces.append(f"\n## {kind}\n\nA rule {told[kind]}.\n\n{table(('name', 'what it is'), rows)}")
+    pieces.append("\n## percept\n\nWhat `decide` may call of its percept.\n\n")
+    methods = (getattr(Percept, name) for name in ("ray", "cast", "normal", "uniform"))
+    rows = ((f"`percept.{m.__name__}`", plain(" ".join((m.__doc__ or "").split()))) for m in methods)
+    put("vocabulary.md", "".join(pieces) + table(("call", "what it gives"), rows))
 
 
 def keys() -> None:
