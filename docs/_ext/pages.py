@@ -1,23 +1,20 @@
-"""Pages made from the code: models, order parameters, keys, commands, presets; and the Markdown of the repository.
+"""Pages made from the code: models, order parameters, robots, rules, keys, commands, presets.
 
 All are written to docs/generated when a build begins; a page is only touched when its text changes.
 """
 
 import ast
 import re
-import shutil
 import tomllib
 from collections.abc import Iterable
 from inspect import getsource
-from pathlib import Path
 from typing import Any
 
+from repository import repository
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
+from writing import DOCS, ROOT, key_table, plain, prose, put, table
 
-DOCS = Path(__file__).parents[1]
-ROOT = DOCS.parent
-OUT = DOCS / "generated"
 RULES = ("neighbour", "boundary", "flock", "decide")
 PAPERS = {
     "vasarhelyi_2018": "vasarhelyi_2018", "viragh_2014": "vasarhelyi_2018", "reynolds_1987": "zapotecatl_2016",
@@ -47,54 +44,6 @@ def write_all() -> None:
     commands()
     presets()
     repository()
-
-
-def put(name: str, text: str) -> None:
-    """Write a page, unless it is there with the same text."""
-    path = OUT / name
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        path.write_text(text, encoding="utf-8")
-
-
-def table(heads: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(heads) + " |"]
-    lines.append("|" + "---|" * lines[0].count(" | ") + "---|")
-    for row in rows:
-        lines.append("| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in row) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def key_table(found: Iterable[Any]) -> str:
-    """Keys with default, range, meaning and source."""
-    return table(
-        ("key", "default", "allowed", "meaning", "source"),
-        ((f"`{key.name}`", key.standard, key.allowed, plain(key.meaning), plain(key.source)) for key in found),
-    )
-
-
-def plain(text: str) -> str:
-    """Text of a docstring that Markdown must not read as markup."""
-    return re.sub(r"([*<>$])", r"\\\1", text)
-
-
-def prose(text: str) -> str:
-    """A docstring as Markdown: its lists stay lists, its underlined heads become heads of level 3."""
-    lines = text.strip().splitlines()
-    result: list[str] = []
-    for line, below in zip(lines, [*lines[1:], ""], strict=True):
-        if re.fullmatch(r"-{3,}", line.strip()):
-            continue
-        if re.fullmatch(r"-{3,}", below.strip()):
-            result += ["", f"## {line.strip()}", ""]
-            continue
-        bullet = line.lstrip().startswith("* ")
-        body = plain(line.lstrip()[2:]) if bullet else plain(line)
-        if bullet and result and result[-1] and not result[-1].lstrip().startswith("* ") and result[-1][0] != " ":
-            result.append("")
-        result.append(f"* {body}" if bullet else body)
-    return "\n".join(result)
 
 
 def equations(name: str) -> dict[str, str]:
@@ -262,8 +211,8 @@ def vocabulary() -> None:
     if wrong:
         raise ExtensionError(f"the page of the vocabulary does not know the rules {', '.join(wrong)}")
     pieces = [
-        "# What a rule may ask for\n\nA rule is a plain function of floats. Its argument names, in any order, say what it "
-        "wants to know; a flight computes only what is asked for. A difference is always neighbour minus own.\n"
+        "# What a rule may ask for\n\nA rule is a plain function of floats. Its argument names, in any order, say what "
+        "it wants to know; a flight computes only what is asked for. A difference is always neighbour minus own.\n"
     ]
     for kind, names in VOCABULARY.items():
         rows = ((f"`{name}`", plain(text)) for name, text in names.items())
@@ -342,69 +291,3 @@ def presets() -> None:
     text = "# Presets\n\nFly one with `airflock run NAME`, see its file with `airflock presets NAME`, "
     text += 'begin your own from it with `extends = "NAME"`.\n\n'
     put("presets.md", text + table(("name", "what it is", "size"), rows))
-
-
-def repository() -> None:
-    """Papers' reports, decisions and other Markdown of the repository, with links that hold within the site."""
-    for name in ("ARCHITECTURE", "CONTRIBUTING", "CHANGELOG"):
-        copy(ROOT / f"{name}.md", f"project/{name.lower()}.md")
-    copy(DOCS / "evolve.md", "evolve.md")
-    decisions = sorted((DOCS / "decisions").glob("*.md"))
-    for path in decisions:
-        copy(path, f"project/decisions/{path.name}")
-    listed = "\n".join(path.stem for path in decisions)
-    head = "# Decisions\n\nWhat was weighed and why it was decided so.\n\n"
-    put("project/decisions/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
-    papers = sorted(path for path in (ROOT / "papers").iterdir() if (path / "README.md").is_file())
-    for folder in papers:
-        extra = [path for path in sorted(folder.glob("*.md")) if path.name != "README.md"]
-        tree = "\n".join(path.stem.lower() for path in extra)
-        after = f"\n\n```{{toctree}}\n:maxdepth: 1\n\n{tree}\n```\n" if extra else ""
-        copy(folder / "README.md", f"papers/{folder.name}/index.md", after)
-        for path in extra:
-            copy(path, f"papers/{folder.name}/{path.stem.lower()}.md")
-    listed = "\n".join(f"{path.name}/index" for path in papers)
-    head = (
-        "# Papers\n\nEvery publication that is recomputed: each number that was compared, what was flown for it, and "
-        "whether it was met. `airflock paper NAME` flies it again.\n\n"
-    )
-    put("papers/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
-
-
-def copy(source: Path, name: str, after: str = "") -> None:
-    """A Markdown file of the repository: pictures come along, links to files that are no pages become their names."""
-    target = OUT / name
-
-    def link(match: re.Match[str]) -> str:
-        bang, text, where = match[1], match[2], match[3]
-        path, _, anchor = where.partition("#")
-        if where.startswith(("http://", "https://", "#")):
-            return match[0] if not where.startswith("#") else text
-        file = (source.parent / path).resolve()
-        if bang and file.is_file():
-            picture = target.parent / "pictures" / file.name
-            picture.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, picture)
-            return f"![{text}](pictures/{file.name})"
-        page = _page_of(file)
-        if page is not None:
-            return f"[{text}](/generated/{page})"
-        return f"{text} (`{path}`)" if path.strip("./") != text.strip("`") else text
-
-    text = source.read_text(encoding="utf-8")
-    put(name, re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, text) + after)
-
-
-def _page_of(file: Path) -> str | None:
-    """The generated page of a file of the repository; None if it has none."""
-    if not file.is_relative_to(ROOT):
-        return None
-    parts = file.relative_to(ROOT).parts
-    if parts[0] == "papers" and len(parts) in (2, 3) and (len(parts) == 2 or file.suffix == ".md"):
-        rest = "index" if len(parts) == 2 or parts[2] == "README.md" else file.stem.lower()
-        return f"papers/{parts[1]}/{rest}.md"
-    if parts[:2] == ("docs", "decisions"):
-        return f"project/decisions/{parts[2] if len(parts) == 3 else 'index.md'}"
-    if parts[-1] in ("ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md") and len(parts) == 1:
-        return f"project/{parts[-1].lower()}"
-    return "evolve.md" if parts == ("docs", "evolve.md") else None
