@@ -1,4 +1,4 @@
-"""The Markdown of the repository as pages: papers' reports, decisions, ARCHITECTURE, with links that hold in the site."""
+"""The Markdown of the repository as pages: reports on papers, decisions, ARCHITECTURE, with links that hold here."""
 
 import re
 import shutil

@@ -85,13 +85,13 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
         return make(document, where, settings, folder=folder, notes=notes)
     if isinstance(law, (str, os.PathLike)):
         kind = str(Path(law).absolute()) if str(law).endswith(".py") else str(law)
-        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings)
+        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings, notes=notes)
     if not isinstance(law, (Model, Mapping)) and not hasattr(law, "__dict__"):
         raise ScenarioError(
             [f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
         )
     own = law if isinstance(law, Model) else model(law)
-    return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own)
+    return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own, notes=notes)
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
