@@ -14,7 +14,7 @@ scenario = airflock.load("dimock_2003/physical", {"agents": 7, "duration": 30.0}
 recording = airflock.simulate(scenario, seed=2)
 half = 0.5 * scenario.wing.span
 
-figure = Figure(figsize=(8, 4), layout="constrained")
+figure = Figure(figsize=(6, 5), layout="constrained")
 for axes, instant in zip(figure.subplots(1, 2, sharex=True, sharey=True), (0, -1), strict=True):
     at = recording.isel(time=instant, keypoint=0)
     x, y = at.position.values[:2]

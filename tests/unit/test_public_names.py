@@ -99,3 +99,21 @@ def test_a_sweep_of_one_point_is_a_score():
     swept = airflock.sweep(short, {"radio.delay": [0.4]}, seeds=2)
     scored = airflock.score(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0, "delay": 0.4}), 2)
     assert swept["phi_vel"].tolist() == scored["phi_vel"].tolist()
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_help_of_every_command_shows_a_call_of_it(name):
+    assert f"Example: airflock {name}" in COMMANDS[name].help
+
+
+def test_keys_are_printed_for_people_and_for_machines():
+    from json import loads
+
+    from typer.testing import CliRunner
+
+    run = CliRunner().invoke
+    (key,) = loads(run(app, ["keys", "delay", "--json"]).stdout)
+    assert key["name"] == "radio.delay" and key["unit"] == "s" and (key["low"], key["high"]) == (0.0, 30.0)
+    text = run(app, ["keys", "radio"]).stdout
+    assert "radio.delay" in text and "age of neighbours' data on arrival" in text and "[0 … 30 s]" in text
+    assert "radio" in run(app, ["keys"]).stdout
