@@ -88,6 +88,11 @@ def test_a_last_word_of_several_sections_or_none_is_refused(key, fault):
         load(NAME, {key: 1.0})
 
 
+def test_a_key_may_not_be_given_whole_and_by_its_last_word():
+    with pytest.raises(ScenarioError, match="radio.delay is given twice"):
+        load(NAME, {"radio.delay": 1.0, "delay": 0.4})
+
+
 def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path):
     fast = load(written(tmp_path, '[model]\nkind = "vasarhelyi_2018"\nv_flock = 6.0\n'))
     assert any("other 12 numbers of vasarhelyi_2018 are its set for 4 m/s" in note for note in fast.notes)

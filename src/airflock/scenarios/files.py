@@ -156,7 +156,7 @@ def make(
     faults += more
     records = ({"model": found.Parameters} if found else {}) | SECTIONS | {"body": body}
     named, told, more = short_keys.whole_keys(short, records, TOP)
-    faults += more
+    faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, body)
