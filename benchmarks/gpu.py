@@ -67,7 +67,7 @@ QUICK = Sizes(duration=60.0, saturated=1000, generations=15, flights=100, boids=
 def ours(scenario: Any, flocks: int, per_agent: int) -> Callable[[], Any]:
     """A function that flies this many flocks with the generated kernel; memory is there already."""
     cuda = device.runtime()
-    plan = replace(plan_of(scenario), grid=False)
+    plan = plan_of(scenario, grid=False)
     shape = layout_of(plan, scenario.agents, flocks, device.multiprocessors())
     shape = replace(shape, per_agent=per_agent, threads=shape.threads // shape.per_agent * per_agent)
     driver = launch.flight_driver(plan, shape)
@@ -149,7 +149,7 @@ def agreement(scenario: Any, flocks: int) -> dict[str, Any]:
 
 def apart(scenario: Any) -> dict[str, float]:
     """Largest difference of any position (m) or velocity (m/s) of CPU and GPU in double precision, three seeds."""
-    plan = replace(plan_of(scenario, precision=64, record=True), grid=False)
+    plan = plan_of(scenario, precision=64, record=True, grid=False)
     jobs = [tables(scenario, plan, seed) for seed in (1, 2, 3)]
     pairs = zip([cpu.fly(plan, job) for job in jobs], launch.fly_many(plan, jobs), strict=True)
     return {

@@ -13,11 +13,12 @@ COMMAND = "velocity"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(airflock.Parameters):
-    """Two gains, a range and a speed."""
+    """Two gains, two ranges and a speed."""
 
     speed: float = airflock.quantity(4.0, "m/s", low=0.1, high=30.0, meaning="preferred speed")
     spacing: float = airflock.quantity(15.0, "m", low=1.0, high=100.0, meaning="neighbours nearer than this repel")
     push: float = airflock.quantity(0.2, "1/s", low=0.0, high=5.0, meaning="repulsion gain")
+    margin: float = airflock.quantity(20.0, "m", low=0.1, high=100.0, meaning="walls nearer than this push")
     align: float = airflock.quantity(0.02, "1", low=0.0, high=1.0, meaning="alignment gain")
 
 
@@ -44,8 +45,8 @@ def neighbour(dx, dy, dz, r, dvx, dvy, dvz, p):
 
 
 def boundary(distance, nx, ny, nz, p):
-    """Push inwards within 20 m of a wall."""
-    k = p.speed * max(1.0 - distance / 20.0, 0.0)
+    """Push inwards near a wall."""
+    k = p.speed * max(1.0 - distance / p.margin, 0.0)
     return Walls(k * nx, k * ny, k * nz)
 
 

@@ -1,4 +1,4 @@
-"""Scenarios that several tests fly. Few distinct plans, because compiling one takes ten seconds."""
+"""Scenarios that several tests fly. Interpreted, but for tests of compiling: to compile a plan takes ten seconds."""
 
 from dataclasses import replace
 
@@ -32,16 +32,19 @@ def flown(found, seed=0, start=None, precision=64):
     return fly(found, seed, precision=precision, record=True, start=start)
 
 
-def from_start(found, *agents, precision=64):
-    """Compiled flight from given (x, y, vx, vy) or (x, y, z, vx, vy, vz) of each agent."""
-    return flown(
-        replace(found, flight=replace(found.flight, agents=float(len(agents)))), 0, np.array(agents).T, precision
-    )
+def interpreted(found, seed=0, start=None):
+    """The same flight by the same driver text, not compiled: for whatever is no question of compiling."""
+    return fly(found, seed, precision=64, record=True, start=start, device="python")
+
+
+def from_start(found, *agents):
+    """Interpreted flight from given (x, y, vx, vy) or (x, y, z, vx, vy, vz) of each agent."""
+    return interpreted(replace(found, flight=replace(found.flight, agents=float(len(agents)))), 0, np.array(agents).T)
 
 
 def measured(found, frames):
-    """Order parameters of frames (time, component, agent), by the compiled driver that scores recordings."""
+    """Order parameters of frames (time, component, agent), by the driver that scores recordings, interpreted."""
     frames = np.asarray(frames, float)
     every = replace(found, flight=replace(found.flight, agents=float(frames.shape[2])))
-    plan = plan_of(every, precision=64)
-    return cpu.measure_frames(plan, tables(every, plan, 0), frames)[0]
+    plan = plan_of(every, precision=64, grid=False)
+    return cpu.measure_frames(plan, tables(every, plan, 0), frames, device="python")[0]

@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
-from airflock.papers.claims import print_claims, write_page
+from airflock.papers import page
+from airflock.papers.claims import print_claims
 from airflock.papers.couzin_2002 import PAPER
+
+ABOUT = "The paper's text is not at hand: nothing is quoted, and nothing counts as a sentence of the paper."
 
 if __name__ == "__main__":
     claims = PAPER.run()
-    write_page(Path(__file__).parent, PAPER.title, "airflock paper couzin_2002", claims)
+    page.write(Path(__file__).parent, PAPER.title, "airflock paper couzin_2002", claims, (), ABOUT)
     print_claims(claims)

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from airflock.papers.claims import print_claims, write_page
+from airflock.papers import page
+from airflock.papers.claims import print_claims
 from airflock.papers.zapotecatl_2016 import PAPER
+
+TITLE = "Boids evolved for the quality of Zapotecatl et al. 2016"
 
 if __name__ == "__main__":
     found = PAPER.run(only="evolved")
-    title, command = (
-        "Boids evolved for the quality of Zapotecatl et al. 2016",
-        "airflock paper zapotecatl_2016 --only evolved",
-    )
-    write_page(Path(__file__).parent, title, command, found, ("evolved", "EVOLVED"), "study 0; paired flights 0 to 99")
+    command, told = "airflock paper zapotecatl_2016 --only evolved", "study 0; paired flights 0 to 99"
+    page.write(Path(__file__).parent, TITLE, command, found, (), told=told, names=("evolved.toml", "EVOLVED.md"))
     print_claims(found)

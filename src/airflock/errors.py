@@ -49,3 +49,15 @@ class DeviceError(AirflockError):
 
 class StudyError(AirflockError):
     """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""
+
+
+class LinkError(AirflockError):
+    """A link cannot be used: a library, a key file or a port is missing, or what shall be sent does not fit a frame."""
+
+
+class CardError(AirflockError):
+    """A flight card cannot be flown: carries every fault that was found, one line each."""
+
+    def __init__(self, faults: list[str]):
+        self.faults = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in fault) for fault in faults]
+        super().__init__("\n".join(self.faults))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly
 from airflock.scenarios.files import load
+from reference.flight import fly_plainly
 
 FLIGHTS = {
     "boids in turn": ("zapotecatl_2016/best", {

@@ -6,9 +6,10 @@ import pytest
 from airflock.scenes.tree import boxes, cylinders, scene, triangles
 from airflock.world import bvh
 from kernels import compiled
+from needed import needed
 
-trimesh = pytest.importorskip("trimesh")
-pytest.importorskip("embreex")
+trimesh = needed("trimesh")
+needed("embreex")
 
 RAYS = 100_000
 LENGTH = 400.0  # m

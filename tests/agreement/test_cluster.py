@@ -16,8 +16,9 @@ from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import run
 from airflock.evolve.store import Store
+from needed import needed
 
-distributed = pytest.importorskip("distributed")
+distributed = needed("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")
 TABLES = (
     "SELECT * FROM candidate",

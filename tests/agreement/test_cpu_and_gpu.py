@@ -19,7 +19,7 @@ def both(found, seeds, precision=64, **layout):
     """Flights of the CPU and of the GPU."""
     from airflock.engine.cuda.launch import fly_many, layout_of
 
-    plan = replace(plan_of(found, precision=precision, record=True), grid=False)
+    plan = plan_of(found, precision=precision, record=True, grid=False)
     jobs = [tables(found, plan, seed) for seed in seeds]
     shape = replace(layout_of(plan, found.agents, len(jobs)), **layout) if layout else None
     return [cpu.fly(plan, job) for job in jobs], fly_many(plan, jobs, shape=shape)

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+from needed import needed
+
+needed("numba_cuda")
 
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
-    "paper", "split", "storm", "polygon", "silo", "links", "table", "couzin", "vicsek", "groups", "together", "city",
-    "herd", "stop", "display", "wings", "vee", "echelon",
+    "paper", "split", "storm", "polygon", "silo", "links", "torus", "table", "couzin", "vicsek", "groups", "together",
+    "city", "herd", "stop", "display", "wings", "vee", "echelon",
 )  # fmt: skip
 
 

@@ -10,12 +10,12 @@ from airflock.aero import descent
 from airflock.core.composition import added
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters as Record
-from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly
 from airflock.errors import RuleError, ScenarioError
 from airflock.models import reynolds_1987, vasarhelyi_2018
 from airflock.scenarios.files import load
 from airflock.scenarios.wings import DESCENT
+from reference.flight import fly_plainly
 
 SMALL = {"agents": 4, "duration": 1.0, "metrics.kind": "order", "wing.segments": "5", "start.jitter": 0.1}
 PRESET = "vasarhelyi_2018/fixed_wing"

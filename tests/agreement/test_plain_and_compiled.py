@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from airflock.engine import cpu
-from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import plan_of
 from airflock.engine.tables import tables
 from flocks import IDEAL, ISLANDS, PENTAGON, flown, scenario
+from reference.flight import fly_plainly
 
 COMMON = {"duration": 10.0, "world.side": 90.0, "world.height": 50.0, "world.radius": 48.0, "start.separation": 5.0}
 FLIGHTS = {

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from airflock.engine import cpu
-from airflock.engine.plain import fly_plainly
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
-from flocks import flown, scenario
+from flocks import flown, interpreted, scenario
 
 PAPER = {
     "agents": 30, "duration": 20.0, "world__side": 120.0, "world__walls": "nearest_per_axis", "start__separation": 6.0,
@@ -59,14 +58,15 @@ SMALL = {"agents": 5, "duration": 3.0, "world__side": 60.0}
     ],
 )
 def test_a_new_source_of_noise_shifts_no_other(settings, seed):
-    plain, more = fly_plainly(scenario(**SMALL), seed), fly_plainly(scenario(**SMALL, **settings), seed)
+    """By the text of the drivers, of which each has the lines for its own noise only."""
+    plain, more = interpreted(scenario(**SMALL), seed), interpreted(scenario(**SMALL, **settings), seed)
     np.testing.assert_array_equal(plain.frames, more.frames)
 
 
 def test_agents_keep_their_noise_when_others_join(seed):
     """Far apart, deaf and blown only by noise of their own, the first agents fly the same in a larger flock."""
     keys = {"duration": 3.0, "world__side": 1e5, "radio__range": 1.0}
-    three, five = (fly_plainly(scenario(**keys, agents=n), seed).frames for n in (3, 5))
+    three, five = (interpreted(scenario(**keys, agents=n), seed).frames for n in (3, 5))
     np.testing.assert_array_equal(three, five[:, :, :3])
 
 

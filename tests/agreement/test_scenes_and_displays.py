@@ -9,12 +9,12 @@ from scipy.spatial.distance import pdist
 from airflock.display import fly_show, points_of
 from airflock.display.assignment import assign
 from airflock.display.show import ranks, recording_of, scenario_of
-from airflock.engine.plain import fly_plainly
 from airflock.recordings.flights import simulate
 from airflock.recordings.layout import check
 from airflock.recordings.scores import scenario_of as of_recording
 from airflock.scenarios.files import load
 from flocks import flown
+from reference.flight import fly_plainly
 
 CITY = {
     "agents": 3, "duration": 1.2, "model.rays": 60, "model.r_ray": 12.0, "start.side": 40.0, "start.clearance": 0.5,

@@ -3,7 +3,6 @@
 import json
 import sys
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airflock.engine.cuda.crowd import Crowd, cells_of, fly_crowd  # noqa: E402
-from airflock.engine.plain import fly_plainly  # noqa: E402
 from airflock.engine.simulate import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
+from reference.flight import fly_plainly  # noqa: E402
 
 COMMON = {"update": "synchronous", "metrics.kind": "order", "start.kind": "arena", "start.separation": 0.0,
           "start.speed": 0.2, "dt": 0.05, "duration": 0.3, "metrics.period": 0.15, "agents": 20}  # fmt: skip
@@ -36,7 +35,7 @@ def differ(name, seed):
     """Largest differences of a case."""
     kind, keys = CASES[name]
     found = load(kind, COMMON | keys)
-    plan = replace(plan_of(found, precision=64, record=True), grid=True)
+    plan = plan_of(found, precision=64, record=True).built(grid=True)
     known, flown = fly_plainly(found, seed), fly_crowd(found, plan, seed)
     flock, other = Crowd(found, plan, seed), Crowd(found, plan, seed)
     for each in (flock, other) if name in ("periodic", "plane") else ():

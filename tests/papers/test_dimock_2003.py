@@ -50,12 +50,12 @@ def test_one_horseshoe_rewards_a_row_without_bound():
 
 def test_fitness_forgets_no_collision_and_grades_closeness():
     calm = {"power": 20.0, "power_solo": 45.0, "n_coll": 0.0, "crowding": 0.0, "unrest": 0.0, "stable": 1.0}
-    assert fitness_dimock.fitness(calm)["fitness"] == -20.0
-    assert fitness_dimock.fitness(calm | {"n_coll": 1.0})["fitness"] == -1000.0
-    assert fitness_dimock.fitness(calm, "sound")["fitness"] == -20.0
+    assert fitness_dimock.of_paper(calm) == -20.0
+    assert fitness_dimock.of_paper(calm | {"n_coll": 1.0}) == -1000.0
+    assert fitness_dimock.sound(calm) == -20.0
     worse = ({"n_coll": 1.0}, {"crowding": 0.1}, {"unrest": 0.3}, {"stable": 0.0}, {"unrest": math.nan})
-    assert all(fitness_dimock.fitness(calm | change, "sound")["fitness"] < -25.0 for change in worse)
-    closer = [fitness_dimock.fitness(calm | {"crowding": c}, "sound")["fitness"] for c in (0.0, 0.1, 0.2)]
+    assert all(fitness_dimock.sound(calm | change) < -25.0 for change in worse)
+    closer = [fitness_dimock.sound(calm | {"crowding": c}) for c in (0.0, 0.1, 0.2)]
     assert closer == sorted(closer, reverse=True)
 
 

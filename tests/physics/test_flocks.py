@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from airflock.engine.plain import fly_plainly
 from airflock.scenarios.files import load
-from flocks import PENTAGON, SILENT, flown, from_start, ideal, scenario
+from flocks import PENTAGON, SILENT, from_start, ideal, interpreted, scenario
 
 OPEN = {"world__side": 1e4, "world__height": 1e4}
 
@@ -77,7 +76,7 @@ def test_the_nearest_wall_of_each_axis_is_enough_up_to_16_m_s(speed, duration, s
         found = load(name, {"agents": 5, "duration": duration, "world.walls": walls})
         corner = 0.5 * found.world.side - 10.0
         start = crowd(seed, 5, 2).T + np.array([[corner], [0.8 * -corner], [1.0], [-1.0]])
-        flights[walls] = fly_plainly(found, seed, start).frames
+        flights[walls] = interpreted(found, seed, start).frames
     every, nearest = flights.values()
     assert np.abs(np.diff(np.sign(every[:, 2]), axis=0)).sum() > 0.0  # somebody turned
     np.testing.assert_allclose(every, nearest, atol=1e-9)
@@ -105,15 +104,13 @@ def test_walls_of_a_box_hold(seed):
 
 
 def test_the_wall_of_a_circle_holds(seed):
-    frames = flown(scenario(**WALLED, world__arena="circle", world__radius=50.0, radio__delay=0.0), seed).frames
+    frames = interpreted(scenario(**WALLED, world__arena="circle", world__radius=50.0, radio__delay=0.0), seed).frames
     assert np.hypot(frames[:, 0], frames[:, 1]).max() < 50.0 + MARGIN
 
 
 def test_walls_of_a_polygon_hold(seed):
-    """With the plan of the links test, of which nothing is left: no loss, perfect links, no wind to speak of."""
-    perfect = {"radio__kind": "links", "radio__near": 1e6, "radio__received_near": 1.0, "radio__loss": 1e-12}
-    found = scenario(**WALLED, **perfect, world__arena="polygon", world__corners=PENTAGON, wind__east=1e-9)
-    assert flown(found, seed).values["phi_wall"] < MARGIN
+    found = scenario(**WALLED, world__arena="polygon", world__corners=PENTAGON)
+    assert interpreted(found, seed).values["phi_wall"] < MARGIN
 
 
 @pytest.mark.parametrize("dims", [2, 3])

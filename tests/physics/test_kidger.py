@@ -15,6 +15,7 @@ from airflock.engine.simulate import score_flights
 from airflock.metrics import fitness_kidger
 from airflock.models import kidger
 from airflock.world import goals
+from needed import needed
 
 EMPTY = kidger.Tally(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 QUIET = kidger.Sums(*[0.0] * 11)
@@ -160,7 +161,7 @@ def mean(rows, name):
 
 
 def test_boids_stay_out_of_city_forest_and_mesh(tmp_path):
-    trimesh = pytest.importorskip("trimesh")
+    trimesh = needed("trimesh")
     bodies = [trimesh.creation.icosphere(subdivisions=2, radius=14.0) for _ in range(5)]
     for number, body in enumerate(bodies):
         body.apply_translation([60.0 * math.cos(number * 1.2566), 60.0 * math.sin(number * 1.2566), 12.0])

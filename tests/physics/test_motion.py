@@ -7,11 +7,11 @@ import pytest
 
 from airflock.body import jostled, motion, sensors, wind
 from airflock.core import random
-from airflock.engine.plain_start import begin
-from airflock.engine.plain_world import Place
+from airflock.engine.place import Place
 from airflock.scenarios.files import load
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
+from reference.begin import begin
 
 
 def error_statistics(h, **settings):

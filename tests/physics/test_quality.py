@@ -18,9 +18,10 @@ def measured(positions, headings, **settings):
     positions, headings = np.asarray(positions, float), np.asarray(headings, float)
     keys = {"metrics.kind": "groups", "metrics.r_cluster": 0.5, "agents": len(positions), **settings}
     found = load("zapotecatl_2016/literal", keys)
-    plan = plan_of(found, precision=64)
+    plan = plan_of(found, precision=64, grid=False)
     frames = np.concatenate([positions.T, headings.T])[None]
-    return measure_frames(plan, tables(found, plan, 0), frames)[0]
+    device = "python" if len(positions) <= 40 else "cpu"  # interpreted, but for large flocks
+    return measure_frames(plan, tables(found, plan, 0), frames, device=device)[0]
 
 
 def lattice(side=3, step=0.2):

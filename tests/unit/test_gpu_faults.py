@@ -13,8 +13,9 @@ from airflock.errors import DeviceError
 from airflock.scenarios.files import load
 from flocks import scenario
 from gpus import runtime
+from needed import needed
 
-pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+needed("numba_cuda")
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from airflock.core.contract import model
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.engine import law
 from airflock.errors import RuleError
-from airflock.metrics.registry import COUNTS, SETS
+from airflock.metrics.registry import METRICS
 from airflock.scenarios.files import MODELS
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
@@ -59,8 +59,41 @@ def walrus(dx):
     return (far := dx * dx) + far
 
 
+def named_like_indices(k, n, e, m, row, word, p):
+    return 2 * k + (n - 1) / 3 + e * 2 + (m + 1) * row - 1 + 2 * word
+
+
+def element(table, k):
+    return table[k][0]
+
+
+def halved(m):
+    return (m + 1) // 2
+
+
+def indices(x, work, first, last, size, p):
+    total = 0.0
+    at = 0
+    other = at + 3
+    for k in range(size - 1):
+        total += x[2 * k + 1] + element(work, first - 1) * float(3 * other - 1) + float(k + 1)
+    for e in range(first + 1, 2 * last):
+        total += float(halved(4 * e) - 1)
+    return total
+
+
 def test_a_lawful_rule_passes():
     assert law.faults(lawful) == []
+
+
+def test_a_float_is_a_float_whatever_its_name():
+    """A name that is used as no index makes of an integer beside it a double in a kernel of single precision."""
+    said = law.faults(named_like_indices)
+    assert [line.partition("integer ")[2].split()[0] for line in sorted(said)] == ["1", "1", "1", "2", "2", "2", "3"]
+
+
+def test_what_counts_or_points_is_an_integer_whatever_its_name():
+    assert law.faults(indices) == law.faults(halved) == []
 
 
 @pytest.mark.parametrize(
@@ -97,7 +130,7 @@ def test_every_shipped_model_is_lawful(name):
 def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
         assert law.faults(body.move) == []
-    for metric in {metric for found in (*SETS.values(), COUNTS.values()) for metric in found}:
+    for metric in METRICS.values():
         for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
             if getattr(metric, kind) is not None:
                 assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)

@@ -7,8 +7,9 @@ import pytest
 
 from airflock.engine.simulate import plan_of
 from airflock.scenarios.files import load, presets
+from needed import needed
 
-pytest.importorskip("numba_cuda", reason="needs numba-cuda: pip install 'airflock[cuda]'")
+needed("numba_cuda")
 
 CAPABILITIES = ((8, 0), (9, 0))
 # One preset per publication: the others differ in numbers or in which perturbations are on. Threads of one of them.
@@ -29,7 +30,7 @@ def driver_of(name, bits=32, **layout):
 
     found = load(name)
     plan = plan_of(found, precision=bits)
-    plan = replace(plan, grid=False, meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
+    plan = replace(plan.built(grid=False), meshed=plan.scene)  # as if the buildings came from a mesh: more of the rules
     return flight_driver(plan, replace(layout_of(plan, found.agents, 1000), **layout)), plan
 
 

@@ -12,8 +12,9 @@ from airflock.errors import AirflockError, FlightError, ScenarioError
 from airflock.scenes import meshes
 from airflock.scenes.build import in_mesh, scene_of
 from airflock.world.scenery import Parameters
+from needed import needed
 
-trimesh = pytest.importorskip("trimesh")
+trimesh = needed("trimesh")
 
 
 @pytest.fixture

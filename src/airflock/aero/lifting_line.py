@@ -36,7 +36,10 @@ class Work(NamedTuple):
     slopes      : (3 n n, m + w) derivatives of the tables; mirror : (n n, m + w) the tables backwards
     adjoint     : (n, w) sensitivity of one wing's drag to all washes; source : (n, w) its own part
     dense       : (n m, n m) factors; pivots, column : (1, n m); touched only where sweeps do not settle
+    WITHIN      : what is written before it is read in each call; the rest is carried from call to call
     """
+
+    WITHIN = ("dense", "pivots", "column")  # type: ignore[misc]
 
     place: object
     alone: object

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from airflock.core.maths import norm, shorten
+from airflock.core.maths import shorten
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
 
@@ -45,9 +45,3 @@ def move(vx, vy, vz, mx, my, mz, cx, cy, cz, gx, gy, gz, wx, wy, wz, dt, b):
         vy + ay * dt + k * gy + b.drag * wy * dt,
         vz + az * dt + k * gz + b.drag * wz * dt,
     )
-
-
-def heading_of(vx, vy, vz):
-    """Unit vector of a velocity (m/s); zero at rest."""
-    k = 1.0 / norm(vx, vy, vz)
-    return k * vx, k * vy, k * vz

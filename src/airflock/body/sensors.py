@@ -24,7 +24,7 @@ class Parameters(Record):
     )
     damping: float = quantity(0.1, "1/s", low=0.001, high=10.0, source=PROGRAM, meaning="damping of the error's swing")
     scale: float = quantity(
-        3.0, "m", low=0.01, high=1000.0, source=PROGRAM, meaning="sets the spring: sqrt(2 damping noise)/scale"
+        3.0, "m s^(1/2)", low=0.01, high=1000.0, source=PROGRAM, meaning="sets the spring: sqrt(2 damping noise)/scale"
     )
 
 

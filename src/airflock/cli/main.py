@@ -9,7 +9,21 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, evolve, harden, inspect, keys, look, paper, run, sweep
+from airflock.cli import (
+    display,
+    evolve,
+    fleet,
+    fly,
+    harden,
+    identify,
+    imports,
+    inspect,
+    keys,
+    look,
+    paper,
+    run,
+    sweep,
+)
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -42,9 +56,14 @@ app.command("score")(run.score)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
+app.command("import")(imports.import_tracks)
+app.command("export")(imports.export)
+app.command("identify")(identify.identify)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("display")(display.display)
+app.command("fleet")(fleet.fleet)
+app.add_typer(fly.app, name="fly")
 app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
 app.command("keys")(keys.keys)

@@ -61,7 +61,7 @@ def run(
     count = f"{seeds} flights" if seeds > 1 else f"seed {first_seed}"
     title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
     published = {} if changed else found.published
-    tables.score_table(title, rows, published, reports(found.metrics.kind))
+    tables.score_table(title, rows, published, reports(found.measures))
     for remark in remarks(rows, numbers):
         tables.say(remark)
 
@@ -114,7 +114,7 @@ def score(
         recording = load_recording(path)
         settings = aero_settings(recording, changed) if aero else changed
         values, course = measure(recording, settings)
-        about |= reports(scenario_of(recording, settings).metrics.kind)
+        about |= reports(scenario_of(recording, settings).measures)
         rows.append(values)
         courses.append(course.assign(file=str(path)))
     if series is not None:

@@ -107,7 +107,7 @@ def meet_neighbours(model: Model, p: Any, own: State, neighbours: Iterable[Heard
     terms = []
     for heard in neighbours:
         given = pair_percept(own, heard, index)
-        if given["r2"] <= near * near:
+        if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
             terms.append(answer(model.neighbour, "neighbour", given | {"p": p}, model.name))
     return reduced(model.Sums, model.reduce, terms)
 

@@ -1,4 +1,4 @@
-"""The rule contract: what a model, a body and an order parameter consist of.
+"""The rule contract: what a model, a body, an order parameter and a set of them consist of.
 
 A rule is a plain function of floats. Its argument names are the declaration: a driver computes and supplies only what
 is asked for, in any order. `core.vocabulary` lists the names.
@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
+from airflock.core.vocabulary import CLOCKS, COMMANDS, OVER_TIME, REDUCTIONS, asks
 from airflock.errors import RuleError
 
 
@@ -29,6 +29,7 @@ class Model:
     decide       : → command x, y, z and a Memory if the model declares one
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
+    violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -51,9 +52,16 @@ class Model:
     preferred_speed: Callable[..., float] | None = None
     interaction_range: Callable[..., float] | None = None
     doc: str = ""
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
+
+
+def names_of(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
+    """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's."""
+    found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
+    return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
 
 
 def model(namespace: Any, name: str = "") -> Model:
@@ -89,8 +97,7 @@ def model(namespace: Any, name: str = "") -> Model:
     >>> airflock.model(Straight).command
     'velocity'
     """
-    found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
-    name = name or str(found.get("NAME") or found.get("__name__", "model")).rpartition(".")[2]
+    found, name = names_of(namespace, name)
     for needed in ("Parameters", "COMMAND", "decide"):
         if needed not in found:
             raise RuleError(f"model {name} lacks {needed}")
@@ -127,6 +134,7 @@ def model(namespace: Any, name: str = "") -> Model:
         preferred_speed=found.get("preferred_speed"),
         interaction_range=found.get("interaction_range"),
         doc=str(found.get("__doc__") or ""),
+        violates=dict(found.get("VIOLATES", {})),
     )
 
 
@@ -136,6 +144,7 @@ class Body:
 
     accepts     : the COMMAND of the models that it can carry
     integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
+    violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -143,18 +152,23 @@ class Body:
     accepts: str
     integration: str
     move: Callable[..., Any]
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.move))
 
 
-def body(module: Any, name: str) -> Body:
-    """Gather a body from its module; refuse what the contract does not know."""
-    found = vars(module)
+def body(namespace: Any, name: str = "") -> Body:
+    """Gather a body from a module, a class or a mapping of names; refuse what the contract does not know."""
+    found, name = names_of(namespace, name)
+    for needed in ("Parameters", "ACCEPTS", "INTEGRATION", "move"):
+        if needed not in found:
+            raise RuleError(f"body {name} lacks {needed}")
     asks(found["move"], "move", name)
     if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
         raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
-    return Body(name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"])
+    violates = dict(found.get("VIOLATES", {}))
+    return Body(name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"], violates)
 
 
 @dataclass(frozen=True)
@@ -168,6 +182,7 @@ class Metric:
               `workspace` of any of n, q, wing gives its scratch
     reports : of every order parameter that comes out: its unit and what it means
     total   : from the combined values of a whole flight to named order parameters; by default they are these
+    violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
@@ -192,18 +207,39 @@ class Metric:
     clock: str = "sample"
     total: Callable[..., dict[str, float]] | None = None
     reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
 
 
-def metric(module: Any) -> Metric:
-    """Gather an order parameter from its module; refuse what the contract does not know."""
-    found = dict(vars(module))
-    name = str(found["__name__"]).rpartition(".")[2]
+RULES_AND_RECORDS = (
+    ("sample", "Sample"), ("pair", "Pair"), ("agent", "Agent"), ("member", "Member"), ("cluster", "Cluster"),
+    ("cluster", "linked"), ("survey", "Shared"), ("survey", "workspace"),
+)  # fmt: skip
+
+
+def metric(namespace: Any, name: str = "") -> Metric:
+    """Gather an order parameter from a module, a class or a mapping; refuse what the contract does not know."""
+    found, name = names_of(namespace, name)
+    if "sample" not in found:
+        raise RuleError(f"metric {name} lacks sample")
+    for rule, record in RULES_AND_RECORDS:
+        if rule in found and record not in found:
+            raise RuleError(f"metric {name} has a rule {rule} but no {record}")
     for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
         if kind in found:
             asks(found[kind], kind, name)
+    fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
+    for key, how in found.get("REDUCE", {}).items():
+        if key not in fields or how not in REDUCTIONS:
+            raise RuleError(f"metric {name}: REDUCE[{key!r}] = {how!r}; give a field of a record, one of {REDUCTIONS}")
+    for key, how in found.get("OVER_TIME", {}).items():
+        if key not in found["Sample"]._fields or how not in OVER_TIME:
+            raise RuleError(f"metric {name}: OVER_TIME[{key!r}] = {how!r}; give a field of Sample, one of {OVER_TIME}")
+    clock = found.get("CLOCK", "sample")
+    if clock not in CLOCKS:
+        raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
         "Memory", "within", "total", "survey", "Shared", "workspace",
@@ -213,6 +249,62 @@ def metric(module: Any) -> Metric:
         reduce=dict(found.get("REDUCE", {})),
         over_time=dict(found.get("OVER_TIME", {})),
         reports=dict(found.get("REPORTS", {})),
-        clock=found.get("CLOCK", "sample"),
+        violates=dict(found.get("VIOLATES", {})),
+        clock=clock,
         **{key: found[key] for key in records if key in found},
     )
+
+
+@dataclass(frozen=True)
+class MetricSet:
+    """Order parameters that are measured together, and what a flight is judged by.
+
+    name       : how scenarios refer to it (metrics.kind)
+    Parameters : record behind the section [metrics]
+    chosen     : `chosen(q)` → the metrics, where a parameter decides; else `metrics`
+    fitness    : of any of values, agents, duration (s), q → named numbers, from the order parameters of one flight
+    reports    : of what `fitness` gives: unit and meaning
+    best       : the order parameter that is larger in a better flight; empty if none is
+    violates   : truths of `airflock.check_metric` that its fitness breaks, and why (VIOLATES)
+    faults     : of any of q, largest (extension, m), edges → what is wrong with the parameters, one line each
+    """
+
+    name: str
+    metrics: tuple[Metric, ...]
+    Parameters: type
+    chosen: Callable[[Any], tuple[Metric, ...]] | None = None
+    fitness: Callable[..., Mapping[str, float]] | None = None
+    reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    best: str = ""
+    faults: Callable[..., list[str]] | None = None
+    violates: Mapping[str, str] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.metrics, self.fitness))
+
+    def __post_init__(self) -> None:
+        if self.fitness is not None:
+            asks(self.fitness, "fitness", self.name)
+        if self.faults is not None:
+            asks(self.faults, "faults", self.name)
+        names = [item.name for item in self.metrics]
+        values = [value for item in self.metrics for value in item.Sample._fields]  # type: ignore[attr-defined]
+        for which, found in (("metric", names), ("value", values)):
+            twice = sorted({name for name in found if found.count(name) > 1})
+            if twice:
+                raise RuleError(f"metric set {self.name}: the {which} {', '.join(twice)} comes twice")
+
+    def of(self, q: Any) -> tuple[Metric, ...]:
+        """Metrics for these parameters."""
+        return self.metrics if self.chosen is None else self.chosen(q)
+
+    def judged(self, values: Mapping[str, Any], agents: int, duration: float, q: Any) -> dict[str, Any]:
+        """The order parameters of one flight with its fitness; q: parameters with everything filled in."""
+        if self.fitness is None:
+            return dict(values)
+        given = {"values": values, "agents": agents, "duration": duration, "q": q}
+        return {**values, **self.fitness(**{name: given[name] for name in asks(self.fitness, "fitness", self.name)})}
+
+    def numbers(self, q: Any) -> tuple[str, ...]:
+        """Names of the order parameters that are one number, fitness last."""
+        return tuple(dict.fromkeys([*(name for each in self.of(q) for name in each.reports), *self.reports]))

@@ -234,8 +234,3 @@ def _number_names(kind: type) -> tuple[str, ...]:
 def choices(record: Any) -> dict[str, str]:
     """The enumerated choices of a record: compile-time constants of a kernel."""
     return {name: getattr(record, name) for name, declared, _ in declarations(record) if isinstance(declared, Choice)}
-
-
-def row(record: Any) -> list[float]:
-    """The numbers of a record in declared order; an optional number that is None becomes 0."""
-    return [getattr(record, name) or 0.0 for name in number_names(record)]

@@ -17,6 +17,7 @@ LINK = 5  # packets received on one link between one pair
 GUST = 6  # wind gusts, common to the flock
 MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
 SCENE = 8  # the scene of a flight, where each flight has its own
+SHOW = 9  # seeds of the parts of a show: step is the leg, agent the segment
 
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
 

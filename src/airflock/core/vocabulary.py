@@ -146,9 +146,22 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "sample": {**SAMPLE, "q": "metric parameters"},
     "survey": {**FLOCK, "q": "metric parameters"},
     "within": {"q": "metric parameters"},
+    "fitness": {
+        "values": "order parameters of one flight, by name",
+        "agents": "number of agents",
+        "duration": "time flown, s",
+        "q": "metric parameters",
+    },
+    "faults": {
+        "q": "metric parameters",
+        "largest": "largest extension, m; 0.0 without an arena",
+        "edges": "world.edges",
+    },
 }
 COMMANDS = ("velocity", "acceleration", "heading")
 REDUCTIONS = ("sum", "min", "max")
+OVER_TIME = ("mean", *REDUCTIONS)  # how the samples of a flight combine
+CLOCKS = ("sample", "collision")  # metrics.period and metrics.collision_period
 
 
 class Own(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from airflock.core import random
 from airflock.display.assignment import assign, better
 from airflock.engine.simulate import fly
 from airflock.errors import AirflockError
@@ -137,20 +138,26 @@ def fly_show(
     frames: list[Frames] = []
     ends: list[int] = []
     for number, points in enumerate(shapes):
-        leg = _Leg(scenario, flock, points, drones, seed * 1000 + number * 100)
+        leg = _Leg(scenario, flock, points, drones, (seed, number))
         formed.append(leg.fly([(int(who), kinds[int(who)], float(rng.uniform())) for who in legs[number]]))
         frames += leg.frames
         ends.append(sum(map(len, frames)) - 1)
     return Show(formed, np.concatenate(frames), scenario.metrics.period, ends, scenario, seed)
 
 
+def segment_seed(seed: int, leg: int, segment: int) -> int:
+    """Seed of one segment of a leg: by a stream, so that no two segments of any shows fly the same noise."""
+    low, high, *_ = random.words(seed, random.SHOW, 0, leg, segment)
+    return int(low | high << 32)
+
+
 class _Leg:
     """The way to one shape."""
 
-    def __init__(self, scenario: Scenario, flock: Drones, points: Frames, drones: int, seed: int):
-        self.scenario, self.flock, self.points, self.total, self.seed = scenario, flock, points, drones, seed
+    def __init__(self, scenario: Scenario, flock: Drones, points: Frames, drones: int, leg: tuple[int, int]):
+        self.scenario, self.flock, self.points, self.total, self.leg = scenario, flock, points, drones, leg
         self.frames: list[Frames] = []
-        self.collisions = self.struck = self.hulls = self.reassigned = 0
+        self.collisions = self.struck = self.hulls = self.reassigned = self.segments = 0
         self.placed: float | None = None
         self.now = 0.0
         self._assign()
@@ -216,7 +223,8 @@ class _Leg:
         steps = round(seconds / period)
         if steps < 1:
             return
-        flock, self.seed = self.flock, self.seed + 1
+        flock, seed = self.flock, segment_seed(*self.leg, self.segments)
+        self.segments += 1
         boxes = tuple((*(hull - HALF), *(hull + HALF), 0.0) for hull in flock.hulls)
         aims = tuple(tuple(map(float, self.points[k])) for k in flock.target)
         part = replace(
@@ -225,7 +233,7 @@ class _Leg:
             goals=replace(self.scenario.goals, points=aims),
             scene=replace(self.scenario.scene, boxes=boxes),
         )
-        flown = fly(part, self.seed, precision=64, record=True, start=flock.state, device="cpu")
+        flown = fly(part, seed, precision=64, record=True, start=flock.state, device="cpu")
         assert flown.frames is not None
         self.collisions += int(flown.values["n_coll"])
         self.hulls += int(flown.values["n_env_coll"])

@@ -1,7 +1,7 @@
 """Devices: on what flights run. `auto` picks by the size of the work and by what there is, and says what it picked."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from airflock.engine import cpu
 from airflock.engine.cpu import Flown
 from airflock.engine.plan import Plan
 from airflock.engine.tables import clock, tables
+from airflock.engine.threads import cores
 from airflock.errors import DeviceError, ScenarioError
 from airflock.scenarios.scenario import Scenario
 
@@ -59,13 +60,13 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     missing = trouble() or next(filter(None, faults), None)
     if missing is not None:
         return Choice("cpu", missing)
-    seconds = sum(work(scenario) for scenario in scenarios) / cpu.cores()
+    seconds = sum(work(scenario) for scenario in scenarios) / cores()
     if seconds < WORTH:
-        return Choice("cpu", f"about {seconds:.2g} s of work on {cpu.cores()} cores")
+        return Choice("cpu", f"about {seconds:.2g} s of work on {cores()} cores")
     missing = next(filter(None, map(no_room, largest.values(), largest)), None)
     if missing is not None:
         return Choice("cpu", missing)
-    return Choice("cuda", f"about {seconds:.2g} s of work on {cpu.cores()} cores would be left to the CPU")
+    return Choice("cuda", f"about {seconds:.2g} s of work on {cores()} cores would be left to the CPU")
 
 
 def by_cells(scenario: Scenario, plan: Plan, given: bool = False) -> bool:
@@ -81,7 +82,7 @@ def no_room(scenario: Scenario, plan: Plan) -> str | None:
 
     if by_cells(scenario, plan, plan.given_start):
         return crowd.too_large(scenario, plan)
-    plan = replace(plan, grid=False)
+    plan = plan.built(grid=False)
     return launch.too_large(plan, tables(scenario, plan, 0))
 
 
@@ -108,9 +109,8 @@ def fly_one(
 ) -> Flown:  # plan: with or without recorded frames
     """Fly one world on a named device other than the CPU."""
     if device == "python":
-        from airflock.engine.plain import fly_plainly
-
-        return fly_plainly(scenario, seed, start)
+        plan = plan.built(grid=False, bits=64)
+        return cpu.fly(plan, tables(scenario, plan, seed), start, device)
     return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
 
 
@@ -134,7 +134,7 @@ def fly_on_gpu(
             if done:
                 done()
         else:
-            groups.setdefault(replace(plan, grid=False), []).append(number)
+            groups.setdefault(plan.built(grid=False), []).append(number)
     for plan, members in groups.items():
         jobs = [tables(scenarios[m], plan, seeds[m]) for m in members]
         given = None if starts is None else [np.asarray(starts[m]) for m in members]

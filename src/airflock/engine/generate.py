@@ -7,6 +7,7 @@ nothing but Numba.
 """
 
 import ast
+import builtins
 import inspect
 import math
 import types
@@ -15,6 +16,7 @@ from typing import Any
 
 from airflock.core import random as random_streams
 from airflock.engine import law
+from airflock.engine.integers import tree_of
 from airflock.errors import RuleError
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
@@ -29,12 +31,17 @@ class Source:
 
     decorator : line put above each function
     constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
+    rows      : fields of each record that is made of a row of numbers, by its name
+    lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
     """
+
+    lenient = False
 
     def __init__(self, decorator: str, constants: Mapping[str, Mapping[str, str | float]]):
         self.decorator = decorator
         self.constants = constants
         self.blocks: list[str] = []
+        self.rows: dict[str, tuple[str, ...]] = {}
         self._names: dict[Any, str] = {}
         self._apart = False
 
@@ -66,6 +73,10 @@ class Source:
         """Names in the driver of all that has come so far."""
         return set(self._names.values())
 
+    def originals(self) -> dict[str, Any]:
+        """What was copied, by its name in the driver: plain functions and NamedTuple classes of their authors."""
+        return {name: item for item, name in self._names.items() if not isinstance(item, (str, tuple))}
+
     def solver(self, rule: Callable[..., Any]) -> str:
         """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
         self._apart = True
@@ -77,12 +88,13 @@ class Source:
         """A record of numbers under a name of its own (the columns of a parameter row)."""
         if name not in self._names.values():
             self._names[name] = name
+            self.rows[name] = fields
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(fields)!r})")
         return name
 
     def _function(self, rule: Callable[..., Any], name: str, chosen: Mapping[str, str]) -> str:
         law.check(rule)
-        node = law.tree_of(rule)
+        node = tree_of(rule)
         node.name = name
         node.returns = None
         node.args.defaults = []
@@ -233,7 +245,7 @@ class _Rewrite(ast.NodeTransformer):
             return ast.Constant(value)
         if isinstance(value, types.FunctionType) or (isinstance(value, type) and issubclass(value, tuple)):
             return ast.Name(self.source.name(value), node.ctx)
-        if isinstance(value, types.ModuleType):
+        if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
             return node
         raise RuleError(
             f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "

@@ -2,10 +2,10 @@
 
 import ast
 import inspect
-import textwrap
 from collections.abc import Callable
 from typing import Any
 
+from airflock.engine.integers import BITWISE, integers_of, is_integer, tree_of
 from airflock.errors import RuleError
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
@@ -16,23 +16,12 @@ FORBIDDEN = (
 )  # fmt: skip
 
 
-def tree_of(rule: Callable[..., Any]) -> ast.FunctionDef:
-    """Syntax tree of a rule from its own source file or notebook cell."""
-    try:
-        text = textwrap.dedent(inspect.getsource(rule))
-    except (OSError, TypeError) as fault:
-        raise RuleError(f"the source of rule {rule.__name__} is not available: {fault}") from fault
-    node = ast.parse(text).body[0]
-    if not isinstance(node, ast.FunctionDef):
-        raise RuleError(f"rule {getattr(rule, '__name__', rule)} is no plain function")
-    return node
-
-
 def faults(rule: Callable[..., Any]) -> list[str]:
     """Everything in a rule that a compiler or a GPU would not take, each as one line with its place."""
     node = tree_of(rule)
     code = rule.__code__
     found = []
+    integers = integers_of(rule)
 
     def complain(where: ast.AST, text: str) -> None:
         line = code.co_firstlineno + getattr(where, "lineno", 1) - 1
@@ -50,23 +39,15 @@ def faults(rule: Callable[..., Any]) -> list[str]:
             complain(item, f"{item.func.id} of fewer than two numbers; write {item.func.id}(a, b)")  # type: ignore[attr-defined]
         if isinstance(item, FORBIDDEN):
             complain(item, f"{type(item).__name__} is not allowed in a rule")
-        if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, ast.LShift, ast.RShift, ast.BitAnd)):
-            for side in (item.left, item.right):
-                if isinstance(side, ast.Constant) and type(side.value) is int and _touches_float(item):
+        if isinstance(item, ast.BinOp) and not isinstance(item.op, (ast.Pow, *BITWISE)):
+            for side, other in ((item.left, item.right), (item.right, item.left)):
+                if isinstance(side, ast.Constant) and type(side.value) is int and not is_integer(other, integers, rule):
                     complain(item, f"integer {side.value} in float arithmetic; write {side.value}.0")
         if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name):
             module = rule.__globals__.get(item.value.id)
             if inspect.ismodule(module) and module.__name__ != "math":
                 complain(item, f"{item.value.id}.{item.attr}: only math may be used through a module name")
     return found
-
-
-def _touches_float(item: ast.BinOp) -> bool:
-    # Index arithmetic (i + 1) is integer on purpose: names of one letter i-n, or anything that range() made.
-    names = [n.id for n in ast.walk(item) if isinstance(n, ast.Name)]
-    return not all(
-        name in {"i", "j", "k", "e", "m", "n", "row", "first", "last", "word", "stream", "draw"} for name in names
-    )
 
 
 def check(rule: Callable[..., Any]) -> None:

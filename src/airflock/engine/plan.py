@@ -1,38 +1,14 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
-from airflock.aero import descent
-from airflock.aero import wing as wings
-from airflock.body import radio, sensors, wind
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
-from airflock.core.parameters import choices, number_names
-from airflock.metrics import parameters as metric_parameters
+from airflock.core.parameters import choices
 from airflock.world import arena, edges, excursion, rays
 
-ARENA = (
-    "half_x",
-    "half_y",
-    "half_z",
-    "extent_x",
-    "extent_y",
-    "extent_z",
-    "separation",
-    "speed",
-    "clearance",
-    "goal_radius",
-    "goal_speed",
-    "goal_spread",
-    "goal_behind",
-    "spacing_x",
-    "spacing_y",
-    "spacing_z",
-    "jitter",
-)
-CLOCK = ("dt", "period")
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
     "seed_high", "corners", "obstacles", "faces_0", "faces_1",
@@ -40,16 +16,35 @@ WHOLE = (
 
 
 @dataclass(frozen=True)
-class Plan:
-    """Compile-time side of a flight.
+class Build:
+    """How a driver is built, whatever the scenario says.
 
+    bits        : 32 or 64 per number
+    record      : keep every sample (position, velocity, command) besides the running sums
+    given_start : the flight starts from positions and velocities that are handed over
+    grid        : neighbours by cells, all cores for one flock; else all pairs, one core
+    """
+
+    bits: int = 32
+    record: bool = False
+    given_start: bool = False
+    grid: bool = False
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Compile-time side of a flight: what the scenario says, and how it is built.
+
+    It is made by `engine.simulate.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
+
+    build     : how it is built; bits, record, given_start and grid read it
+    numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
     surfaces  : surface function of each family of walls, in the order of the faces table
     excursion : how far outside a position is
     ray       : free distance along a direction
     body      : what turns commands into motion; body_choices its compile-time constants
     edge      : what happens to a coordinate beyond the arena's faces, if anything
     start     : region in which agents start
-    grid      : neighbours by cells, all cores for one flock; else all pairs, one core
     scene     : something stands in the world that agents see with rays, feel, or must not touch
     goals     : the flock has goals; herd: the goal is a shepherd
     own       : each agent has a goal of its own
@@ -57,12 +52,11 @@ class Plan:
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
     sequential: one agent after another perceives, decides and moves
-    record    : keep every sample (position, velocity, command) besides the running sums
     """
 
     model: Model
     model_choices: tuple[tuple[str, str | float], ...]
-    model_numbers: tuple[str, ...]
+    numbers: tuple[tuple[str, tuple[str, ...]], ...]
     metrics: tuple[Metric, ...]
     surfaces: tuple[Callable[..., Any], ...]
     excursion: Callable[..., float]
@@ -80,17 +74,38 @@ class Plan:
     herd: bool = False
     own: bool = False
     sequential: bool = False
-    grid: bool = False
     dimensions: int = 2
-    bits: int = 32
     noisy: bool = True
     delayed: bool = True
     lossy: bool = False
     links: bool = False
     windy: bool = False
     obstacles: bool = False
-    given_start: bool = False
-    record: bool = False
+    build: Build = Build()
+
+    def built(self, **changes: Any) -> "Plan":
+        """The same flight built otherwise: fields of `Build`."""
+        return replace(self, build=replace(self.build, **changes))
+
+    @property
+    def bits(self) -> int:
+        """Bits of a number."""
+        return self.build.bits
+
+    @property
+    def record(self) -> bool:
+        """Whether every sample is kept."""
+        return self.build.record
+
+    @property
+    def given_start(self) -> bool:
+        """Whether the start is handed over."""
+        return self.build.given_start
+
+    @property
+    def grid(self) -> bool:
+        """Whether neighbours are found by cells."""
+        return self.build.grid
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -117,18 +132,7 @@ class Plan:
     @property
     def records(self) -> dict[str, tuple[str, ...]]:
         """Columns of the parameter row, by record name, in order."""
-        return {
-            "p": self.model_numbers,
-            "b": number_names(self.body.Parameters),
-            "s": number_names(sensors.Parameters),
-            "k": number_names(radio.Parameters),
-            "a": number_names(wind.Parameters),
-            "w": ARENA,
-            "q": number_names(metric_parameters.Parameters),
-            "c": CLOCK,
-            "wing": number_names(wings.Parameters),
-            "aero": number_names(descent.Parameters),
-        }
+        return dict(self.numbers)
 
 
 def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], ...], Callable[..., float]]:
@@ -160,9 +164,14 @@ EDGES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
 
 
 def make_plan(
-    model: Model, parameters: Any, metrics: tuple[Metric, ...], world: arena.Parameters, **options: Any
+    model: Model,
+    parameters: Any,
+    metrics: tuple[Metric, ...],
+    world: arena.Parameters,
+    numbers: Mapping[str, tuple[str, ...]],
+    **options: Any,
 ) -> Plan:
-    """Plan for a model with these parameters (only their choices matter) in this world."""
+    """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
     surfaces, beyond = arena_surfaces(world)
     usual: dict[str, str | float] = {
         name: number for name, number in model.usual.items() if getattr(parameters, name) == number
@@ -170,7 +179,7 @@ def make_plan(
     return Plan(
         model=model,
         model_choices=tuple(sorted((usual | choices(parameters)).items())),
-        model_numbers=number_names(parameters),
+        numbers=tuple(numbers.items()),
         metrics=metrics,
         surfaces=surfaces,
         excursion=beyond,

@@ -5,20 +5,21 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+from numpy.typing import NDArray
+
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import cpu, devices
+from airflock.engine import cpu, devices, failure
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Plan, make_plan
+from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe
+from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
+from airflock.engine.threads import in_threads
 from airflock.errors import FlightError, ScenarioError
-from airflock.metrics import fitness_dimock, fitness_kidger
-from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock.metrics.registry import metrics_of
 from airflock.scenarios.geometry import half_sizes
-from airflock.scenarios.places import start_inside
+from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
@@ -30,10 +31,12 @@ def plan_of(
     record: bool = False,
     metrics: tuple[Metric, ...] | None = None,
     grid: bool | None = None,
+    given_start: bool = False,
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
-    grid : neighbours by cells or all pairs; by default what is faster, and all pairs in a box too small for cells
+    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
+    given_start : the start is handed over with each flight
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
@@ -42,9 +45,15 @@ def plan_of(
     return make_plan(
         scenario.model,
         scenario.parameters,
-        metrics_of(scenario.metrics) if metrics is None else metrics,
+        scenario.order_parameters if metrics is None else metrics,
         scenario.world,
-        grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        scenario.numbers,
+        build=Build(
+            bits=precision,
+            record=record,
+            given_start=given_start,
+            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+        ),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
         start=scenario.start.kind,
@@ -54,7 +63,6 @@ def plan_of(
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
         sequential=scenario.flight.update == "sequential",
-        bits=precision,
         noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
@@ -63,13 +71,12 @@ def plan_of(
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
         windy=any((wind.east, wind.north, wind.up, wind.gust)),
-        record=record,
     )
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
-    found = metrics_of(scenario.metrics) if metrics is None else metrics
+    found = scenario.order_parameters if metrics is None else metrics
     used = scenario.model.flock is not None or any(
         "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
     )
@@ -105,10 +112,8 @@ def fly(
     scenario = scenario.in_flight(seed)
     plan = plan_of(scenario, precision=precision, record=record)
     if start is not None:
-        plan = replace(plan, given_start=True)
-        inside = start_inside(scenario, start) if plan.scene else ""
-        if inside:
-            raise FlightError(f"{scenario.name}: {inside}")
+        plan = plan.built(given_start=True)
+        start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
@@ -149,16 +154,11 @@ def checked(
 ) -> cpu.Flown:
     """A flight that went well; raises FlightError for any other."""
     if flown.status < 0:
-        raise FlightError(
-            f"{scenario.name}: seed {seed}: agent {-flown.status - 1} of {scenario.agents} found no place at "
-            f"start.separation = {scenario.separation():g} m; enlarge the arena or lower start.separation"
-        )
+        raise FlightError(failure.no_place(scenario, seed, -flown.status - 1))
     bad = _first_bad(flown)
     if bad is not None:
-        step = _first_bad_step(scenario, seed, precision, start, device)
         raise FlightError(
-            f"{scenario.name}: seed {seed}: agent {bad} left the finite numbers at step {step} "
-            f"(t = {step * scenario.flight.dt:g} s)"
+            failure.not_finite(scenario, seed, bad, _first_bad_step(scenario, seed, precision, start, device))
         )
     return flown
 
@@ -172,10 +172,11 @@ def _first_bad(flown: cpu.Flown) -> int | None:
 
 
 def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
-    """First step after which a state is not finite: flights are deterministic, so shorter ones find it by halves."""
+    """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
     low, high = 0, clock(scenario)["steps"]
-    plan = plan_of(scenario, precision=precision)
-    plan = replace(plan, given_start=start is not None)
+    if device != "cuda":
+        return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), low, high)
+    plan = plan_of(scenario, precision=precision).built(given_start=start is not None)
     while high - low > 1:
         middle = (low + high) // 2
         shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))
@@ -186,20 +187,67 @@ def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, d
     return high
 
 
+def opened(
+    scenario: Scenario,
+    seed: int,
+    precision: int = 32,
+    record: bool = False,
+    start: Any = None,
+    world: int = 0,
+    *,
+    given_start: bool = False,
+    device: str = "cpu",
+) -> State:
+    """State of a flight before its first step.
+
+    start       : as in `fly`; given_start : whether agents have been given their places already, so that none are drawn
+    device      : cpu, or python, in double precision and with all pairs
+    Raises FlightError where `start` cannot be flown.
+    """
+    plan = plan_of(scenario, precision=precision, record=record)
+    if device == "python":
+        plan = plan.built(grid=False, bits=64)
+    given = None
+    if start is not None:
+        given = sound_start(scenario, plan, start)
+    plan = plan.built(given_start=given_start or start is not None)
+    return State(plan, tables(scenario, plan, seed, world), cpu.driver_of(plan, device), given)
+
+
+def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
+    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s.
+
+    Raises FlightError, one line, where their shape, their kind or their values are wrong.
+    """
+    import numpy as np
+
+    names = [*plan.axes, *(f"v{axis}" for axis in plan.axes)]
+    shape, said = (len(names), scenario.agents), f"{scenario.name}: start: "
+    try:
+        given = np.asarray(start, np.float32 if plan.bits == 32 else np.float64)
+    except (TypeError, ValueError) as fault:
+        raise FlightError(f"{said}not an array of numbers: {fault}") from fault
+    if given.shape != shape:
+        wanted = f"{shape}, the rows {', '.join(names)} of {scenario.agents} agents in m and m/s"
+        raise FlightError(f"{said}its shape is {given.shape}; give {wanted}")
+    bad = np.argwhere(~np.isfinite(given))
+    if len(bad):
+        row, agent = bad[0]
+        raise FlightError(f"{said}{names[row]} of agent {agent} is {given[row, agent]}, not a finite number")
+    outside = start_fault(scenario, given)
+    if outside:
+        raise FlightError(f"{scenario.name}: {outside}")
+    return given
+
+
 def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> dict[str, float]:
     """Order parameters and fitness of one flight, from running sums: no trajectory is kept."""
     return finish(scenario, fly(scenario, seed, precision=precision).values)
 
 
-def finish(scenario: Scenario, values: dict[str, float]) -> dict[str, float]:
-    """Order parameters, with partial fitnesses and fitness where the metrics are those that they are made of."""
-    if scenario.metrics.kind == "dimock":
-        return {**values, **fitness_dimock.fitness(values, scenario.metrics.fitness)}
-    if scenario.metrics.kind == "kidger":
-        return {**values, **fitness_kidger.fitness(values, scenario.agents, scenario.flight.duration)}
-    if scenario.metrics.kind != "vasarhelyi":
-        return values
-    return {**values, **fitness(values, scenario.agents, scenario.measured_by())}
+def finish(scenario: Scenario, values: dict[str, Any]) -> dict[str, Any]:
+    """Order parameters with what the scenario's metric set makes of them: partial fitnesses and fitness."""
+    return scenario.measures.judged(values, scenario.agents, scenario.flight.duration, scenario.measured_by())
 
 
 def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
@@ -230,7 +278,7 @@ def score_flights(
             together = zip(scenarios, seeds, flown, strict=True)
             return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
     if device == "python":
-        return list(cpu.in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
+        return list(in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
     for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
         compile_for(scenario, precision=precision)  # once, before threads ask for it
 
@@ -240,7 +288,7 @@ def score_flights(
     jobs = [job(scenario, seed) for scenario, seed in zip(scenarios, seeds, strict=True)]
     if any(_pays(scenario) for scenario in scenarios):
         threads = 1  # each flight takes all cores by itself
-    return list(cpu.in_threads(jobs, threads, done))
+    return list(in_threads(jobs, threads, done))
 
 
 def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:

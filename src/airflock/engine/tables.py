@@ -1,15 +1,15 @@
 """Tables: a scenario as the numbers that a driver reads: a row of reals, a row of integers, the arena's geometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core.parameters import row
-from airflock.engine.plan import ARENA, CLOCK, WHOLE, Plan
+from airflock.engine.plan import WHOLE, Plan
 from airflock.scenarios.geometry import counter_clockwise, half_sizes
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import ORDER, Clock, Geometry
 from airflock.scenes.tree import Scene
 from airflock.scenes.tree import scene as make_scene
 from airflock.world.shapes import APPEARS
@@ -42,6 +42,11 @@ class Tables:
     links: NDArray[np.int64]
     later: NDArray[Any]
     goals: NDArray[Any]
+
+    def changed(self, **whole: int) -> "Tables":
+        """The same world with other integers, by their names in `plan.WHOLE`."""
+        known = dict(zip(WHOLE, self.whole.tolist(), strict=True))
+        return replace(self, whole=np.array([(known | whole)[name] for name in WHOLE], np.int64))
 
 
 def clock(scenario: Scenario) -> dict[str, int]:
@@ -120,6 +125,34 @@ def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return shapes, later
 
 
+def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
+    """Record behind each letter of a driver's row; period: time between two decisions, s."""
+    derived = {"world": geometry(scenario), "": Clock(scenario.flight.dt, period)}
+    records = scenario.records | derived | {"metrics": scenario.measured_by()}
+    return {section.letter: records[section.key] for section in ORDER if section.letter}
+
+
+def geometry(scenario: Scenario) -> Geometry:
+    """What drivers read of world, start and goals."""
+    begin, goals = scenario.start, scenario.goals
+    half, extent = half_sizes(scenario.world), extents(scenario)
+    return Geometry(
+        **dict(zip(("half_x", "half_y", "half_z"), half, strict=True)),
+        **dict(zip(("extent_x", "extent_y", "extent_z"), extent, strict=True)),
+        separation=scenario.separation(),
+        speed=begin.speed,
+        clearance=begin.clearance,
+        goal_radius=goals.radius,
+        goal_speed=goals.speed,
+        goal_spread=goals.spread,
+        goal_behind=goals.behind,
+        spacing_x=begin.spacing_x,
+        spacing_y=begin.spacing_y,
+        spacing_z=begin.spacing_z,
+        jitter=begin.jitter,
+    )
+
+
 def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     """Numbers of one world for a plan's driver."""
     scenario = scenario.in_flight(seed)
@@ -127,20 +160,11 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     dt, times = scenario.flight.dt, clock(scenario)
     surfaces, families = faces(scenario)
     edges, corners, spans = polygon_edges(scenario)
-    begin, goals = scenario.start, scenario.goals
-    arena = dict(zip(ARENA, (
-        *half_sizes(scenario.world), *extents(scenario), scenario.separation(), begin.speed, begin.clearance,
-        goals.radius, goals.speed, goals.spread, goals.behind,
-        begin.spacing_x, begin.spacing_y, begin.spacing_z, begin.jitter,
-    ), strict=True))  # fmt: skip
     scene = scenario.stands() if plan.scene else EMPTY
     shapes, later = unbuilt(scene)
-    timing = dict(zip(CLOCK, (dt, times["decide_every"] * dt), strict=True))
-    numbers = [
-        *row(scenario.parameters), *row(scenario.body), *row(scenario.sensors), *row(scenario.radio),
-        *row(scenario.wind), *(arena[name] for name in ARENA), *row(scenario.measured_by()),
-        *(timing[name] for name in CLOCK), *row(scenario.wing), *row(scenario.aero),
-    ]  # fmt: skip
+    values = read_by_drivers(scenario, dt * times["decide_every"])
+    # an optional number that is None becomes 0
+    numbers = [getattr(values[letter], name) or 0.0 for letter, names in plan.numbers for name in names]
     counts = families + [0] * (2 - len(families))
     whole = times | {
         "agents": scenario.agents,

@@ -167,7 +167,7 @@ def measured(
         [found for found in flown for _ in seeds], [s for _ in flown for s in seeds], threads=threads, done=done
     )
     if "fitness" not in rows[0] or "r_min" not in rows[0]:
-        raise ScenarioError([f"{scenario.name}: metrics.kind = '{scenario.metrics.kind}' has no fitness and no r_min"])
+        raise ScenarioError([f"{scenario.name}: metrics.kind = '{scenario.measures.name}' has no fitness and no r_min"])
     keys = ("fitness", "r_min", "n_coll")
     table = {key: np.array([row[key] for row in rows]).reshape(len(plans), -1) for key in keys}
     found = []
@@ -188,7 +188,8 @@ def cautious(scenario: Scenario, r_coll: float = 1.5, delay: float = 1.0) -> dic
 
 def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], search: Mapping[str, Any]) -> Study:
     """Study of workaround (i): the scenario's space, searched under the stricter settings."""
-    found = make(scenario.document, f"{scenario.name}, stricter", settings, law=scenario.model)
+    own: dict[str, Any] = {"law": scenario.model, "measures": scenario.measures, "vehicle": scenario.vehicle}
+    found = make(scenario.document, f"{scenario.name}, stricter", settings, **own)
     return replace(make_study({}, found.name, search=search, scenario=found), space=space)
 
 

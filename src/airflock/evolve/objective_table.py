@@ -3,15 +3,15 @@
 import hashlib
 from collections.abc import Mapping
 from difflib import get_close_matches
-from importlib import util
 from pathlib import Path
 from typing import Any
 
+from airflock.errors import RuleError, ScenarioError
 from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
+from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario
 
 KEYS = ("maximise", "minimise", "over_seeds", "quantile", "own", "source", "note")
-USUAL = {"zapotecatl": "quality", "groups": "quality"}  # by metrics.kind; others have an order parameter fitness
 
 
 def read_objectives(
@@ -44,7 +44,7 @@ def read_objectives(
         how = (key == "maximise", str(over), float(quantile))
         found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]
     if not found:
-        name = USUAL.get(scenario.metrics.kind, "fitness")
+        name = scenario.measures.best or "fitness"
         found = [Objective(name, True, str(over), float(quantile), own.get(name), text if name in own else "")]
     if text and not any(objective.own for objective in found):
         names = [
@@ -63,13 +63,11 @@ def _own(name: Any, folder: Path | None) -> tuple[dict[str, Own], str, list[str]
     if name is None:
         return {}, "", []
     path = Path(str(name)) if folder is None else folder / str(name)
-    spec = util.spec_from_file_location(path.stem, path) if path.suffix == ".py" and path.is_file() else None
-    if spec is None or spec.loader is None:
-        return {}, "", [f"objective.own = {name!r}: no such Python file"]
-    module = util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
-    except Exception as fault:  # the user's own file may fail in any way
-        return {}, "", [f"objective.own: {path}: {type(fault).__name__}: {fault}"]
+        module = own_code("objective.own", str(name), folder)
+    except ScenarioError as fault:
+        return {}, "", [str(fault)]
+    except RuleError as fault:
+        return {}, "", [f"objective.own: {fault}"]
     own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
     return own, hashlib.sha256(path.read_bytes()).hexdigest()[:12], []

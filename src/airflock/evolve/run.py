@@ -188,13 +188,13 @@ def executor_for(
         from airflock.evolve.executors.cluster import Cluster
 
         return Cluster(study, scheduler, timeout=timeout)
-    from airflock.engine import cpu
     from airflock.engine.simulate import compile_for, takes_all_cores
+    from airflock.engine.threads import cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     compile_for(study.scenario, precision=int(study.search.precision))
     alone = takes_all_cores(study.scenario)
-    return Here(score_of(study), 1 if alone else threads or cpu.cores())
+    return Here(score_of(study), 1 if alone else threads or cores())
 
 
 def run(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from airflock.core.parameters import Quantity, declarations
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.sections import SECTIONS
+from airflock.scenarios.sections import ORDER
 
 DECADES = 3.0  # a declared range at least this many decades wide is searched on a logarithmic scale
 
@@ -138,28 +138,22 @@ def _order(axes: Sequence[Axis]) -> list[int]:
     return done
 
 
-def records(scenario: Scenario) -> dict[str, Any]:
-    """Section → record of parameters of a scenario; the empty section holds the keys at the top."""
-    found = {section: getattr(scenario, section) for section in SECTIONS}
-    return {"model": scenario.parameters, **found, "": scenario.flight}
-
-
 def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scenario:
     """The scenario with other numbers, without reading it again. Raises ParameterError outside declared ranges."""
     changed: dict[str, dict[str, float]] = {}
     for key, value in parameters.items():
         section, _, name = key.rpartition(".")
         changed.setdefault(section, {})[name] = value
-    places = {"model": "parameters", "": "flight"}
-    found = records(scenario)
-    return replace(scenario, **{places.get(s, s): replace(found[s], **values) for s, values in changed.items()})
+    fields = {section.key: section.field for section in ORDER}
+    records = scenario.records
+    return replace(scenario, **{fields[s]: replace(records[s], **values) for s, values in changed.items()})
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
     """Key → declaration and present value of every number of a scenario; drag descent's only where it is flown."""
     return {
         f"{section}.{name}".lstrip("."): (how, getattr(record, name))
-        for section, record in records(scenario).items()
+        for section, record in scenario.records.items()
         if section != "aero" or scenario.descends
         for name, how, _ in declarations(record)
         if isinstance(how, Quantity)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 REPORTS = {"phi_coll": ("", "collision risk"), "n_coll": ("", "collisions")}
 
 CLOCK = "collision"
+VIOLATES = {"renumbering": "of two that meet, the one with the higher index begins the event, if nobody was near it"}
 OVER_TIME = {"n_coll": "sum"}
 
 

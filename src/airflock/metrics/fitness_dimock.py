@@ -8,16 +8,27 @@ sound : minus the power and, in units of a lone bird's power, penalties for clos
 import math
 from collections.abc import Mapping
 
+from airflock.metrics.parameters import Parameters
+
 COLLIDED = -1000.0
 CLOSE = 10.0  # lone powers per unit of crowding: half of r_safe costs 2.5
 UNSTABLE = 0.25  # lone powers for a formation that has not settled
+VIOLATES = {"units": "a collision costs COLLIDED, a number of watts"}
 REPORTS = {"fitness": ("W", "minus the mean power per bird, less penalties (metrics.fitness)")}
 
 
-def fitness(score: Mapping[str, float], kind: str = "paper") -> dict[str, float]:
-    """Fitness from the order parameters of one flight; kind: "paper" or "sound"."""
-    if kind == "paper":
-        return {"fitness": COLLIDED if score["n_coll"] > 0.5 else -score["power"]}
-    unrest = 1.0 if math.isnan(score["unrest"]) else min(score["unrest"], 1.0)  # of 1 m/s
-    lost = CLOSE * score["crowding"] + score["n_coll"] + unrest + UNSTABLE * (1.0 - score["stable"])
-    return {"fitness": -(score["power"] + lost * score["power_solo"])}
+def fitness(values: Mapping[str, float], q: Parameters) -> dict[str, float]:
+    """Fitness from the order parameters of one flight, as metrics.fitness says."""
+    return {"fitness": of_paper(values) if q.fitness == "paper" else sound(values)}
+
+
+def of_paper(values: Mapping[str, float]) -> float:
+    """Minus the mean power per bird, W; a fixed low value after a collision (Eq. 10)."""
+    return COLLIDED if values["n_coll"] > 0.5 else -values["power"]
+
+
+def sound(values: Mapping[str, float]) -> float:
+    """Minus the mean power per bird and the penalties, W."""
+    unrest = 1.0 if math.isnan(values["unrest"]) else min(values["unrest"], 1.0)  # of 1 m/s
+    lost = CLOSE * values["crowding"] + values["n_coll"] + unrest + UNSTABLE * (1.0 - values["stable"])
+    return -(values["power"] + lost * values["power_solo"])

@@ -15,6 +15,7 @@ from airflock.core.maths import peak
 
 COLLISIONS = 3.0  # per agent and minute, at which f_coll is a quarter
 CRASHES = 0.1  # the same with the environment
+VIOLATES = {"units": "COLLISIONS and CRASHES are numbers per agent and minute"}
 REPORTS = {
     "f_goals": ("", "share of goals reached, averaged over the flight"),
     "f_coll": ("", "partial fitness of collisions"),

@@ -19,20 +19,20 @@ REPORTS = {
 }
 
 
-def fitness(score: Mapping[str, float], n: int, q: Parameters) -> dict[str, float]:
+def fitness(values: Mapping[str, float], agents: int, q: Parameters) -> dict[str, float]:
     """Partial fitnesses f_* and their product from the order parameters of one flight.
 
-    score : mapping with phi_vel (m/s), phi_corr, phi_coll, phi_wall (m), n_disc, n_min
-    n     : number of agents; q : metric parameters with v_flock, v_tol (m/s), a_tol, r_tol (m)
+    values : mapping with phi_vel (m/s), phi_corr, phi_coll, phi_wall (m), n_disc, n_min
+    agents : number of agents; q : metric parameters with v_flock, v_tol (m/s), a_tol, r_tol (m)
     Returns a dict of numbers between 0 and 1.
     """
     parts = {
-        "f_speed": rising(score["phi_vel"], q.v_flock, q.v_tol),
-        "f_coll": peak(score["phi_coll"], q.a_tol),
-        "f_disc": peak(score["n_disc"], n / 5.0),
-        "f_cluster": rising(score["n_min"], n / 5.0, n / 5.0),
-        "f_wall": bell(score["phi_wall"], q.r_tol),
-        "f_corr": max(score["phi_corr"], 0.0),
+        "f_speed": rising(values["phi_vel"], q.v_flock, q.v_tol),
+        "f_coll": peak(values["phi_coll"], q.a_tol),
+        "f_disc": peak(values["n_disc"], agents / 5.0),
+        "f_cluster": rising(values["n_min"], agents / 5.0, agents / 5.0),
+        "f_wall": bell(values["phi_wall"], q.r_tol),
+        "f_corr": max(values["phi_corr"], 0.0),
     }
     product = 1.0
     for part in parts.values():

@@ -10,7 +10,21 @@ from typing import NamedTuple
 
 from airflock.metrics.quality import REPORTS, Agent, Sample, angle_from, offset_from, sample, total
 
-__all__ = ["REPORTS", "Agent", "Sample", "Scratch", "Shared", "agent", "sample", "survey", "total", "workspace"]
+__all__ = [
+    "REPORTS",
+    "VIOLATES",
+    "Agent",
+    "Sample",
+    "Scratch",
+    "Shared",
+    "agent",
+    "sample",
+    "survey",
+    "total",
+    "workspace",
+]
+
+VIOLATES = {"renumbering": "the program skips the pairs of agents that it marked before"}
 
 
 class Shared(NamedTuple):

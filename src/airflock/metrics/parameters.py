@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import choice, quantity, text
 
 ZAPOTECATL = "Zapotecatl et al. 2016"
 METHODS = "Vásárhelyi et al. 2018, Methods"
@@ -13,13 +13,13 @@ METHODS = "Vásárhelyi et al. 2018, Methods"
 class Parameters(Record):
     """What the order parameters need; None means "from the scenario"."""
 
-    kind: str = choice(
+    kind: str = text(
         "vasarhelyi",
-        ("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"),
         source="our choice",
-        meaning="which order parameters: of Vásárhelyi et al. 2018 with fitness; of Kidger (flocked, sub-swarms, "
-        "avoidance); power of a flock of wings (Dimock & Selig 2003); extension, polarization and quality of "
-        "Zapotecatl et al. 2016; these with sub-groups told apart; or only polarisation, milling, speed and shape",
+        meaning="which order parameters, or a file of your own that ends in .py. vasarhelyi: of Vásárhelyi et al. 2018 "
+        "with fitness; kidger: flocked, sub-swarms, avoidance; dimock: power of a flock of wings (Dimock & Selig "
+        "2003); zapotecatl: extension, polarization and quality of Zapotecatl et al. 2016; groups: these with "
+        "sub-groups told apart; order: only polarisation, milling, speed and shape",
     )
     stop: str = choice(
         "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",

@@ -16,6 +16,7 @@ REPORTS = {
     "power_solo": ("W", "power of a bird alone"),
     "saving": ("", "share of its power that flying together saves a bird"),
 }
+VIOLATES = {"rotation": "forward is along x, in a frame that flies along (wing.frame)"}
 REDUCE = {"most": "max"}
 
 

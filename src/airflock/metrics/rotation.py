@@ -9,6 +9,11 @@ REPORTS = {
     "phi_lap_abs": ("", "rotation, either way"),
 }
 
+VIOLATES = {
+    "translation": "it is the rotation about the arena's centre",
+    "mirror": "phi_lap tells one sense of rotation from the other",
+}
+
 
 class Sample(NamedTuple):
     """phi_LAP of this instant, and its magnitude."""

@@ -33,6 +33,10 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
+VIOLATES = {
+    "rotation": "forward is along x, in a frame that flies along (wing.frame)",
+    "units": "Eq. 4 takes the direction of a weighted offset, be it ever so short; below 1e-6 m its guard shows",
+}
 BEST = "Dimock & Selig 2003, best-ever controller"
 UNIT = 0.3048 * 0.3048 / 4.4482216152605  # m²/(N s) in a ft²/(lbf s)
 

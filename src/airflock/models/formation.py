@@ -15,6 +15,10 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
 
 COMMAND = "velocity"
+VIOLATES = {
+    "mirror": "obstacles are passed on one side, so that nobody waits behind them (turn)",
+    "lone agent": "without a goal a drone stays where it is",
+}
 OURS = "our choice, for drones that stand 3 m apart"
 
 

@@ -29,6 +29,11 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
+VIOLATES = {
+    "rotation": "the spiral of rays that looks for a way out begins on a fixed side",
+    "mirror": "the spiral of rays turns one way",
+    "units": "accel is the growth of a speed per frame, and a frame is 1/60 s (FRAMES)",
+}
 FRAMES = 60.0  # 1/s; our choice, because the thesis gives speeds per frame only
 GOLDEN = 0.6180339887498949  # fraction of the golden ratio: the turn from one point of the spiral to the next
 FINAL = "Kidger, section 5.4"

@@ -28,6 +28,9 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "acceleration"
+VIOLATES = {
+    "units": "the program smooths by clip(9 dt, 0.15, 0.4), 9 per second; as printed, weights turn metres into newtons",
+}
 USUAL = {"fov_s_deg": 360.0, "fov_a_deg": 360.0, "fov_c_deg": 360.0}
 TABLE = "Zapotecatl et al. 2016, Table 1"
 PROGRAM = "authors' program of Zapotecatl et al. 2016"

@@ -1,7 +1,8 @@
-"""Claims: what a publication states, what we measure, and whether the two agree."""
+"""Claims: a statement, what we measured for it, and the verdict that follows from its bound."""
 
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -9,54 +10,115 @@ from typing import Any
 
 from airflock import atomic
 from airflock.errors import AirflockError
+from airflock.papers import bounds
+from airflock.papers.statements import Statement
+from airflock.papers.statistics import Estimate
 
 SEEDS = "0 to n - 1 of each scenario, n flights"  # as `Flights.score` counts them
-VERDICTS = ("reproduced", "not reproduced", "finding")
+VERDICTS = {  # by kind: the bound holds, it does not, there is none
+    "paper": ("reproduced", "not reproduced", "qualitative only"),
+    "program": ("agrees", "differs", "finding"),
+    "ours": ("holds", "does not hold", "finding"),
+}
+UNFLOWN = "not flown yet"
+COUNTED = ("reproduced", "not reproduced", "qualitative only", "not testable", "not flown yet")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Claim:
-    """One published number or statement beside our measurement of it.
+@dataclass(frozen=True)
+class Measured:
+    """A measurement for the statement with the same id.
 
-    id           : part and quantity, for instance s2.phi_vel.4ms
-    statement    : what is claimed, in one sentence
-    source       : table, figure, column or page of the paper, or the program that it is compared with
-    test         : how the verdict follows from the numbers
-    published, published_sd : the reported value and its SD over runs, if it is a number
-    ours, sd     : our value and the SD over our runs; low, high: its 95 % interval
-    runs         : flights behind our value
-    verdict      : reproduced, not reproduced, or finding (nothing printed to agree with)
-    reason       : why it is not reproduced, measured; or what was found
+    quantity, at : what was measured and where, made from the numbers that were used; they must be the statement's
+    value        : our value with its SD and 95 % interval; p: of the test that the bound asks for
+    note         : what else was seen
+    reference    : what it is compared with and no paper prints (runs of a program, theory): value and SD
     """
 
     id: str
-    statement: str
-    source: str
-    test: str
-    verdict: str
-    published: float | None = None
-    published_sd: float | None = None
+    quantity: str
+    at: str
+    value: Estimate
+    note: str = ""
+    p: float | None = None
+    reference: tuple[float, float | None] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim(Statement):
+    """A statement with our measurement: fields of both, see `Statement` and `Measured`.
+
+    The verdict is that of the bound, or the statement's own if it has no bound; any other is refused.
+    """
+
     ours: float | None = None
     sd: float | None = None
     low: float | None = None
     high: float | None = None
     runs: int = 0
-    reason: str = ""
+    p: float | None = None
+    reference: float | None = None
+    reference_sd: float | None = None
+    note: str = ""
 
     def __post_init__(self) -> None:
-        if self.verdict not in VERDICTS:
-            raise AirflockError(f"claim {self.id}: verdict = {self.verdict!r} is none of {', '.join(VERDICTS)}")
-        if self.verdict != "reproduced" and not self.reason:
-            raise AirflockError(f"claim {self.id}: {self.verdict} without a reason")
+        wanted = verdict_of(self)
+        if self.verdict != wanted:
+            raise AirflockError(f"claim {self.id}: verdict = {self.verdict!r}, but its bound says {wanted!r}")
 
     def as_dict(self) -> dict[str, Any]:
         """The claim as plain values, without what it does not have."""
         return {key: value for key, value in asdict(self).items() if value not in (None, "") and not _lost(value)}
 
 
-def judged(holds: bool, reason: str = "") -> dict[str, Any]:
-    """Verdict and reason of a test that holds or does not."""
-    return {"verdict": "reproduced" if holds else "not reproduced", "reason": reason}
+def verdict_of(claim: "Claim") -> str:
+    """Verdict that a claim's fields give."""
+    holds, fails, none = VERDICTS[claim.kind]
+    measured = isinstance(claim, Claim) and claim.ours is not None
+    if claim.quantity and not measured and claim.verdict in ("", UNFLOWN, *VERDICTS[claim.kind]):
+        if not claim.command:
+            raise AirflockError(f"claim {claim.id}: has no measurement and no command that would fly it")
+        return UNFLOWN
+    if not claim.bound:
+        return claim.verdict or none
+    return holds if bounds.holds(claim.bound, asdict(claim)) else fails
+
+
+def judge(statements: Mapping[str, Statement], measured: Iterable[Measured]) -> list[Claim]:
+    """Claims of what was measured, in the order of the statements.
+
+    Raises AirflockError if something else was measured than a statement is about.
+    """
+    by_id = {found.id: found for found in measured}
+    unknown = sorted(set(by_id) - set(statements))
+    if unknown:
+        raise AirflockError(f"measured without a statement: {', '.join(unknown)}")
+    return [_judged(statements[name], by_id[name]) for name in statements if name in by_id]
+
+
+def unmeasured(statements: Mapping[str, Statement]) -> list[Claim]:
+    """Claims of the statements that nothing measures, with the reason that they give."""
+    return [Claim(**asdict(s)) for s in statements.values() if s.verdict and not s.quantity]
+
+
+def unflown(statements: Mapping[str, Statement], claims: Iterable[Claim], command: str) -> list[Claim]:
+    """Claims of the statements that were not measured this time, with the command that would measure them."""
+    flown = {claim.id for claim in claims}
+    rest = [s for s in statements.values() if s.id not in flown and s.quantity]
+    return [Claim(**asdict(s) | {"verdict": s.verdict or UNFLOWN, "command": command}) for s in rest]
+
+
+def _judged(statement: Statement, found: Measured) -> Claim:
+    for key in ("quantity", "at"):
+        told, used = getattr(statement, key), getattr(found, key)
+        if told != used:
+            raise AirflockError(f"claim {statement.id}: is about {key} {told!r}, but {used!r} was measured")
+    values = asdict(statement)
+    values |= {**found.value._asdict(), "p": found.p, "note": found.note}
+    values["reference"], values["reference_sd"] = found.reference or (None, None)
+    holds, fails, none = VERDICTS[statement.kind]
+    if not statement.bound:
+        return Claim(**values | {"verdict": statement.verdict or none})
+    return Claim(**values | {"verdict": holds if bounds.holds(statement.bound, values) else fails})
 
 
 def header(paper: str, command: str, seeds: int | None = None, told: str = SEEDS) -> dict[str, str]:
@@ -75,7 +137,11 @@ def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) 
     import tomlkit
 
     document = tomlkit.document()
-    document.add(tomlkit.comment("Written by the command below; numbers in SI units, intervals are 95 %."))
+    document.add(
+        tomlkit.comment(
+            "Written by the command below; SI units unless a unit is given, intervals low to high are 95 %."
+        )
+    )
     for key, value in above.items():
         document.add(key, value)
     table = tomlkit.aot()
@@ -92,7 +158,7 @@ def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) 
 
 
 def read_claims(path: Path) -> tuple[dict[str, Any], list[Claim]]:
-    """Header and claims of a claims.toml."""
+    """Header and claims of a claims.toml; a verdict that does not follow from its bound is refused."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
         entries = document.pop("claim", [])
@@ -100,7 +166,7 @@ def read_claims(path: Path) -> tuple[dict[str, Any], list[Claim]]:
         for entry in entries:
             unknown = set(entry) - known
             if unknown:
-                raise AirflockError(f"{path}: claim {entry.get('id')}: {', '.join(sorted(unknown))} is no key")
+                raise AirflockError(f"{path}: claim {entry.get('id')}: unknown key {', '.join(sorted(unknown))}")
         return document, [Claim(**entry) for entry in entries]
     except (OSError, tomllib.TOMLDecodeError, TypeError) as fault:
         raise AirflockError(f"{path}: {fault}") from fault
@@ -115,54 +181,81 @@ def _spread(value: float | None, sd: float | None) -> str:
     return number(value) + (f" ± {number(sd, 2)}" if sd is not None else "")
 
 
+def sentence(claim: Claim) -> str:
+    """What is claimed: the paper's words in quotation marks, or ours."""
+    return f"“{claim.quote}”" + (f" {claim.statement}" if claim.statement else "") if claim.quote else claim.statement
+
+
+def asked(claim: Claim) -> str:
+    """What is measured, where, and the bound, in one line."""
+    told = ", ".join(part for part in (f"`{claim.quantity}`" if claim.quantity else "", claim.at) if part)
+    p = f" (p = {number(claim.p, 2)})" if claim.p is not None else ""
+    return told + (f": {claim.bound}{p}" if claim.bound else "")
+
+
 def cells(claim: Claim) -> tuple[str, ...]:
-    """Claim as the cells of a table: id, statement, published, ours, 95 % interval, runs, verdict."""
-    published, ours = _spread(claim.published, claim.published_sd), _spread(claim.ours, claim.sd)
+    """Claim as the cells of a table: see HEADINGS."""
+    ours, published = _spread(claim.ours, claim.sd), _spread(claim.published, claim.published_sd)
+    published = published or _spread(claim.reference, claim.reference_sd)
+    unit = f" {claim.unit}" if claim.unit and ours else ""
     interval = "" if claim.low is None or claim.high is None else f"{number(claim.low)} … {number(claim.high)}"
-    return claim.id, claim.statement, published, ours, interval, str(claim.runs or ""), claim.verdict
+    about = f"{sentence(claim)} ({claim.where})"
+    return claim.id, about, asked(claim), published, ours + unit, interval, str(claim.runs or ""), claim.verdict
 
 
-HEADINGS = ("claim", "statement", "published", "ours", "95 % interval", "runs", "verdict")
+HEADINGS = ("claim", "sentence", "judged by", "printed or reference", "ours", "95 % interval", "runs", "verdict")
 
 
-def markdown(claims: Sequence[Claim], reasons: bool = True) -> str:
-    """Claims as a Markdown table, and below it the reason of each that is not simply reproduced."""
+def markdown(claims: Sequence[Claim]) -> str:
+    """Claims as a Markdown table, and below it what is to be said of each."""
     rows = [HEADINGS, ("---",) * len(HEADINGS), *(cells(claim) for claim in claims)]
     text = "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows) + "\n"
-    notes = [f"* `{claim.id}`: {claim.reason}" for claim in claims if claim.reason] if reasons else []
+    notes = [f"* `{claim.id}`: {told}" for claim in claims if (told := remark(claim))]
     return text + ("\n" + "\n".join(notes) + "\n" if notes else "")
 
 
-def write_page(
-    folder: Path,
-    title: str,
-    command: str,
-    claims: Sequence[Claim],
-    names: tuple[str, str] = ("claims", "README"),
-    told: str = SEEDS,
-) -> None:
-    """Write claims.toml and README.md, or files of other names, for claims without figures; told: as of `header`."""
-    write_claims(folder / f"{names[0]}.toml", claims, header(title, command, told=told))
-    atomic.write(folder / f"{names[1]}.md", f"# {title}\n\n`{command}` recomputes this page.\n\n{markdown(claims)}")
+def remark(claim: Claim) -> str:
+    """Reason, note, the command that would fly it, and what was judged before."""
+    command = f"`{claim.command}` would fly it" if claim.command else ""
+    return ". ".join(part.rstrip(".") for part in (claim.reason, claim.note, command, claim.changed) if part)
+
+
+def headline(claims: Sequence[Claim]) -> str:
+    """Count of the paper's own sentences by verdict; empty if there is none."""
+    paper = [claim for claim in claims if claim.kind == "paper"]
+    if not paper:
+        return ""
+    count = [(verdict, sum(claim.verdict == verdict for claim in paper)) for verdict in COUNTED]
+    return f"{len(paper)} sentences of the paper: " + ", ".join(f"{n} {verdict}" for verdict, n in count if n)
 
 
 def print_claims(claims: Sequence[Claim]) -> None:
-    """Print claims as a table, then their reasons and a count of verdicts."""
+    """Print each claim with its verdict, what was measured and what is to be said of it; then the headline."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.padding import Padding
+    from rich.text import Text
 
-    colour = {"reproduced": "green", "not reproduced": "red", "finding": "yellow"}
-    table = Table(*HEADINGS)
+    good, bad = ({verdicts[k] for verdicts in VERDICTS.values()} for k in (0, 1))
+    console = Console(highlight=False)
     for claim in claims:
-        *most, verdict = cells(claim)
-        table.add_row(*most, f"[{colour[verdict]}]{verdict}[/]")
-    console = Console()
-    console.print(table)
-    for claim in claims:
-        if claim.reason:
-            console.print(f"{claim.id}: {claim.reason}", markup=False, highlight=False)
-    count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
-    console.print(", ".join(f"{n} {verdict}" for verdict, n in count.items()))
+        colour = "green" if claim.verdict in good else "red" if claim.verdict in bad else "yellow"
+        console.print(Text.assemble((claim.id, "bold"), "  ", (claim.verdict, colour)))
+        for line in (f"{sentence(claim)} ({claim.where})", _numbers(claim), remark(claim)):
+            if line:
+                console.print(Padding(Text(line), (0, 0, 0, 2)))
+    told = ", ".join(f"{n} {verdict}" for verdict, n in Counter(c.verdict for c in claims if c.kind != "paper").items())
+    for line in (headline(claims), f"not of the paper: {told}" if told else ""):
+        if line:
+            console.print(line)
+
+
+def _numbers(claim: Claim) -> str:
+    """What was measured, in one line: nothing of a sentence that nothing tests."""
+    _, _, question, printed, ours, interval, runs, _ = cells(claim)
+    if not ours:
+        return ""
+    against = f"; {'printed' if claim.published is not None else 'reference'} {printed}" if printed else ""
+    return f"{question}; ours {ours}" + f" ({interval})" * bool(interval) + f", {runs} runs" * bool(runs) + against
 
 
 def _lost(value: Any) -> bool:

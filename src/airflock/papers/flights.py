@@ -7,8 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.engine.cpu import in_threads
 from airflock.engine.simulate import score_flights
+from airflock.engine.threads import in_threads
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.scenario import Scenario
@@ -40,7 +40,7 @@ class Flights:
             [scenarios[k] for k, _ in pairs],
             [s for _, s in pairs],
             threads=self.threads,
-            done=self._counter(title, len(pairs)),
+            done=self.counter(title, len(pairs)),
         )
         keys = [(*k, s) if isinstance(k, tuple) else (k, s) for k, s in pairs]
         return pd.DataFrame(rows, index=pd.MultiIndex.from_tuples(keys))
@@ -53,9 +53,10 @@ class Flights:
             return lambda: over_time(simulate(scenario, seed))
 
         jobs = [job(seed) for seed in range(seeds)]
-        return list(in_threads(jobs, self.threads, self._counter(title, seeds)))
+        return list(in_threads(jobs, self.threads, self.counter(title, seeds)))
 
-    def _counter(self, title: str, total: int) -> Callable[[], None]:
+    def counter(self, title: str, total: int) -> Callable[[], None]:
+        """What is called after each flight of a title, to tell how far it is."""
         done = 0
 
         def count() -> None:

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from airflock.errors import AirflockError
-from airflock.papers.claims import Claim
+from airflock.papers.claims import Claim, Measured, judge, unmeasured
 from airflock.papers.flights import Flights, Progress, progress_bar
+from airflock.papers.statements import load
 
+Flown = tuple[list[Measured], dict[str, Any]]  # measurements, and by part what is behind them
 Found = tuple[list[Claim], dict[str, Any]]  # claims, and by part what is behind them
 
 
@@ -15,15 +17,17 @@ Found = tuple[list[Claim], dict[str, Any]]  # claims, and by part what is behind
 class Paper:
     """A publication.
 
-    title : as printed, with its authors
-    parts : what is flown when no part is asked for by name
-    fly   : called with the parts wanted and how to fly
-    long  : parts of hours, flown only when asked for by name
+    title   : as printed, with its authors
+    package : where its statements.toml lies, airflock.papers.NAME
+    parts   : what is flown when no part is asked for by name
+    fly     : called with the parts wanted and how to fly
+    long    : parts of hours, flown only when asked for by name
     """
 
     title: str
+    package: str
     parts: tuple[str, ...]
-    fly: Callable[[Sequence[str], Flights], Found]
+    fly: Callable[[Sequence[str], Flights], Flown]
     long: tuple[str, ...] = ()
 
     def run(
@@ -49,26 +53,28 @@ class Paper:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Found:
-        """Claims as of `run`, and by part what is behind them."""
+        """Claims as of `run`, and by part what is behind them; of all parts also the sentences that nothing tests."""
         known = (*self.long, *self.parts)
         if only is not None and only not in known:
             raise AirflockError(f"only = {only!r} is no part; known: {', '.join(known)}")
+        statements = load(self.package)  # a fault in it is told before anything flies
         if progress is None:
             with progress_bar() as bar:
                 return self.recompute(only, quick, seeds, threads, bar)
         flights = Flights(quick=quick, seeds=seeds, threads=threads, progress=progress)
-        return self.fly((only,) if only else self.parts, flights)
+        measured, flown = self.fly((only,) if only else self.parts, flights)
+        return judge(statements, measured) + ([] if only else unmeasured(statements)), flown
 
 
-def by_modules(modules: dict[str, Any]) -> Callable[[Sequence[str], Flights], Found]:
-    """Fly a paper whose parts are modules with `fly(flights)` and `claims(data)`."""
+def by_modules(modules: dict[str, Any]) -> Callable[[Sequence[str], Flights], Flown]:
+    """Fly a paper whose parts are modules with `fly(flights)` and `measured(data)`."""
 
-    def fly(wanted: Sequence[str], flights: Flights) -> Found:
-        claims: list[Claim] = []
+    def fly(wanted: Sequence[str], flights: Flights) -> Flown:
+        found: list[Measured] = []
         flown: dict[str, Any] = {}
         for part in wanted:
             flown[part] = modules[part].fly(flights)
-            claims += modules[part].claims(flown[part])
-        return claims, flown
+            found += modules[part].measured(flown[part])
+        return found, flown
 
     return fly

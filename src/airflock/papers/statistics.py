@@ -15,13 +15,14 @@ class Estimate(NamedTuple):
 
     ours: float
     sd: float | None
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     runs: int
 
-    def fields(self) -> dict[str, Any]:
-        """Keyword arguments of a Claim."""
-        return self._asdict()
+
+def one(value: float, runs: int = 1) -> Estimate:
+    """A value without a spread: an extreme, a count, a result of many flights at once."""
+    return Estimate(float(value), None, None, None, runs)
 
 
 def mean(values: ArrayLike) -> Estimate:

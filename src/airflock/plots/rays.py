@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from airflock.core.agent import Heard, State, decide
-from airflock.engine.plain_world import Course, Place, Senses
+from airflock.engine.place import Course, Place, Senses
 from airflock.engine.tables import clock
 from airflock.errors import RecordingError
 from airflock.plots import style

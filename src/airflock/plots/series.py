@@ -28,12 +28,14 @@ def series(
     start, stop : window of time, s; by default the whole flight
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     """
-    if scenario_of(recording, settings).metrics.kind == "kidger":
+    course = _window(over_time(recording, settings), start, stop)
+    if "flocked" in course:
         from airflock.plots.flocked import flocked
 
         return flocked(recording, start=start, stop=stop, settings=settings)
+    if not {"phi_corr", "phi_vel", "phi_lap"} <= set(course):
+        return _each(recording, course)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0
-    course = _window(over_time(recording, settings), start, stop)
     figure = style.Picture(7.0, 4.2)
     figure.set_layout_engine("constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
@@ -50,6 +52,19 @@ def series(
     style.legend(upper, handles, columns=4, above=True)
     _rotation(lower, course, style.PURPLE, LAP)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
+    style.overall(figure, name_of(recording), details_of(recording))
+    return figure
+
+
+def _each(recording: xr.Dataset, course: pd.DataFrame) -> Figure:
+    """Every value of a metric set that has no picture of its own, one below the other."""
+    figure = style.Picture(7.0, 0.6 + 1.1 * len(course.columns))
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(len(course.columns), 1, sharex=True, squeeze=False)[:, 0]
+    for number, (name, axes) in enumerate(zip(course.columns, panels, strict=True)):
+        values = course[name].dropna()  # values of the collision clock stand at its instants only
+        axes.plot(values.index, values, color=style.LINES[number % len(style.LINES)], linewidth=0.9)
+        style.dress(axes, "time (s)" if axes is panels[-1] else "", name)
     style.overall(figure, name_of(recording), details_of(recording))
     return figure
 

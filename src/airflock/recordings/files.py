@@ -15,6 +15,8 @@ from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
 from airflock.recordings.scores import scenario_of
 
+FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
+
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a recording as netCDF: to a temporary name first, then renamed.
@@ -91,6 +93,10 @@ def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
     source = Path(path)
     if not source.is_file():
         raise RecordingError(f"{source}: no such file")
+    if source.suffix.lower() in FOREIGN:
+        raise RecordingError(
+            f"{source}: holds tracks, but is no recording yet: airflock import {source.name} --save FILE.nc"
+        )
     try:
         with xr.open_dataset(source, engine="h5netcdf") as opened:
             recording = opened.load()
@@ -108,9 +114,11 @@ def fly_again(recording: xr.Dataset) -> tuple[bool, list[str]]:
     attributes: dict[str, Any] = dict(recording.attrs)
     if "airflock_scenario" not in attributes or not int(attributes.get("random_start", 1)):
         raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
-    scenario = scenario_of(recording)
-    if scenario.document["model"].get("kind") != json.loads(attributes["airflock_scenario"])["model"].get("kind"):
-        raise RecordingError("recording: was flown with a law given directly, which is not in the file")
+    scenario, flown = scenario_of(recording), json.loads(attributes["airflock_scenario"])
+    for section, what in (("model", "law"), ("body", "body")):
+        now, then = (document.get(section, {}).get("kind") for document in (scenario.document, flown))
+        if now != then:
+            raise RecordingError(f"recording: was flown with a {what} given directly, which is not in the file")
     seed, precision = int(attributes["airflock_seed"]), int(attributes["airflock_precision"])
     again = simulate(scenario, seed, precision=precision, device=str(attributes.get("airflock_device", "cpu")))
     now = provenance(scenario, seed, precision)

@@ -3,19 +3,22 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from airflock import __version__
-from airflock.engine import cpu
+from airflock.engine.events import Event
+from airflock.engine.flight import DEVICES, Flight
 from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
+from airflock.errors import FlightError
 from airflock.recordings.layout import dataset
 from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
@@ -30,6 +33,7 @@ def simulate(
     start: Any = None,
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
+    events: Sequence[Event | Mapping[str, Any]] = (),
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
@@ -47,6 +51,8 @@ def simulate(
         cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked.
     say : callable, optional
         Told what auto picked.
+    events : sequence of mappings, optional
+        What is done to the flight on its way, as `Flight.events` or the attribute airflock_events hold it.
 
     Returns
     -------
@@ -74,12 +80,30 @@ def simulate(
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)
     device = picked([scenario], device, precision=precision, record=True, say=say)
+    if device in DEVICES:
+        flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
+        flight.finish()
+        return recording_of(flight)
+    if events:
+        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu or python")
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
-    period = clock(scenario)["sample_every"] * scenario.flight.dt
+    times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
+    attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None), "airflock_device": device}
+    return dataset(flown.frames, scenario.dimensions, times, attributes, scenario.model.command)
+
+
+def recording_of(flight: Flight) -> xr.Dataset:
+    """Recording of what an open flight has flown so far; it must have been opened with record=True.
+
+    Its attribute airflock_events holds what was done to the flight; with scenario and seed it gives the same bits.
+    """
+    scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
-    attributes |= {"airflock_device": device} if device != "cpu" else {}
-    return dataset(flown.frames, scenario.dimensions, period, attributes, scenario.model.command)
+    attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
+    if flight.events:
+        attributes["airflock_events"] = json.dumps([plain(event.plain()) for event in flight.events])
+    return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
@@ -99,14 +123,16 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 
 
 def flown_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values; a law in a file of its own with its whole path, so that it is found from anywhere.
+    """The scenario as plain values; code in files of its own with whole paths, so that it is found from anywhere.
 
-    A law that was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
+    What was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
     """
     document: dict[str, Any] = plain(scenario.document)
-    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
-    if law.suffix == ".py" and law.is_file():
-        document["model"]["kind"] = str(law.absolute())
+    for section in ("model", "body", "metrics"):
+        kind = str(document.get(section, {}).get("kind", ""))
+        places = [place for place in (Path(scenario.name).parent / kind, Path(kind)) if place.is_file()]
+        if kind.endswith(".py") and places:
+            document[section]["kind"] = str(places[0].absolute())
     return document
 
 
@@ -129,8 +155,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(entry) for entry in value]
     return value
-
-
-def warm(scenario: Scenario, precision: int = 32) -> None:
-    """Compile or load the driver of a scenario before it is needed."""
-    cpu.flight_driver(plan_of(scenario, precision=precision))

@@ -7,10 +7,10 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from airflock import __version__
-from airflock.engine.cpu import cores
 from airflock.engine.cuda.device import describe, trouble
 from airflock.engine.simulate import score_flight, score_flights
 from airflock.engine.store import cache_folder
+from airflock.engine.threads import cores
 from airflock.recordings.flights import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario

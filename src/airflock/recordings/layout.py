@@ -17,16 +17,25 @@ UNITS = {"position": "m", "velocity": "m/s"}
 
 
 def dataset(
-    frames: NDArray[Any], dimensions: int, period: float, attributes: dict[str, Any], command: str
+    frames: NDArray[Any],
+    dimensions: int,
+    times: float | NDArray[Any],
+    attributes: dict[str, Any],
+    command: str,
 ) -> xr.Dataset:
-    """Dataset from frames (time, component, agent): position, velocity and command components, `period` s apart.
+    """Dataset from frames (time, component, agent): position, velocity and command components.
 
+    times   : time of each frame, or the constant time between two, s
     command : what the model commands: velocity (m/s), acceleration (m/s²) or heading
     """
     count, _, agents = frames.shape
+    if isinstance(times, np.ndarray):
+        period = float(times[1] - times[0]) if count > 1 else 1.0
+    else:
+        period, times = times, np.arange(count) * times
     space = ["x", "y", "z"][:dimensions]
     coordinates = {
-        "time": ("time", np.arange(count) * period, {"units": "s"}),
+        "time": ("time", times, {"units": "s"}),
         "space": space,
         "keypoint": ["centre"],
         "individual": [f"agent_{i}" for i in range(agents)],

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,17 +10,22 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from airflock.aero import descent
+from airflock.body.registry import BODIES
+from airflock.core.contract import Model
+from airflock.core.parameters import Parameters, declarations
+from airflock.core.vocabulary import Own, asks
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
-from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
 from airflock.metrics import nearest
-from airflock.metrics.registry import reports
+from airflock.metrics.registry import POWER, SETS, reports
 from airflock.recordings.layout import frames_of
 from airflock.scenarios.files import MODELS, loaded, make
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
 
 
@@ -93,7 +98,7 @@ def score(
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
-    known = reports(scenario.metrics.kind)
+    known = reports(scenario.measures)
     table.attrs["units"] = {name: known[name][0] for name in table.columns if name in known}
     table.attrs["meanings"] = {name: known[name][1] for name in table.columns if name in known}
     return table
@@ -138,14 +143,12 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = replace(plan_of(scenario, precision=precision), record=False)
-    found = tables(scenario, plan, 0)
+    plan = plan_of(scenario, precision=precision)
     q = scenario.measured_by()
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
-    for name, seconds in every.items():
-        found.whole[WHOLE.index(name)] = max(1, round(seconds / period))
-    found.whole[WHOLE.index("agents")] = frames.shape[2]
-    values, series = cpu.measure_frames(plan, found, frames, period)
+    steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
+    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    values, series = cpu.measure_frames(plan, numbers, frames, period)
     names = [name for name, _, _ in columns(plan.metrics)]
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times, columns=names)
@@ -154,21 +157,37 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
 
 
+class _Nothing(Parameters):
+    """A law without a parameter."""
+
+
+def _on(own: Own) -> tuple[float, float, float]:
+    """Keep the velocity."""
+    return own.vx, own.vy, own.vz
+
+
+# Stands where the law of a recording is not known: it is measured, not flown.
+UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=_on)
+
+
 def aero_settings(recording: xr.Dataset, changed: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Settings that measure the power of a recording's geometry; `changed` goes before them.
 
-    A flock of birds was flown in a frame that moves with the air; elsewhere forward is the flock's mean heading.
+    A law that solves for the wings of the flock flies in a frame that moves with the air; elsewhere forward is the
+    flock's mean heading.
     """
-    document = json.loads(str(recording.attrs.get("airflock_scenario") or "{}"))
-    birds = document.get("model", {}).get("kind") == "dimock_2003"
-    frame = {} if birds else {"wing.frame": "ground"}
-    return {"metrics.kind": "dimock", "metrics.fitness": "sound", **frame, **(changed or {})}
+    law = scenario_of(recording).model
+    on_wings = law.flock is not None and law.flock is not descent.flock and "wing" in asks(law.flock, "flock")
+    frame = {} if on_wings else {"wing.frame": "ground"}
+    return {**POWER, **frame, **(changed or {})}
 
 
 def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> Scenario:
     """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
 
-    A log brings no arena and no model: its arena is open unless settings name one, and v_flock is its mean speed.
+    A law, a body or a metric set that was given directly is not in the file: the law is unknown then, and the body and
+    the metrics are the usual ones. A log brings no arena: it is open unless settings name one, and v_flock is its mean
+    speed.
     """
     text = recording.attrs.get("airflock_scenario")
     if text:
@@ -176,24 +195,47 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
             document = json.loads(text)
         except json.JSONDecodeError as fault:
             raise RecordingError(f"recording: attribute airflock_scenario is damaged: {fault}") from fault
-        name = str(recording.attrs.get("airflock_name", "recording"))
-        kind = document.get("model", {}).get("kind", "")
-        if kind in MODELS or str(kind).endswith(".py"):
-            return make(document, name, settings)
-        # flown with a law that was given directly: its parameters are gone, what it is measured by is kept
-        measured = json.loads(str(recording.attrs.get("airflock_metrics", "{}")))
-        stand_in = {**document, "model": {"kind": MODELS[0]}, "metrics": measured}
-        return make(stand_in, name, {k: v for k, v in (settings or {}).items() if not k.startswith("model.")})
+        return _flown(document, recording, dict(settings or {}))
     frames, period = frames_of(recording)
     dims = frames.shape[1] // 2
     speed = float(np.linalg.norm(frames[:, dims:], axis=1).mean())
     document = {
         "agents": 1,
         "dt": period,
-        "model": {"kind": "vasarhelyi_2018"},
         "sensors": {"period": period},
         "start": {"separation": 0.0},
         "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return make(document, "recording", settings)
+    return make(document, "recording", settings, law=UNKNOWN)
+
+
+def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, Any]) -> Scenario:
+    """Scenario of a simulated recording, with stand-ins for what the file does not hold."""
+    name = str(recording.attrs.get("airflock_name", "recording"))
+    if not _in_file(_kind(document, "metrics"), SETS):
+        document = {**document, "metrics": _usual_metrics(document["metrics"])}
+    if not _in_file(_kind(document, "body"), BODIES):
+        document = {**document, "body": {}}
+    if _kind(document, "model") in MODELS or _kind(document, "model").endswith(".py"):
+        return make(document, name, settings)
+    measured = json.loads(str(recording.attrs.get("airflock_metrics", "{}")))
+    kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
+    stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
+    return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
+
+
+def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a section metrics that every set has."""
+    known = {key for key, _, _ in declarations(SECTIONS["metrics"])} - {"kind"}
+    return {key: value for key, value in table.items() if key in known}
+
+
+def _kind(document: Mapping[str, Any], section: str) -> str:
+    table = document.get(section, {})
+    return str(table.get("kind", "")) if isinstance(table, Mapping) else ""
+
+
+def _in_file(kind: str, known: Container[str]) -> bool:
+    """Whether a kind is the usual one, one of ours, or a file of its own; else it was given directly."""
+    return not kind or kind in known or kind.endswith(".py")

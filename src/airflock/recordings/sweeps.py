@@ -113,11 +113,11 @@ def flown(
 
 def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
     """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
-    each = [numbers_of(found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    each = [numbers_of(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
     known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
     if asked is None:
-        usual = [name for name in ("fitness", "quality") if name in known]
-        return (usual + known + [""])[0]
+        usual = [name for name in (found.measures.best for found in scenarios) if name in known]
+        return str((usual + known + [""])[0])
     if each and asked not in known:
         near = get_close_matches(asked, known, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"

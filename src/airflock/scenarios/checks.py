@@ -2,28 +2,61 @@
 
 from collections.abc import Mapping
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 from airflock.body.registry import BODIES, body_for
-from airflock.core.contract import Model
-from airflock.metrics.registry import metrics_of
+from airflock.core.contract import Body, Metric, MetricSet, Model, body
+from airflock.core.vocabulary import asks
+from airflock.errors import AirflockError
+from airflock.metrics.registry import SETS, USUAL, metric_set
 from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.own_code import own_code
 
 
-def body_record(table: Any, found: Model | None) -> tuple[type, list[str]]:
-    """Record behind the section body, by its key kind or else by what the model commands; and what is wrong with it."""
+def body_of(table: Any, found: Model | None, folder: Path | None = None) -> tuple[Body, list[str]]:
+    """Body of the section body, by its key kind or else by what the model commands; and what is wrong with it."""
     usual = body_for(found.command if found else "velocity")
     kind = table.get("kind", usual) if isinstance(table, Mapping) else usual
-    if not isinstance(kind, str) or kind not in BODIES:
+    if isinstance(kind, str) and kind.endswith(".py"):
+        try:
+            carried = body(own_code("body.kind", kind, folder), Path(kind).stem)
+        except AirflockError as fault:
+            return BODIES[usual], str(fault).splitlines()
+    elif isinstance(kind, str) and kind in BODIES:
+        carried = BODIES[kind]
+    else:
         near = get_close_matches(str(kind), BODIES, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}"
-        return BODIES[usual].Parameters, [f"body.kind = {kind!r} is no body; {hint}"]
-    if found and BODIES[kind].accepts != found.command:
-        return BODIES[usual].Parameters, [
-            f"body.kind = {kind!r} takes a {BODIES[kind].accepts}, but model {found.name} commands {found.command}; "
-            f"body.kind = {usual!r} takes it"
-        ]
-    return BODIES[kind].Parameters, []
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}, or a file that ends in .py"
+        return BODIES[usual], [f"body.kind = {kind!r} is no body; {hint}"]
+    faults = carries(carried, found, kind)
+    return BODIES[usual] if faults else carried, faults
+
+
+def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
+    """Why a body cannot fly what a model commands, one line."""
+    if found is None or carried.accepts == found.command:
+        return []
+    return [
+        f"body.kind = {kind!r} takes a {carried.accepts}, but model {found.name} commands {found.command}; "
+        f"body.kind = {body_for(found.command)!r} takes it"
+    ]
+
+
+def metrics_set(table: Any, folder: Path | None = None) -> tuple[MetricSet, list[str]]:
+    """Metric set of the section metrics, by its key kind; and what is wrong with it."""
+    kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL
+    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
+    if isinstance(kind, str) and kind in SETS:
+        return SETS[kind], []
+    if isinstance(kind, str) and kind.endswith(".py"):
+        try:
+            return metric_set(own_code("metrics.kind", kind, folder), Path(kind).stem), []
+        except AirflockError as fault:
+            return SETS[USUAL], str(fault).splitlines()
+    near = get_close_matches(str(kind), SETS, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return SETS[USUAL], [f"metrics.kind = {kind!r} is none of {', '.join(SETS)}, or a file that ends in .py{hint}"]
 
 
 def order_faults(flight: Any, sensors: Any, radio: Any) -> list[str]:
@@ -46,29 +79,20 @@ def order_faults(flight: Any, sensors: Any, radio: Any) -> list[str]:
     ]
 
 
-def metric_faults(q: Any, world: Any) -> list[str]:
-    """What is wrong with the metrics of Zapotecatl et al. 2016 beyond single ranges."""
-    if q is None or world is None or q.kind not in ("zapotecatl", "groups"):
+def metric_faults(measures: MetricSet, q: Any, world: Any) -> list[str]:
+    """What a metric set says is wrong with its parameters beyond single ranges."""
+    if q is None or world is None or measures.faults is None:
         return []
-    most = q.max_e if q.max_e is not None else largest_extension(world)
-    if not most:
-        return ["metrics.max_e is missing: without an arena the largest extension is unknown; give metrics.max_e in m"]
-    faults = []
-    if q.count == "program" and world.edges == "periodic":
-        faults.append("metrics.count = 'program': the program knows no periodic box (world.edges); count each")
-    if q.k is not None and q.k > most * (1.0 + 1e-9):
-        faults.append(f"metrics.k = {q.k:g} m lies outside [0, {most:g}] m, the largest extension metrics.max_e")
-    if abs(q.sigma + q.gamma - 1.0) > 1e-9:
-        faults.append(f"metrics.sigma + metrics.gamma = {q.sigma + q.gamma:g} is not 1")
-    return faults
+    given = {"q": q, "largest": largest_extension(world), "edges": world.edges}
+    return measures.faults(**{name: given[name] for name in asks(measures.faults, "faults", measures.name)})
 
 
 MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 
 
-def pair_notes(flight: Any, q: Any) -> list[str]:
+def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...]) -> list[str]:
     """What order parameters over all pairs cost in a large flock: neighbours may be found by cells, these are not."""
-    paired = [item.name for item in metrics_of(q) if item.pair or item.cluster or item.survey]
+    paired = [item.name for item in metrics if item.pair or item.cluster or item.survey]
     if flight.agents < MANY or not paired:
         return []
     seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md

@@ -5,15 +5,18 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
-from importlib import import_module, resources, util
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Any
 
-from airflock.core.contract import Model, model
-from airflock.errors import AirflockError, RuleError, ScenarioError
+from airflock.core.contract import Body, MetricSet, Model, model
+from airflock.core.contract import body as gathered_body
+from airflock.errors import AirflockError, ScenarioError
+from airflock.metrics.registry import as_set
 from airflock.scenarios import checks, geometry, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
+from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 
@@ -42,7 +45,14 @@ def presets() -> dict[str, Path]:
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
 
-def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None) -> Scenario:
+def load(
+    name: str | os.PathLike[str],
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    *,
+    metrics: Any = None,
+    body: Any = None,
+) -> Scenario:
     """Scenario from a preset's name or a file.
 
     Parameters
@@ -56,6 +66,11 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
     law : optional
         A flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead of the
         file's, or one by its name or its file. Its parameters start from their defaults.
+    metrics : optional
+        Order parameters of your own measure the flight: a `MetricSet`, a metric, a list of metrics and of names of
+        ours, or a namespace such as globals(); likewise the name of a set or a file.
+    body : optional
+        A body of your own carries the agents: a `Body`, a namespace, or a name or file.
 
     Returns
     -------
@@ -81,17 +96,18 @@ def load(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None
     document, folder = _read(where, None)
     document, base = extended(document, where, folder, _read)
     notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
+    document, own = _given(document, metrics, body)
+    own["notes"] = notes
     if law is None:
-        return make(document, where, settings, folder=folder, notes=notes)
+        return make(document, where, settings, folder=folder, **own)
     if isinstance(law, (str, os.PathLike)):
-        kind = str(Path(law).absolute()) if str(law).endswith(".py") else str(law)
-        return make({**document, "model": {"kind": kind}, "published": {}}, where, settings, notes=notes)
+        return make({**document, "model": {"kind": _whole_path(law)}, "published": {}}, where, settings, **own)
     if not isinstance(law, (Model, Mapping)) and not hasattr(law, "__dict__"):
         raise ScenarioError(
             [f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
         )
-    own = law if isinstance(law, Model) else model(law)
-    return make({**document, "model": {"kind": own.name}, "published": {}}, where, settings, law=own, notes=notes)
+    flown = law if isinstance(law, Model) else model(law)
+    return make({**document, "model": {"kind": flown.name}, "published": {}}, where, settings, law=flown, **own)
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
@@ -109,6 +125,28 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     return document, path.parent
+
+
+def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A document that names the metrics and the body which are given directly, and these themselves for `make`."""
+    document = dict(document)
+    own: dict[str, Any] = {}
+    if isinstance(metrics, (str, os.PathLike)):
+        document["metrics"] = {**document.get("metrics", {}), "kind": _whole_path(metrics)}
+    elif metrics is not None:
+        own["measures"] = as_set(metrics)
+        document["metrics"] = {**document.get("metrics", {}), "kind": own["measures"].name}
+    if isinstance(body, (str, os.PathLike)):
+        document["body"] = {"kind": _whole_path(body)}
+    elif body is not None:
+        own["vehicle"] = body if isinstance(body, Body) else gathered_body(body)
+        document["body"] = {"kind": own["vehicle"].name}
+    return document, own
+
+
+def _whole_path(name: str | os.PathLike[str]) -> str:
+    """A name, or the whole path of a user's Python file."""
+    return str(Path(name).absolute()) if str(name).endswith(".py") else str(name)
 
 
 def loaded(what: Any) -> Scenario:
@@ -132,11 +170,14 @@ def make(
     *,
     folder: Path | None = None,
     law: Model | None = None,
+    measures: MetricSet | None = None,
+    vehicle: Body | None = None,
     notes: tuple[str, ...] = (),
 ) -> Scenario:
     """Scenario from a nested dict.
 
-    where : names it in faults; law : a model given directly instead of by name; notes : what is known of it already
+    where : names it in faults; notes : what is known of it already
+    law, measures, vehicle : a model, a metric set, a body given directly, not by name
     """
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
@@ -152,20 +193,29 @@ def make(
         more = wings.descent_faults(found)
         faults += more
         found = found if more else wings.descending(found)
-    body, more = checks.body_record(merged.get("body", {}), found)
+    if vehicle is None:
+        vehicle, more = checks.body_of(merged.get("body", {}), found, folder)
+    else:
+        more = checks.carries(vehicle, found, vehicle.name)
     faults += more
-    records = ({"model": found.Parameters} if found else {}) | SECTIONS | {"body": body}
+    if measures is None:
+        measures, more = checks.metrics_set(merged.get("metrics", {}), folder)
+        faults += more
+    own = SECTIONS | {"body": vehicle.Parameters, "metrics": measures.Parameters}
+    records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
-    parts, more = _parts(merged, merged.get("model", {}), found, body)
-    faults += more + _faults_between(parts, found)
+    parts, more = _parts(merged, merged.get("model", {}), found, own)
+    faults += more + _faults_between(parts, found, measures)
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     published = _published(merged.get("published", {}))
     parts["scene"] = _beside(parts["scene"], folder)
-    scenario = Scenario(name=where, model=found, published=published, document=merged, **parts)
+    scenario = Scenario(
+        name=where, model=found, vehicle=vehicle, measures=measures, published=published, document=merged, **parts
+    )
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -206,11 +256,13 @@ def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str
     return {}, [f"model = {table!r} is no table; write model.kind = {table!r}"]
 
 
-def _parts(merged: Mapping[str, Any], table: Any, found: Model | None, body: type) -> tuple[dict[str, Any], list[str]]:
+def _parts(
+    merged: Mapping[str, Any], table: Any, found: Model | None, records: Mapping[str, type]
+) -> tuple[dict[str, Any], list[str]]:
     """The records of a scenario by section, None where one is faulty; and all their faults."""
     parts: dict[str, Any] = {}
     faults: list[str] = []
-    for section, record in (SECTIONS | {"body": body}).items():
+    for section, record in records.items():
         given = merged.get(section, {})
         if section == "body" and isinstance(given, Mapping):
             given = {key: value for key, value in given.items() if key != "kind"}
@@ -226,7 +278,7 @@ def _parts(merged: Mapping[str, Any], table: Any, found: Model | None, body: typ
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], found: Model | None) -> list[str]:
+def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight = parts["flight"]
@@ -242,8 +294,8 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None) -> list[str]:
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += _timing_faults(flight, parts["sensors"].period, parts["metrics"])
         faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
-        faults += checks.metric_faults(parts["metrics"], parts["world"])
-        faults += wings.faults(parts, found)
+        faults += checks.metric_faults(measures, parts["metrics"], parts["world"])
+        faults += wings.faults(parts, found, measures)
     return faults
 
 
@@ -254,16 +306,7 @@ def find_model(kind: Any, folder: Path | None = None) -> Model:
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
-        path = Path(kind) if Path(kind).is_absolute() or folder is None else folder / kind
-        spec = util.spec_from_file_location(path.stem, path)
-        if spec is None or spec.loader is None or not path.is_file():
-            raise ScenarioError([f"model.kind = {kind!r}: no such file"])
-        module = util.module_from_spec(spec)
-        try:
-            spec.loader.exec_module(module)
-        except Exception as fault:  # the user's own file may fail in any way
-            raise RuleError(f"{path}: {type(fault).__name__}: {fault}") from fault
-        return model(module, path.stem)
+        return model(own_code("model.kind", kind, folder), Path(kind).stem)
     near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
     raise ScenarioError([f"model.kind = {kind!r} is no model; {hint}"])
@@ -295,7 +338,7 @@ def _timing_faults(flight: Flight, period: float, metrics: Any) -> list[str]:
 
 def _notes(scenario: Scenario) -> list[str]:
     """What is rounded or cannot be meant, for a person to read; nothing here stops a flight."""
-    notes, dt = checks.pair_notes(scenario.flight, scenario.metrics), scenario.flight.dt
+    notes, dt = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters), scenario.flight.dt
     times = {
         "sensors.period": scenario.sensors.period,
         "radio.delay": scenario.radio.delay,

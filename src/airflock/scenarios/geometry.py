@@ -5,9 +5,11 @@ from typing import Any
 
 from shapely.geometry import Point, Polygon, box
 
+from airflock.scenarios.wings import FORMATIONS
 from airflock.world import arena, start
 
 FAR_HEIGHT = 1e9  # half height of an arena that is flown in a plane, m
+MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
 JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
 
 
@@ -62,10 +64,31 @@ def largest_extension(world: arena.Parameters) -> float:
     return math.hypot(ground, up)
 
 
-def start_faults(world: arena.Parameters, begin: start.Parameters) -> list[str]:
+def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
+    """Why a formation does not fit into the arena. Its ends decide: it is made of straight lines, arenas are convex."""
+    plan = ground_plan(world)
+    if plan is None or world.edges == "periodic":
+        return []
+    margin = MOST_JITTER * begin.jitter if world.edges == "bounce" else 0.0  # it puts whoever is outside onto a face
+    for agent in dict.fromkeys((0, max(agents - 2, 0), agents - 1)):
+        x, y, z = FORMATIONS[begin.kind](agent, begin.spacing_x, begin.spacing_y, begin.spacing_z)
+        high = abs(z) + margin > half_sizes(world)[2] and world.dimensions == "3"
+        if high or not plan.covers(Point(x, y).buffer(margin) if margin else Point(x, y)):
+            spot = f"[{x:g}, {y:g}" + (f", {z:g}]" if world.dimensions == "3" else "]")
+            return [
+                f"start.kind = {begin.kind!r}: agent {agent} of {agents} would start at {spot} m, outside the arena"
+                + (f" or within {margin:g} m of jitter of its faces" if margin else "")
+                + "; enlarge it, or lower start.spacing_x, start.spacing_y and start.spacing_z"
+            ]
+    return []
+
+
+def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
     """Why a start region does not fit into the arena."""
     found = []
-    if begin.kind != "arena" and world.arena != "none":
+    if begin.kind in FORMATIONS:
+        found += formation_faults(world, begin, agents)
+    elif begin.kind != "arena" and world.arena != "none":
         reach = begin.radius if begin.kind == "ball" else 0.5 * begin.side
         x, y, z = half_sizes(world)
         plan = ground_plan(world)
@@ -105,7 +128,7 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
         found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
     plan = None if found else ground_plan(world)
     free, height = (math.inf, 1.0) if found else _region(world, begin)
-    found += [] if found else start_faults(world, begin)
+    found += [] if found else start_faults(world, begin, agents)
     for number, corners in enumerate(world.obstacles):
         fault = polygon_fault(corners)
         if fault:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import SceneError
+from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.scenario import Scenario
 from airflock.scenes.build import Scene, clearance, in_mesh, scene_of
 from airflock.world import scenery, start
@@ -65,6 +66,20 @@ def place_notes(scenario: Scenario) -> list[str]:
     if scenario.goals.role == "herd" and not getattr(scenario.parameters, "s_goal", -1.0) < 0.0:
         notes.append("goals.role = 'herd': a flock with model.s_goal >= 0 follows the shepherd instead of fleeing it")
     return notes
+
+
+def start_fault(scenario: Scenario, given: NDArray[Any]) -> str:
+    """What is wrong with a given start (component, agent), as a sentence; empty if nothing is."""
+    dims = scenario.dimensions
+    if scenario.world.edges == "bounce":  # which would put whoever starts beyond a face onto it, farther than it flies
+        beyond = np.abs(np.asarray(given, float)[:dims]) - np.array(half_sizes(scenario.world)[:dims])[:, None]
+        if beyond.max() > 0.0:
+            agent = int(beyond.max(axis=0).argmax())
+            return (
+                f"start: agent {agent} lies {beyond.max():.3g} m outside the arena, from whose faces agents bounce; "
+                "move it in or enlarge world.side"
+            )
+    return start_inside(scenario, given)
 
 
 def start_inside(scenario: Scenario, given: NDArray[Any]) -> str:

@@ -8,13 +8,13 @@ from typing import Any
 from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
-from airflock.body.registry import BODIES
 from airflock.core import random
-from airflock.core.contract import Body, Model
+from airflock.core.contract import Body, Metric, MetricSet, Model
+from airflock.core.parameters import number_names
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.portrait import html, sentence
-from airflock.scenarios.sections import Flight
+from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
 from airflock.world import arena, goals, scenery, start
 
@@ -26,6 +26,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
+    vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
     notes     : what was adjusted, for a person to read
@@ -52,6 +53,8 @@ class Scenario:
     aero: descent.Parameters
     metrics: metric_parameters.Parameters
     flight: Flight
+    vehicle: Body
+    measures: MetricSet
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -79,9 +82,23 @@ class Scenario:
         return self.model.flock is descent.flock
 
     @property
-    def vehicle(self) -> Body:
-        """The body that `body` holds the numbers of."""
-        return next(found for found in BODIES.values() if type(self.body) is found.Parameters)
+    def records(self) -> dict[str, Any]:
+        """Key of a section → its record of parameters; the empty key holds those at the top."""
+        return {section.key: getattr(self, section.field) for section in ORDER}
+
+    @property
+    def numbers(self) -> dict[str, tuple[str, ...]]:
+        """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
+        return {
+            each.letter: each.derived._fields if each.derived else number_names(self.records[each.key])  # type: ignore[attr-defined]
+            for each in ORDER
+            if each.letter
+        }
+
+    @property
+    def order_parameters(self) -> tuple[Metric, ...]:
+        """The metrics that measure a flight."""
+        return self.measures.of(self.metrics)
 
     def in_flight(self, seed: int) -> "Scenario":
         """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws."""
@@ -127,7 +144,7 @@ class Scenario:
             given["max_e"] = largest_extension(self.world) or None
         if given["k"] is None:
             given["k"] = given["max_e"]
-        return metric_parameters.Parameters(**given)
+        return type(self.metrics)(**given)
 
     def separation(self) -> float:
         """Smallest distance of two agents at the start, m."""

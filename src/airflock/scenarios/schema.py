@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
 
-LONG_FORM = {"value", "unit", "source", "note"}
+LONG_FORM = {"value", "unit", "source", "note", "interval"}
 
 
 @cache
@@ -47,6 +47,9 @@ def plain(section: str, given: Mapping[str, Any], record: type) -> tuple[dict[st
             if "value" not in value or unknown:
                 faults.append(f"{name}: give a value, or a table with value, unit and source")
                 continue
+            if "interval" in value and not _holds(value["interval"], value["value"]):
+                faults.append(f"{name}: interval = {value['interval']!r} is not [low, high] about {value['value']!r}")
+                continue
             unit = value.get("unit", "")
             if unit and units.get(key) is not None and unit != units[key]:
                 faults.append(f"{name} = {value['value']} {unit}: the unit is {units[key] or 'none'}")
@@ -55,6 +58,13 @@ def plain(section: str, given: Mapping[str, Any], record: type) -> tuple[dict[st
             value = str(value)  # model.scheme = 2
         values[key] = value
     return values, faults
+
+
+def _holds(interval: Any, value: Any) -> bool:
+    """Whether an interval, written by identify, is two numbers about a value."""
+    numbers = [interval[0], value, interval[1]] if isinstance(interval, list) and len(interval) == 2 else [None]
+    sound = all(isinstance(n, (int, float)) and not isinstance(n, bool) for n in numbers)
+    return sound and numbers[0] <= value <= numbers[-1]
 
 
 def check(section: str, given: Mapping[str, Any], record: type) -> tuple[Any, list[str]]:

@@ -1,6 +1,11 @@
-"""Sections of a scenario file and the record of parameters behind each."""
+"""The sections of a scenario: one list.
+
+The tables of a scenario file, the fields of a `Scenario`, the keys of a search space, the records that rules are
+handed and the columns of the row that a driver reads are all made from `ORDER`, each by name.
+"""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from airflock.aero import descent, wing
 from airflock.body import motion, radio, sensors, wind
@@ -27,17 +32,75 @@ class Flight(Record):
     )
 
 
-# body is read by its kind (`airflock.body.registry`); the record here is the one of velocity commands
-SECTIONS: dict[str, type[Record]] = {
-    "body": motion.Parameters,
-    "sensors": sensors.Parameters,
-    "radio": radio.Parameters,
-    "wind": wind.Parameters,
-    "world": arena.Parameters,
-    "scene": scenery.Parameters,
-    "goals": goals.Parameters,
-    "start": start.Parameters,
-    "wing": wing.Parameters,
-    "aero": descent.Parameters,
-    "metrics": metrics.Parameters,
-}
+class Geometry(NamedTuple):
+    """What drivers read of world, start and goals: derived at set-up, m and m/s.
+
+    half_*   : half sizes of the arena; extent_*: of the box about the origin from which starts are drawn
+    speed    : at the start; clearance: from what stands in the scene
+    goal_*   : radius in which a goal counts as reached, speed, spread, distance of a shepherd
+    spacing_*, jitter : of a start formation
+    """
+
+    half_x: float
+    half_y: float
+    half_z: float
+    extent_x: float
+    extent_y: float
+    extent_z: float
+    separation: float
+    speed: float
+    clearance: float
+    goal_radius: float
+    goal_speed: float
+    goal_spread: float
+    goal_behind: float
+    spacing_x: float
+    spacing_y: float
+    spacing_z: float
+    jitter: float
+
+
+class Clock(NamedTuple):
+    """What drivers read of the flight: motion step and time between two decisions, s."""
+
+    dt: float
+    period: float
+
+
+class Section(NamedTuple):
+    """One section of a scenario.
+
+    key     : its table in a scenario file; empty for the keys at the top
+    record  : its parameters; None where the model brings them. A body and a metric set may bring others
+    letter  : what rules and drivers call its numbers; empty where no driver reads any
+    derived : what drivers read instead of the record itself
+    """
+
+    key: str
+    record: type[Record] | None
+    letter: str = ""
+    derived: type | None = None
+
+    @property
+    def field(self) -> str:
+        """Field of a Scenario that holds its record."""
+        return {"model": "parameters", "": "flight"}.get(self.key, self.key)
+
+
+# The order is that of the columns of a driver's row; everything finds its numbers by letter and name.
+ORDER = (
+    Section("model", None, "p"),
+    Section("body", motion.Parameters, "b"),
+    Section("sensors", sensors.Parameters, "s"),
+    Section("radio", radio.Parameters, "k"),
+    Section("wind", wind.Parameters, "a"),
+    Section("world", arena.Parameters, "w", Geometry),
+    Section("scene", scenery.Parameters),
+    Section("goals", goals.Parameters),
+    Section("start", start.Parameters),
+    Section("metrics", metrics.Parameters, "q"),
+    Section("", Flight, "c", Clock),
+    Section("wing", wing.Parameters, "wing"),
+    Section("aero", descent.Parameters, "aero"),
+)
+SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

@@ -7,9 +7,8 @@ from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.composition import added
 from airflock.core.composition import faults as misfits
-from airflock.core.contract import Model, model
+from airflock.core.contract import Metric, MetricSet, Model, model
 from airflock.core.vocabulary import asks
-from airflock.metrics.registry import metrics_of
 from airflock.world import start
 
 Place = Callable[[int, float, float, float], tuple[float, float, float]]
@@ -32,22 +31,22 @@ def descent_faults(found: Model) -> list[str]:
     return [f"aero: {fault}" for fault in misfits(found, DESCENT)]
 
 
-def flies_on_wings(found: Model | None, q: Any) -> bool:
+def flies_on_wings(found: Model | None, metrics: tuple[Metric, ...]) -> bool:
     """Whether a rule of this scenario solves for the wings of the flock."""
     return (found is not None and found.flock is not None) or any(
-        "wing" in asks(m.survey, "survey") for m in metrics_of(q) if m.survey
+        "wing" in asks(m.survey, "survey") for m in metrics if m.survey
     )
 
 
-def faults(parts: Mapping[str, Any], found: Model | None) -> list[str]:
+def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -> list[str]:
     """Everything that is wrong with the wings of a scenario, one line each."""
     q, wing = parts["metrics"], parts["wing"]
     if q is None or wing is None:
         return []
-    lines = []
-    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics_of(q)):  # type: ignore[attr-defined]
+    lines, metrics = [], measures.of(q)
+    if q.stop == "collision" and not any("n_coll" in m.Sample._fields for m in metrics):  # type: ignore[attr-defined]
         lines.append(f"metrics.stop = 'collision' needs collisions, which metrics.kind = {q.kind!r} does not count")
-    if not flies_on_wings(found, q):
+    if not flies_on_wings(found, metrics):
         return lines
     lines += _stalled(wing) if wing.stall == "refused" else []
     lines += _overlapping(parts)
@@ -64,7 +63,7 @@ def faults(parts: Mapping[str, Any], found: Model | None) -> list[str]:
 def notes(scenario: Any) -> list[str]:
     """What cannot be meant, but flies."""
     wing = scenario.wing
-    if not flies_on_wings(scenario.model, scenario.metrics):
+    if not flies_on_wings(scenario.model, scenario.order_parameters):
         return []
     lines = _stalled(wing) if wing.stall == "noted" else []
     if wing.core == 0.0 and wing.positions == "free" and scenario.model.flock is not None:

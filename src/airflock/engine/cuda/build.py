@@ -4,7 +4,7 @@ import ast
 import builtins
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from textwrap import indent
 
 from airflock.core.contract import Metric
@@ -14,13 +14,15 @@ from airflock.engine.cuda.primitives import head
 from airflock.engine.cuda.reciprocals import Forms, spelled, with_reciprocals
 from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
-from airflock.engine.passes.build import JIT, Builder, branch
+from airflock.engine.passes.build import JIT, Builder, branch, in_place
 from airflock.engine.plan import Plan
+from airflock.engine.replace import ReplacementError, must_replace
 
 STAGES = (
     "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
     "measure_",
 )  # fmt: skip
+WITHIN = ("noise", "gusts")  # stages that a kernel has within `move`, so that registers carry them over
 REDUCED = 24  # totals that one stage reduces at once, at most
 
 
@@ -46,12 +48,13 @@ class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
     def __init__(self, plan: Plan, shape: Shape):
-        super().__init__(replace(plan, grid=False))
+        super().__init__(plan.built(grid=False))
         self.shape = shape
         self.stages: dict[str, Stage] = {}
         self.letters: set[str] = set()
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
+        self.within: dict[str, list[str]] = {}
         self.receive: tuple[list[ast.stmt], list[ast.stmt]] | None = None
         self.forms = Forms(self.source.blocks, JIT)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
@@ -81,9 +84,10 @@ class CudaBuilder(Builder):
         """Integers of this world are read once, by the kernel."""
         return []
 
-    def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
-        """Loop over all agents, whatever the order of updates."""
-        return [f"for i in range({lanes}):", *(f"    {line}" for text in body for line in text.splitlines())]
+    @property
+    def in_turn(self) -> bool:
+        """Never: a kernel takes one agent after another by its own loop."""
+        return False
 
     def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
         """One stage of a step."""
@@ -97,13 +101,15 @@ class CudaBuilder(Builder):
             lines += [body] if isinstance(body, str) else list(body)
         if name == "receive":
             self.receive = _split(parse(lines))
+        elif name in WITHIN:
+            self.within[name] = lines
         elif name.startswith(STAGES):
             self._stage(name, lines)
         else:
             self.plain.add(name)
             self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
             return
-        if name != "receive":
+        if name not in ("receive", *WITHIN):
             self.letters, self.bound = set(), set()
 
     def once(self, lines: Iterable[str]) -> list[str]:
@@ -145,16 +151,22 @@ class CudaBuilder(Builder):
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
-        if name in ("snapshot", "perceive"):
-            return [line.replace("ring[", "past[") for line in lines]
-        if name.startswith("measure_"):  # whose pair loops end with the last agent
-            return [line.replace(" & (integer(j) < nn)", "") for line in lines]
+        heard = self.plan.noisy or self.plan.delayed
+        if name == "snapshot" or (name == "perceive" and heard):
+            return must_replace(lines, "ring[", "past[")
+        if name.startswith("measure_") and any("j in range(m)" in line for line in lines):
+            return must_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent
         shared = self.shape.registers and self.shape.per_agent > 1
-        return shared_noise(lines) if name == "move" and shared else lines
+        return shared_noise(lines) if self.drawn_for_two(name) and shared else lines
+
+    def drawn_for_two(self, name: str) -> bool:
+        """Whether a stage draws the outer noise of two steps at once: in a plane four words are two steps."""
+        plan = self.plan
+        return name == "move" and plan.dimensions == 2 and self.wants(plan.body.move, "move", "gx", "gy", "gz")
 
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
-        statements = parse(self.prepared(name, lines))
+        statements = parse(self.prepared(name, self._with_parts(lines) if name == "move" else lines))
         if name == "neighbours" and self.receive is not None:
             statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
@@ -162,7 +174,7 @@ class CudaBuilder(Builder):
         context.cells, context.exact = self.cells(), name.startswith("measure_")
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
-        body = [_Renamed(self, name).visit(s) for s in body]
+        body = [_Renamed(self).visit(s) for s in body]
         body, numbers = with_reciprocals(self.forms, body, {f"row_{letter}" for letter in self.plan.records})
         self.source.blocks += self.forms.made
         self.forms.made.clear()
@@ -171,6 +183,13 @@ class CudaBuilder(Builder):
         else:
             body = [*parse(reciprocal_lines(numbers)), *body]
         self._add(name, body, context.rows)
+
+    def _with_parts(self, lines: list[str]) -> list[str]:
+        """Lines of `move` with those of the noise and the gusts in place of their calls."""
+        for name, part in self.within.items():
+            lines = in_place(lines, name, part)
+        self.within = {}
+        return lines
 
     def _add(self, name: str, body: list[ast.stmt], rows: set[str]) -> None:
         """The device function of lowered statements."""
@@ -207,16 +226,14 @@ class CudaBuilder(Builder):
 
 def shared_noise(lines: list[str]) -> list[str]:
     """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
-    found = []
-    for line in lines:
-        if line == "if step % 2 == 0:":
-            found += ["if step % (2 * PER_AGENT) == 0:"]
-        elif line.endswith(" if step % 2 == 0 else g2") or line.endswith(" if step % 2 == 0 else g3"):
-            name = line.partition(" = ")[0]
-            found += [line, f"{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"]
-        else:
-            found += [line.replace("(i, step // 2,", "(i, step // 2 + sub,")]
-    return found
+    lines = must_replace(lines, "if step % 2 == 0:", "if step % (2 * PER_AGENT) == 0:")
+    lines = must_replace(lines, "(i, step // 2,", "(i, step // 2 + sub,")
+    for number in (2, 3):
+        (line,) = (line for line in lines if line.endswith(f" if step % 2 == 0 else g{number}"))
+        name = line.partition(" = ")[0]
+        handed = f"{line}\n{name}[i] = from_thread({name}[i], (step // 2) % PER_AGENT, tid)"
+        lines = must_replace(lines, line, handed)
+    return lines
 
 
 def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
@@ -225,9 +242,9 @@ def reciprocal_lines(numbers: Iterable[tuple[str, str]]) -> list[str]:
 
 
 class _Renamed(ast.NodeTransformer):
-    """Records under the kernel's names (p → row_p), rows that share another's under its name, radio calls gone."""
+    """Records under the kernel's names (p → row_p), rows that share another's under its name."""
 
-    def __init__(self, build: CudaBuilder, name: str):
+    def __init__(self, build: CudaBuilder):
         self.build = build
         self.letters = set(build.letters)
 
@@ -247,15 +264,19 @@ def _split(statements: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
 
 def _with_radio(statements: list[ast.stmt], radio: tuple[list[ast.stmt], list[ast.stmt]]) -> list[ast.stmt]:
     """The loop nest of `neighbours` with the reception of each pair in it, instead of a call that fills rows."""
+    replaced = 0
     for outer in statements:
         if isinstance(outer, ast.For):
             kept: list[ast.stmt] = []
             for s in outer.body:
                 if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call):
                     kept += radio[0]
+                    replaced += 1
                     continue
                 if isinstance(s, ast.For):
                     s.body = [*radio[1], *s.body]
                 kept.append(s)
             outer.body = kept
+    if replaced != 1:
+        raise ReplacementError(f"neighbours calls receive {replaced} times instead of once")
     return statements

@@ -6,7 +6,6 @@ So the order of every sum, and with it every bit, is the same in each run. Only 
 loss.
 """
 
-from collections.abc import Iterable
 from typing import Any
 
 from airflock.core import random
@@ -17,6 +16,7 @@ from airflock.engine.passes import decide, move, scene
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.replace import must_replace
 from airflock.world import start as start_rules
 
 NEAR = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
@@ -86,19 +86,19 @@ class CellBuilder(CudaBuilder):
             found += image if line == "{image}" else ACROSS if line == "{across}" and periodic else [line]
         return tuple(line for line in found if line != "{across}")
 
-    def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
-        """Nothing: candidates come at their image."""
-        return []
+    @property
+    def images(self) -> bool:
+        """Never: candidates come at their image."""
+        return False
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Numbers of agents instead of places in the table; noise of an odd step is drawn again."""
-        lines = [
-            line.replace("integer(j)", "sorted_[j, 3]").replace("ii = integer(i)", "ii = real(i)") for line in lines
-        ]
         if name == "neighbours":
+            lines = must_replace(lines, "integer(j)", "sorted_[j, 3]")
+            lines = must_replace(lines, "ii = integer(i)", "ii = real(i)")
             for a in self.plan.axes:
-                lines = [line.replace(f"[j] - own_{a};", f"[j] - base_{a};") for line in lines]
-        return [line.replace("if step % 2 == 0:", "if step >= 0:") for line in lines]
+                lines = must_replace(lines, f"[j] - own_{a}", f"[j] - base_{a}")
+        return must_replace(lines, "if step % 2 == 0:", "if step >= 0:") if self.drawn_for_two(name) else lines
 
 
 def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[str]:
@@ -130,7 +130,7 @@ def _begin(build: CellBuilder) -> list[str]:
     spread = build.source.name(start_rules.spread)
     draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
     draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
-    draw += [f"free = {beyond(build).replace(', w,', ', row_w,')} <= ZERO"]
+    draw += [f"free = {must_replace(beyond(build), ', w,', ', row_w,')} <= ZERO"]
     if plan.start == "ball":
         draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
     draw += branch("free", ["placed = True", "break"])

@@ -1,7 +1,6 @@
 """Crowd: one big flock on a GPU, step by step; its order parameters are measured by the CPU's driver at each sample."""
 
 import math
-from dataclasses import replace
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -16,9 +15,10 @@ from airflock.engine.cuda.device import free_memory, required, runtime, simulati
 from airflock.engine.cuda.memory import SHARE, unfit
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, clock, tables
+from airflock.engine.totals import combined
 from airflock.errors import DeviceError
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.wings import FORMATIONS
@@ -84,7 +84,7 @@ class Crowd:
 
     def __init__(self, scenario: Scenario, plan: Plan, seed: int = 0, start: Any = None):
         required(simulating())
-        self.plan = replace(plan, grid=True)
+        self.plan = plan.built(grid=True)
         self.scenario, self.agents, self.step = scenario, scenario.agents, 0
         fault = refused(self.plan, self.agents)
         if fault is not None:
@@ -181,9 +181,8 @@ def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> F
     """Fly one big flock and measure it at each sample."""
     flock = Crowd(scenario, plan, seed, start)
     every, steps = flock.times["sample_every"], flock.times["steps"]
-    once = replace(plan, grid=True, record=False)
-    table = replace(flock.tables, whole=flock.tables.whole.copy())
-    table.whole[WHOLE.index("sample_every")] = 1
+    once = plan.built(grid=True, record=False)
+    table = flock.tables.changed(sample_every=1)
     frames, series = [], []
     places = flock.state()[0]
     for step in range(0, steps + 1, every):
@@ -198,7 +197,7 @@ def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> F
         places = flock.state()[0]
     status = min(0, int(flock.near.copy_to_host()[:, 3].min()))
     kept = np.stack(frames) if plan.record else None
-    return Flown(cpu.combined(plan, _sums(plan, np.array(series))), kept, places, status)
+    return Flown(combined(plan, _sums(plan, np.array(series))), kept, places, status)
 
 
 def _sums(plan: Plan, series: NDArray[np.float64]) -> NDArray[np.float64]:

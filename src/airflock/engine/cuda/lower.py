@@ -15,6 +15,7 @@ from collections.abc import Iterable
 
 from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, Registers, parse
 from airflock.engine.cuda.shape import UNROLL
+from airflock.engine.replace import ReplacementError
 
 NEUTRAL = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
@@ -155,6 +156,8 @@ class _Pairs:
 def _by_fours(text: str) -> list[str]:
     """Lines that read the columns of a candidate four at a time."""
     read = set(re.findall(r"sorted_\[j, (\d)\]", text))
+    if not read:
+        raise ReplacementError(f"nothing is read of a candidate in:\n{text}")
     first = [
         f"{', '.join(f'near_{c}' for c in columns)} = {load}(sorted_, j)"
         for load, columns in (("four_low", "0123"), ("four_high", "4567"))

@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from airflock.engine.cuda.shape import Shape
 
@@ -16,8 +16,6 @@ class Context:
     shape    : layout of a flock
     rows     : names that stand for rows of the work table
     columns  : row → (shared table, column) for rows that other agents read
-    pair_how : how a total of the pair loop is reduced over the threads of one agent, by its name
-    renamed  : free names that the kernel calls otherwise
     turn     : one agent i at a time, for all threads
     carried  : totals stay with each thread instead of being reduced over the block
     cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
@@ -28,8 +26,6 @@ class Context:
     shape: Shape
     rows: set[str]
     columns: dict[str, tuple[str, int]]
-    pair_how: dict[str, str] = field(default_factory=dict)
-    renamed: dict[str, str] = field(default_factory=dict)
     turn: bool = False
     carried: bool = False
     alone: bool = False

@@ -7,6 +7,7 @@ from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off, in_formation
+from airflock.engine.replace import must_replace
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
@@ -46,10 +47,10 @@ def begin(build: CudaBuilder) -> list[str]:
     draw = [f"w0, w1, w2, w3 = {philox}(e, attempt, {random.START}, world, seed_low, seed_high)"]
     draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
     draw += [] if plan.dimensions == 3 else ["sz = ZERO"]
-    draw += [f"free = {beyond(build).replace(', w,', ', row_w,')} <= ZERO"]
+    draw += [f"free = {must_replace(beyond(build), ', w,', ', row_w,')} <= ZERO"]
     if plan.start == "ball":
         draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
-    draw += [line.replace("w.clearance", "row_w.clearance") for line in scene.room(build)]
+    draw += must_replace(scene.room(build), "w.clearance", "row_w.clearance") if plan.scene else []
     gap = " + ".join(f"(s{a} - {place(build, 'j', a)}) * (s{a} - {place(build, 'j', a)})" for a in axes)
     near = loop(
         "j in range(tid, e, THREADS)", branch(f"{gap} < row_w.separation * row_w.separation", ["crowded = integer(1)"])

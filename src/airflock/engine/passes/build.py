@@ -1,5 +1,6 @@
 """Builder: what all passes share while the text of one driver grows."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from textwrap import indent
 from typing import Any
@@ -9,6 +10,7 @@ from airflock.core.vocabulary import asks
 from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.replace import ReplacementError, must_replace
 from airflock.world import edges
 
 JIT = "@njit(**JIT)"
@@ -43,6 +45,16 @@ class Builder:
         if not (plan.noisy or plan.delayed) and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
         return self.rows.setdefault(name, len(self.rows))
+
+    @property
+    def in_turn(self) -> bool:
+        """Whether a loop over all agents is the body alone, for the agent in turn."""
+        return self.plan.sequential
+
+    @property
+    def images(self) -> bool:
+        """Whether a stage takes offsets between agents to the nearest image."""
+        return self.plan.periodic
 
     @property
     def who(self) -> str:
@@ -88,16 +100,19 @@ class Builder:
 
     def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
         """Loop over all agents (n) or lanes (m); with a sequential update the body alone, for the agent in turn."""
-        return list(body) if self.plan.sequential else loop(f"i in range({lanes})", body)
+        return list(body) if self.in_turn else loop(f"i in range({lanes})", body)
 
     def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
         """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i."""
         if not self.plan.sequential:
             spread = self.plan.grid and name == "decide"
-            body = [line.replace("i in range(n)", "i in prange(n)") for line in body] if spread else body
+            body = must_replace(body, "i in range(n)", "i in prange(n)") if spread else body
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return
         read = [line.partition(" = ")[0] for line in lines if " = " in line and line[0] != " " and ";" not in line]
+        several = [part.partition(" = ")[0] for line in lines if line[0] != " " for part in line.split("; ")]
+        used = set(re.findall(r"\w+", "\n".join(body)))
+        read += [name for name in several if name not in read and name in used]
         given = ", ".join(dict.fromkeys(["i", *arguments.split(", "), *(w for w in read if w.isidentifier())]))
         self.function(f"{name}_of({given})", body, f"return {answer}")
         self.turns.append((lines, f"{name}_of({given})"))
@@ -116,6 +131,15 @@ class Builder:
     def z(self, text: str) -> str:
         """A third coordinate, or a literal zero in a plane."""
         return text if self.plan.dimensions == 3 else "ZERO"
+
+
+def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:
+    """Lines in which those of a function stand in place of its call. Raises ReplacementError where they do not fit."""
+    (call,) = (line for line in lines if f"{name}(" in line)
+    at, answer = lines.index(call), call.rpartition(" = ")[0] or "0"
+    if part[-1] not in (f"return {answer}", f"return ({answer})"):
+        raise ReplacementError(f"{name} ends with {part[-1]!r}, but is called as {call!r}")
+    return [*lines[:at], *part[:-1], *lines[at + 1 :]]
 
 
 def loop(over: str, lines: Iterable[str]) -> list[str]:

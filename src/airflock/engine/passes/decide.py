@@ -1,11 +1,17 @@
 """Meet neighbours, meet surfaces, decide: the three loop nests of one decision."""
 
+import ast
+
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
 from airflock.engine.passes import flock, grid, percept, scene
-from airflock.engine.passes.build import Builder, branch, loop
-from airflock.world import arena, bvh
+from airflock.engine.passes.build import Builder
+from airflock.engine.specialise.stage import Specialised, lines_of, specialise
+from airflock.engine.specialise.values import Call
+from airflock.engine.stages import neighbours as meeting
+from airflock.engine.stages import surfaces
+from airflock.engine.stages.words import live
 
 EXTREME = {"min": "least", "max": "most"}
 START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
@@ -16,109 +22,44 @@ def combine(how: str, total: str, term: str) -> str:
     return f"{total} += {term}" if how == "sum" else f"{total} = {EXTREME[how]}({total}, {term})"
 
 
-def live(fields: tuple[str, ...], dimensions: int) -> list[int]:
-    """Fields that can differ from zero: in a plane, a field that ends in z cannot."""
-    return [c for c, name in enumerate(fields) if dimensions == 3 or not name.endswith("z")]
-
-
 def neighbours(build: Builder) -> None:
-    """Sum the neighbour rule over all agents in range of each agent (all pairs)."""
-    plan, axes, model = build.plan, build.plan.axes, build.plan.model
-    rule, fields = model.neighbour, getattr(model.Sums, "_fields", ())
-    if rule is None:
+    """Function neighbours: the neighbour rule over all others in range of each agent, all pairs or by cells."""
+    plan, model = build.plan, build.plan.model
+    if model.neighbour is None:
         return
-    used = set(asks(rule, "neighbour", model.name))
-    sums = _asked(build, live(fields, plan.dimensions))
-    how = {c: model.reduce.get(fields[c], "sum") for c in sums}
-    heard = "eh" if plan.links else "h"
-    truth = axes if plan.noisy or plan.delayed or plan.links else ()
-    rows = [f"m{a}" for a in axes] + [f"mv{a}" for a in axes] + [f"{heard}{a}" for a in axes]
-    rows += [f"{heard}v{a}" for a in axes] + list(truth) + [f"sum{c}" for c in sums]
-    selective = plan.lossy or plan.links
-    rows += ["heard", "age"] if selective else []
-    lines = build.records("p k c w" if plan.periodic else "p k c") + build.bind(rows)
-    lines += ["range_ = least(k.range, LIMIT)", "range2 = range_ * range_"]
-    if model.reach is not None:
-        lines += [f"near = least({build.call(model.reach, 'reach', {})}, LIMIT)", "near2 = near * near"]
-    outer = ["ii = integer(i)"]
-    if selective:
-        outer += ["receive(i, k_, n, time, late, row, whole, work, store)"]
-    outer += [f"own_{a} = m{a}[i]; v{a} = mv{a}[i]" for a in axes]
-    outer += [] if plan.dimensions == 3 else ["vz = ZERO"]
-    outer += [f"true_{a} = {a}[i]" for a in truth]
-    if used & {"hx", "hy", "hz"}:
-        outer += [
-            f"f = ONE / {build.source.name(norm)}(vx, vy, vz)",
-            "own_hx = f * vx; own_hy = f * vy; own_hz = f * vz",
-        ]
-    outer += [f"t{c} = {START[how[c]]}" for c in sums]
-    inner = [f"d{a} = {heard}{a}[j] - own_{a}; dv{a} = {heard}v{a}[j] - v{a}" for a in axes]
-    inner += build.image(axes)
-    inner += [] if plan.dimensions == 3 else ["dz = ZERO; dvz = ZERO"]
-    inner += ["r2 = " + " + ".join(f"d{a} * d{a}" for a in axes) + " + TINY"]
-    inner += ["r = math.sqrt(r2)"] if "r" in used else []
-    if "dv" in used:
-        inner += ["dv = math.sqrt(" + " + ".join(f"dv{a} * dv{a}" for a in axes) + " + TINY)"]
-    if used & {"nhx", "nhy", "nhz"}:
-        inner += [f"g = ONE / {build.source.name(norm)}(vx + dvx, vy + dvy, vz + dvz)"]
-        inner += [f"nh{a} = g * (v{a} + dv{a})" for a in "xyz"]
-    if truth:
-        inner += [f"o{a} = {a}[j] - true_{a}" for a in truth] + build.image(truth, "o{}")
-        inner += ["ok = (" + " + ".join(f"o{a} * o{a}" for a in truth) + " <= range2) & (integer(j) != ii)"]
-    else:
-        inner += ["ok = (r2 <= range2) & (integer(j) != ii)"]
-    inner += ["ok = ok & (r2 <= near2)"] if model.reach is not None else []
-    inner += ["ok = ok & (heard[j] > HALF)"] if selective else []
-    given = {"age": "age[j]" if selective else "late", "lower": "(ONE if integer(j) < ii else ZERO)"}
-    given |= {f"h{a}": f"own_h{a}" for a in "xyz"}
-    inner += [f"t = {build.call(rule, 'neighbour', given, model.name)}"]
-    inner += [combine(how[c], f"t{c}", f"choose(ok, t[{c}], {START[how[c]]})") for c in sums]
-    after = [f"sum{c}[i] = t{c}" for c in sums]
+    fields = model.Sums._fields  # type: ignore[union-attr]
+    sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
+    hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    images = build.images and not plan.grid  # candidates that come by cells come at their image
+    made = specialise(build, meeting.neighbours, receive=hear, sums=sums, images=images)
     if plan.grid:
-        inner = [line for line in inner if line not in build.image(axes)]  # candidates come at their image
-        kept = [line for line in lines if not line.startswith((heard, *(f"m{a} =" for a in axes), "mv"))]
-        grid.neighbours(build, kept, outer, inner, sums)
+        grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
-    outer += loop("j in range(m)", inner) + after
-    build.stage("neighbours", "k_, n, m, time, late, row, whole, work, store", lines, build.each(outer))
+    arguments = "k_, n, m, time, late, row, whole, work, store"
+    build.stage("neighbours", arguments, made.once, made.body, made.answer)
+
+
+def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str], list[str]]:
+    """Of `neighbours`: what is done once, for an agent, and for each candidate, for the grid's own loops."""
+    axes = build.plan.axes
+    found = {f"{kind}{a}" for kind in ("m", "mv", "h", "hv") for a in axes}  # the grid lays them out in its own way
+    lines = [line for line in made.once if line.partition(" = ")[0] not in found]
+    lines = list(dict.fromkeys([*(build.records("w") if build.plan.periodic else []), *lines]))
+    (agents,) = made.rest
+    assert isinstance(agents, ast.For)
+    at = next(k for k, statement in enumerate(agents.body) if isinstance(statement, ast.For))
+    candidates = agents.body[at]
+    assert isinstance(candidates, ast.For)
+    return lines, lines_of(agents.body[:at]), lines_of(candidates.body)
 
 
 def boundaries(build: Builder) -> None:
-    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
-
-    Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
-    """
-    plan, axes, model = build.plan, build.plan.axes, build.plan.model
-    rule, fields = model.boundary, getattr(model.Walls, "_fields", ())
-    if rule is None:
+    """Function boundaries: the boundary rule over all surfaces."""
+    if build.plan.model.boundary is None:
         return
-    walls = live(fields, plan.dimensions)
-    given = {name: f"f.{name}" for name in ("distance", "nx", "ny", "nz")} | {"vz": build.z("vz")}
-    term = build.call(rule, "boundary", given, model.name)
-    position = f"m{axes[0]}[i], m{axes[1]}[i], {build.z('mz[i]')}"
-    add = [f"v{a} = mv{a}[i]" for a in axes] + [f"t = {term}"] + [f"wall{c}[i] += t[{c}]" for c in walls]
-    lines = build.records("p") + build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
-    lines += build.bind([f"wall{c}" for c in walls]) + build.whole("obstacles", "faces_0", "faces_1")
-    body = build.each([f"wall{c}[i] = ZERO" for c in walls])
-    bounds = ("0", "faces_0", "faces_0 + faces_1")
-    for family, surface in enumerate(plan.surfaces):
-        face = "ea = faces[e, 0]; eb = faces[e, 1]; ec = faces[e, 2]; ed = faces[e, 3]"
-        name = build.source.name(surface)
-        inner = build.each([f"f = {name}({position}, ea, eb, ec, ed)", *add])
-        body += loop(f"e in range({bounds[family]}, {bounds[family + 1]})", [face, *inner])
-    if plan.obstacles and model.sight is None:  # who casts meets them in the scene
-        name = build.source.name(arena.convex_obstacle)
-        inner = build.each([f"f = {name}({position}, edges, spans[o, 0], spans[o, 1])", *add])
-        body += loop("o in range(obstacles)", inner)
-    if plan.scene:
-        lines += scene.parts("shapes", "nodes", "links")
-        look = "LIMIT" if model.wall_reach is None else build.call(model.wall_reach, "wall_reach", {}, model.name)
-        lines += [f"look = least({look}, LIMIT)"]
-        name = build.source.name(bvh.nearest_of)
-        for ground in ("ZERO", "ONE") if plan.dimensions == 3 else ("ZERO",):
-            inner = [f"f = {name}({position}, look, {ground}, shapes, nodes, links)"]
-            body += build.each([*inner, *branch("f.distance < look", add)])
-    build.stage("boundaries", "n, row, whole, work, faces, edges, spans, scene", lines, body)
+    made = specialise(build, surfaces.boundaries)
+    arguments = "n, row, whole, work, faces, edges, spans, scene"
+    build.stage("boundaries", arguments, made.once, made.body, made.answer)
 
 
 def decide(build: Builder) -> None:
@@ -135,7 +76,7 @@ def decide(build: Builder) -> None:
         body += [f"own = {build.source.name(Own)}(vx, vy, vz, f * vx, f * vy, f * vz)"]
     for record, word, rows in ((model.Sums, "sums", "sum"), (model.Walls, "walls", "wall")):
         if word in used and record is not None:
-            kept = live(record._fields, plan.dimensions)  # type: ignore[attr-defined]
+            kept = live(record, plan.dimensions)
             kept = _asked(build, kept) if word == "sums" else kept
             present = _present(model, word)
             lines += build.bind([f"{rows}{c}" for c in kept]) if present else []

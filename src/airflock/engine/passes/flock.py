@@ -5,7 +5,6 @@ from inspect import signature
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.contract import Metric
@@ -116,14 +115,15 @@ def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str,
     return found
 
 
-def scratch(plan: Plan, row: NDArray[Any], agents: int) -> tuple[tuple[tuple[NDArray[Any], ...], ...], ...]:
-    """Scratch arrays of all rules of the whole flock, as one last argument or none."""
-    found = owners(plan)
-    if not found:
-        return ()
-    # pages of zeros cost nothing until they are written: what is meant for rare cases may be large
-    made = tuple(tuple(np.zeros(size, row.dtype) for size in sizes) for sizes in scratch_sizes(plan, row, agents))
-    return (made,)
+def scratch_of(plan: Plan, row: NDArray[Any], agents: int) -> list[list[tuple[str, tuple[int, int], bool]]]:
+    """Scratch of every rule of the whole flock: a name, rows and columns, and whether nothing in it outlasts a call."""
+    made = []
+    for owner, sizes in zip(owners(plan), scratch_sizes(plan, row, agents), strict=True):
+        record = _record(owner, plan)
+        within = getattr(record, "WITHIN", ())
+        fields = zip(record._fields, sizes, strict=True)
+        made.append([(f"{owner.name}.{name}", size, name in within) for name, size in fields])
+    return made
 
 
 def scratch_sizes(plan: Plan, row: NDArray[Any] | None, agents: int) -> list[list[tuple[int, int]]]:

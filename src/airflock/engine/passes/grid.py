@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.plan import Plan
+from airflock.engine.replace import must_replace
 
 CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
 CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
@@ -65,16 +66,16 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
     names = [*axes, *(f"v{a}" for a in axes)]
     for c, name in enumerate(names):
-        before = [line.replace(f"m{name}[i]", f"packed[e, {c}]") for line in before]
+        before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
-    before = [line.replace("ii = integer(i)", "ii = ident[e]" if who else "") for line in before]
-    inner = [line.replace("integer(j) != ii", "(integer(q) != me) & (integer(q) < many)") for line in inner]
-    inner = [line.replace("integer(j) < ii", "who[j] < ii") for line in inner]
+    before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
+    inner = must_replace(inner, "integer(j) != ii", "(integer(q) != me) & (integer(q) < many)")
+    inner = must_replace(inner, "integer(j) < ii", "who[j] < ii") if who else inner
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
     wide = max(1, len(sums))
-    meet += ["slot = whose[e]", *[f"totals[slot, {k}] = t{c}" for k, c in enumerate(sums)]]
+    meet += ["slot = whose[e]", *[f"totals[slot, {k}] = total_{c}" for k, c in enumerate(sums)]]
     cell = [
         "here = (oz * count[1] + oy) * count[0] + ox",
         *["if starts[here] == starts[here + 1]:", "    continue"],
@@ -89,7 +90,7 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
         f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
-    lines = [line.replace("CHUNKS", str(CHUNKS)) for line in lines]
+    lines = must_replace(lines, "CHUNKS", str(CHUNKS))
     build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
 
 
@@ -142,7 +143,7 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     lines += loop("chunk in prange(CHUNKS)", ["head = chunk * total", *loop(part, put)])
     each = [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))]
     each += ["ident[e] = " + ("order[whose[e]]" if build.slots else "whose[e]")] * who
-    return lines + loop("chunk in prange(CHUNKS)", loop(part.replace("i in", "e in"), each))
+    return lines + loop("chunk in prange(CHUNKS)", loop(must_replace(part, "i in", "e in"), each))
 
 
 def _slabs(build: Builder, who: bool) -> list[str]:

@@ -8,6 +8,7 @@ from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.passes.decide import START, combine
 from airflock.engine.passes.members import members
 from airflock.engine.passes.move import beyond
+from airflock.engine.replace import must_replace
 
 CLOCKS = ("sample", "collision")
 
@@ -99,7 +100,7 @@ def _pairs(build: Builder, metrics: list[Metric], least: bool) -> list[str]:
 def _excursions(build: Builder, metrics: list[Metric]) -> list[str]:
     if not any(build.wants(metric.agent, "agent", "excursion") for metric in metrics):
         return []
-    call = beyond(build).replace("sx, sy, sz", f"x[i], y[i], {build.z('z[i]')}")
+    call = must_replace(beyond(build), "sx, sy, sz", f"x[i], y[i], {build.z('z[i]')}")
     return [*build.bind(["excursion_"]), *loop("i in range(n)", [f"excursion_[i] = {call}"])]
 
 

@@ -1,13 +1,17 @@
 """Start and move: where agents begin, and one motion step of all of them."""
 
-from airflock.body import wind
 from airflock.core import random
 from airflock.engine.passes import scene
-from airflock.engine.passes.build import Builder, branch, loop
-from airflock.engine.passes.perceive import normals
+from airflock.engine.passes.build import Builder, branch, in_place, loop
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.values import Call
+from airflock.engine.stages import gusts as air
+from airflock.engine.stages import move as motion
+from airflock.engine.stages import noise as outer
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
 
+NOISE, GUSTS = "step, m, row, whole, work, words", "step, row, whole, gust"  # what these stages are called with
 ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
 
 
@@ -94,58 +98,22 @@ def beyond(build: Builder) -> str:
 
 
 def move(build: Builder) -> None:
-    """Velocities by the body, positions by the velocity before or after; returns the largest squared speed."""
-    plan, axes, vehicle = build.plan, build.plan.axes, build.plan.body
-    lines = build.records("b a c w" if plan.edge else "b a c") + build.whole("world", "seed_low", "seed_high")
-    lines += build.bind([*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)])
-    if build.wants(vehicle.move, "move", "gx", "gy", "gz"):
-        lines += _noise(build)
-    lines += ["wx = ZERO; wy = ZERO; wz = ZERO"]
+    """Function move, with what the stages noise and gusts do once per step, where the body and the wind have them.
+
+    They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
+    """
+    plan = build.plan
+    made = specialise(build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"))
+    parts: dict[str, tuple[str, list[str]]] = {}
+    if build.wants(plan.body.move, "move", "gx", "gy", "gz"):
+        parts["noise"] = NOISE, [*specialise(build, outer.noise).lines, "return 0"]
     if plan.windy:
-        lines += _wind(build)
-    square = " + ".join(f"v{a}[i] * v{a}[i]" for a in axes)
-    speeds = ["fastest = ZERO", *build.each([f"fastest = most(fastest, {square})"])]
-    positions = [line for a in axes for line in build.each([f"{a}[i] += v{a}[i] * c.dt"], "m")]
-    if plan.noisy:
-        lines += build.bind([f"own_u{a}" for a in axes])
-    given = {"dt": "c.dt"}
-    for a in ("x", "y", "z"):
-        flown = a in axes
-        given[f"v{a}"] = f"v{a}[i]" if flown else "ZERO"
-        error = f" + own_u{a}[i]" if plan.noisy else ""
-        given[f"m{a}"] = f"v{a}[i]{error}" if flown else "ZERO"
-        given[f"c{a}"] = f"c{a}[i]" if flown else "ZERO"
-        given[f"g{a}"] = f"g{a}_[i]" if flown else "ZERO"
-        given[f"w{a}"] = f"w{a}" if flown else "ZERO"
-    body = [f"t = {build.call(vehicle.move, 'move', given, vehicle.name)}"]
-    velocities = build.each(body + [f"v{a}[i] = t[{c}]" for c, a in enumerate(axes)], "m")
-    old = plan.integration == "old"
-    steps = [*speeds, *positions, *velocities] if old else [*velocities, *speeds, *positions]
-    if plan.edge:
-        edge = build.source.name(plan.edge)
-        kept = [f"{a}[i], v{a}[i] = {edge}({a}[i], v{a}[i], w.half_{a})" for a in axes]
-        steps += build.each(kept)
-    build.stage("move", "step, n, m, row, whole, work, words, gust", lines, steps, "fastest")
-
-
-def _noise(build: Builder) -> list[str]:
-    """Normal numbers of the outer noise, as gx_ gy_ gz_."""
-    if build.plan.dimensions == 3:
-        return [*normals(build, "step", random.OUTER), "gx_ = g0; gy_ = g1; gz_ = g2"]
-    lines = branch("step % 2 == 0", normals(build, "step // 2", random.OUTER))  # four words are two steps of two axes
-    lines += build.bind(["g0", "g1", "g2", "g3"])
-    return [*lines, "gx_ = g0 if step % 2 == 0 else g2", "gy_ = g1 if step % 2 == 0 else g3"]
-
-
-def _wind(build: Builder) -> list[str]:
-    """Wind of this step, common to the flock, as wx wy wz."""
-    philox, pair = build.source.name(random.draw), build.source.name(random.normal_pair)
-    gusting = build.source.name(wind.gusting)
-    return [
-        f"w0, w1, w2, w3 = {philox}(0, step, {random.GUST}, world, seed_low, seed_high)",
-        f"ga, gb = {pair}(w0, w1); gc, gd = {pair}(w2, w3)",
-        f"gust[0] = {gusting}(gust[0], ga, c.dt, a)",
-        f"gust[1] = {gusting}(gust[1], gb, c.dt, a)",
-        f"gust[2] = {gusting}(gust[2], gc, c.dt, a)",
-        "wx = a.east + gust[0]; wy = a.north + gust[1]; wz = a.up + gust[2]",
-    ]
+        blown = specialise(build, air.gusts)
+        parts["gusts"] = GUSTS, [*blown.lines, f"return {blown.answer}"]
+    once = made.once
+    for name, (arguments, lines) in parts.items():
+        if plan.sequential:
+            build.function(f"{name}({arguments})", lines)
+        else:
+            once = in_place(once, name, lines)
+    build.stage("move", "step, n, m, row, whole, work, words, gust", once, made.body, made.answer)

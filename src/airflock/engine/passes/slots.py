@@ -36,18 +36,6 @@ def rearrange(build: Builder) -> list[str]:
     return branch(f"k % {EVERY} == 0", ["rearrange(n, work, mem, memory, cells)"])
 
 
-def restored(build: Builder) -> list[str]:
-    """Lines that bring positions and velocities back into the order of agents."""
-    if not build.slots:
-        return []
-    axes = build.plan.axes
-    lines = [*opened(build), "kept = totals_[:n]"]
-    for name in (*axes, *(f"v{a}" for a in axes)):
-        lines += [f"lane = work[{build.row(name)}]"]
-        lines += loop("i in range(n)", ["kept[order[i]] = lane[i]"]) + loop("i in range(n)", ["lane[i] = kept[i]"])
-    return lines
-
-
 def _spread(line: str) -> list[str]:
     """A loop over all slots, in parts side by side."""
     part = loop(f"i in range(n * part // {CHUNKS}, n * (part + 1) // {CHUNKS})", [line])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
+from airflock.engine.threads import in_threads
 from airflock.papers.dimock_2003.units import FOOT, Gains
 from airflock.papers.flights import Progress
 from airflock.scenarios.files import load
@@ -83,7 +84,7 @@ class Birds:
         def job(task: Task) -> Callable[[], Flight]:
             return lambda: _flown(bases[task.start.flat], task)
 
-        return list(cpu.in_threads([job(task) for task in tasks], self.threads, done))
+        return list(in_threads([job(task) for task in tasks], self.threads, done))
 
 
 @cache

@@ -15,6 +15,7 @@ from airflock.papers.dimock_2003.units import Gains, gains
 LOST = 1e3  # W: loss of a controller that collides, or whose range of cohesion lies inside that of avoidance
 POPULATION, GENERATIONS = 50, 150
 SEEDS = (1, 2, 3)
+EARLY, MIDWAY = 5, 13  # generations of Figs 6 and 7
 Points = NDArray[np.float64]
 
 
@@ -144,7 +145,7 @@ def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]
 
 def _flown_again(birds: Birds, run: Run) -> Run:
     last = len(run.best) - 1
-    moments = {"early": 5, "midway": 13, "final": last}
+    moments = {"early": EARLY, "midway": MIDWAY, "final": last}
     tasks = [Task(run.champions[min(at, last)], run.reading.start) for at in moments.values()]
     flown = birds.fly("", tasks, centroid=run.reading.centroid)
     run.flights = dict(zip(moments, flown, strict=True))

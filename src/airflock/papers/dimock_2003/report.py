@@ -5,36 +5,42 @@ from typing import Any
 
 import numpy as np
 
-from airflock import atomic
-from airflock.papers import claims as records
-from airflock.papers.claims import VERDICTS, Claim
+from airflock.papers import page
+from airflock.papers.claims import Claim
 from airflock.papers.dimock_2003 import PAPER
 from airflock.papers.dimock_2003.flights import Flight
 from airflock.papers.dimock_2003.ga import WEIGHTS
 from airflock.papers.dimock_2003.units import FOOT, FT_LBF
+from airflock.papers.page import Section
 
 SEEDS = "genetic algorithm and CMA-ES 1 to 3; robust search 7; its held-out flights from 1000000"
 COMMAND = "airflock paper dimock_2003"
-WORDS = (
-    ("static.", "Formations that stand still", "The unit of the fitness, bounds, and what selfishness costs."),
-    (
+ABOUT = (
+    "`python papers/dimock_2003/reproduce.py` also rewrites this folder. Powers are in ft lbf/s per bird, the unit "
+    "that the printed HP are read as; nothing in the text states it."
+)
+SECTIONS = (
+    Section("static.", "Formations that stand still", "The unit of the fitness, bounds, and what selfishness costs."),
+    Section(
         "controller.",
         "The published controller flown again",
         "Eqs 1 and 2 of the surviving scan are illegible. C1 and 1/n weights are reconstructions, fitted to what the "
         "paper says its controller does, and not read from it; the spacing of the start is not printed either.",
     ),
-    (
+    Section(
         "ga.",
         "The genetic algorithm, Figs 5-8",
         "Three seeds of each reading of Eq. 2 and of the start; gradients with the others' circulations held. "
         "Intervals are the least and the greatest of the seeds. Figures are of the first seed with 1/(n-1) weights.",
+        ("fig5", "fig6", "fig7", "fig8"),
     ),
-    (
+    Section(
         "robust.",
         "A sound fitness",
         "CMA-ES on V, tight, wide, column and random starts in the plane in which the paper's birds stay, and a V in "
         "space; 60 s, noise at the start and in flight; penalties for closeness, collisions, unrest, no formation. "
         "Judged on flights that no search has seen.",
+        ("pareto",),
     ),
 )
 
@@ -57,26 +63,7 @@ def write(folder: Path, claims: list[Claim], found: dict[str, Any]) -> None:
             traces(figures / f"fig{number}.png", run.flights[flight], f"Fig. {number}: best-ever, {name}")
     if "robust" in found:
         front(figures / "pareto.png", found["robust"])
-    header = records.header(PAPER.title, COMMAND, told=SEEDS)
-    records.write_claims(folder / "claims.toml", claims, header)
-    atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1], sorted(figures.glob("*"))))
-
-
-def page(claims: list[Claim], figures: list[Path]) -> str:
-    """README.md: verdicts, tables and figures."""
-    count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
-    lines = [
-        f"# {PAPER.title}", "", f"`{COMMAND}` computes all this again; `python papers/dimock_2003/reproduce.py` also "
-        "rewrites this folder. Numbers are SI (W per bird); ft lbf/s stand beside them.", "",
-        f"**{count['reproduced']} reproduced, {count['not reproduced']} not reproduced, "
-        f"{count['finding']} findings.**", "",
-    ]  # fmt: skip
-    for start, title, words in WORDS:
-        part = [claim for claim in claims if claim.id.startswith(start)]
-        if part:
-            lines += [f"## {title}", "", words, "", records.markdown(part)]
-    lines += [f"![{path.stem}](figures/{path.name})\n" for path in figures]
-    return "\n".join(lines).rstrip() + "\n"
+    page.write(folder, PAPER.title, COMMAND, claims, SECTIONS, ABOUT, SEEDS)
 
 
 def _axes(title: str, rows: int = 1) -> Any:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airflock.evolve.cmaes import CMAES
-from airflock.metrics.fitness_dimock import fitness
+from airflock.metrics import fitness_dimock
 from airflock.papers.dimock_2003.flights import Birds, Flight, Start, Task
 from airflock.papers.dimock_2003.units import BEST, Gains, gains
 
@@ -98,7 +98,7 @@ def evolve(birds: Birds, generations: int, population: int, repeats: int) -> tup
 
 def sound(values: dict[str, Any]) -> float:
     """Sound fitness of one flight, W; a collision ends a flight of the paper's preset, so power is that until then."""
-    return fitness(values, "sound")["fitness"]
+    return fitness_dimock.sound(values)
 
 
 def candidate(found: Gains, flights: Sequence[Flight]) -> Candidate:

@@ -3,7 +3,6 @@
 Dense solutions of any number of segments, by the rules of `aero.filaments`; powers in W per bird.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,8 @@ from numpy.typing import NDArray
 
 from airflock.aero import wing as wings
 from airflock.aero.filaments import influences
-from airflock.papers.claims import Claim, judged
+from airflock.papers import statistics
+from airflock.papers.claims import Measured
 from airflock.papers.dimock_2003.units import FOOT, FT_LBF, HORSEPOWER, both
 from airflock.scenarios.files import load
 
@@ -131,57 +131,36 @@ def measure() -> dict[str, float]:
     return found
 
 
-def claims(found: dict[str, float]) -> list[Claim]:
-    """Verdicts on the unit of the fitness, the benchmarks, and the horseshoe."""
-    printed = 9.8 * FT_LBF
-    inside = found["best"] <= printed <= found["deep.10"]
-    source = "computed here; the paper has no benchmark"
+def measured(found: dict[str, float]) -> list[Measured]:
+    """Bounds of formations that stand still, in ft lbf/s per bird, and the horseshoe."""
+    at = {
+        "solo": ("a bird alone", "solo.10"),
+        "deep": ("deep V tip to tip", "deep.10"),
+        "munk": ("Munk's bound tip to tip", "munk"),
+        "best": ("best formation found on the grid", "best"),
+    }
+    printed, solo = 9.8 * HORSEPOWER, found["solo.10"]
+    unit = f"{solo / HORSEPOWER:.3f} HP: 9.8 HP ({printed:.0f} W) a bird, or for the flock, is impossible"
     return [
-        Claim(
-            id="static.unit", statement="the best controller needs 9.8 HP", source="Results, Fig. 5",
-            test="a bird alone needs at least as much as one in a flock", published=9.8 * HORSEPOWER,
-            ours=found["solo.10"],
-            **judged(
-                found["solo.10"] >= 9.8 * HORSEPOWER,
-                f"a bird alone needs {both(found['solo.10'])} of induced power, {found['solo.10'] / HORSEPOWER:.3f} "
-                "HP; 9.8 HP a bird, or for the flock, is impossible",
-            ),
+        *(
+            Measured(
+                f"static.{name}", "power", words, statistics.one(found[key] / FT_LBF), unit if name == "solo" else ""
+            )
+            for name, (words, key) in at.items()
         ),
-        Claim(
-            id="static.unit.read", statement="9.8 and 13 are ft lbf/s per bird", verdict="finding",
-            source="an inference from magnitudes: nothing in the text states it",
-            test="9.8 ft lbf/s lies between the best static formation and a deep V tip to tip, at 10 segments",
-            published=printed, ours=found["deep.10"], low=found["best"], high=found["deep.10"],
-            reason=f"{'it does' if inside else 'it does not'}: {both(found['best'])} to {both(found['deep.10'])}; with "
-            f"9 segments the deep V needs {both(found['deep.9'])}, with 5 {both(found['deep.5'])}",
+        Measured(
+            "static.selfish",
+            "share saved",
+            "birds in turn save for themselves, against a bird alone",
+            statistics.one(1.0 - found["selfish"] / solo, 3),
+            f"{both(found['selfish'])}, median of three starts",
         ),
-        _finding("static.solo", "power of a bird alone", found["solo.10"], source,
-                 f"{both(found['solo.10'])} at 10 segments, {both(found['solo.5'])} at 5"),
-        _finding("static.munk", "Munk's bound tip to tip, equal lifts", found["munk"], source, both(found["munk"])),
-        _finding("static.best", "best static formation found on the grid", found["best"], source,
-                 f"{both(found['best'])}, tip to tip and abreast ({both(found['abreast'])})"),
-        _finding("static.selfish", "selfish play: birds in turn save for themselves", found["selfish"], source,
-                 f"{both(found['selfish'])}, median of three starts, until nobody gains or 40 rounds"),
-        _finding("static.anarchy", "price of anarchy: selfish over best", found["selfish"] / found["best"], source,
-                 f"{found['selfish'] / found['best']:.2f}"),
-        Claim(
-            id="static.horseshoe", statement="with one horseshoe a wing birds gain by flying in a row, an artefact",
-            source="Results: what the GA exploited first",
-            test="five birds in a row, each half a span and 2 % aside of the one ahead: one horseshoe off the grid "
-            "gives less than half the power of ten segments on it",
-            ours=found["row.1"],
-            **judged(
-                found["row.1"] < 0.5 * found["row.10"],
-                f"{both(found['row.1'])} against {both(found['row.10'])}: a lone control point beside the tip vortex "
-                "of the bird ahead feels an upwash without bound",
-            ),
+        Measured("static.anarchy", "power", "selfish over best", statistics.one(found["selfish"] / found["best"])),
+        Measured(
+            "static.horseshoe",
+            "power",
+            "five birds in a row, one horseshoe over ten segments",
+            statistics.one(found["row.1"] / found["row.10"]),
+            f"{both(found['row.1'])} against {both(found['row.10'])}",
         ),
-    ]  # fmt: skip
-
-
-def _finding(id_: str, statement: str, value: float, source: str, reason: str) -> Claim:
-    assert math.isfinite(value)
-    return Claim(
-        id=id_, statement=statement, source=source, test="no published value", verdict="finding", ours=value,
-        reason=reason,
-    )  # fmt: skip
+    ]

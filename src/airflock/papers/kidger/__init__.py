@@ -1,15 +1,25 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: shown there by videos, here by numbers.
 
-Parts: schemes (five ways to recombine, in a city and a forest), corners (thin walls), tuning (every radius and scale),
-presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), learnt (its first wish:
-parameters learnt from its measures), display (its second).
+Parts: conduct (collisions in four scenes, erratic and slow flights), schemes (five ways to recombine, in a city and a
+forest), corners (thin walls), tuning (every radius and scale), presets (final, natural and poor),
+shepherd (the negative goal), cost (time per boid and frame), learnt (its first wish: parameters learnt from its
+measures), display (its second).
 """
 
-from airflock.papers.kidger import corners, cost, display, learnt, presets, schemes, shepherd, tuning
+from airflock.papers.kidger import conduct, corners, cost, display, learnt, presets, schemes, shepherd, tuning
 from airflock.papers.paper import Paper, by_modules
 
 MODULES = {
-    "schemes": schemes, "corners": corners, "tuning": tuning, "presets": presets, "shepherd": shepherd, "cost": cost,
-    "learnt": learnt, "display": display,
-}  # fmt: skip
-PAPER = Paper("Kidger, An Investigation into Drone Swarms & Swarm Intelligence", tuple(MODULES), by_modules(MODULES))
+    "conduct": conduct,
+    "schemes": schemes,
+    "corners": corners,
+    "tuning": tuning,
+    "presets": presets,
+    "shepherd": shepherd,
+    "cost": cost,
+    "learnt": learnt,
+    "display": display,
+}
+PAPER = Paper(
+    "Kidger, An Investigation into Drone Swarms & Swarm Intelligence", __name__, tuple(MODULES), by_modules(MODULES)
+)

@@ -6,9 +6,9 @@ from typing import Any
 import pandas as pd
 
 from airflock.display import fly_show, points_of
-from airflock.engine.cpu import in_threads
+from airflock.engine.threads import in_threads
 from airflock.papers import statistics
-from airflock.papers.claims import Claim, judged
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 
 DRONES = 200
@@ -37,39 +37,31 @@ def fly(flights: Flights) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index").sort_index()
 
 
-def claims(table: pd.DataFrame) -> list[Claim]:
-    """What must hold with a tenth failing; and the figures of every share."""
+def measured(table: pd.DataFrame) -> list[Measured]:
+    """Largest distance from the point and collisions with a tenth failing; time to form with every share."""
     tenth = table.loc[(0.1, "calm")]
     hits = tenth[["collisions", "hulls", "struck"]].sum()
-    placed = bool((tenth["worst"] <= 1.0).all() and tenth["time"].notna().all())
+    at, never = "200 drones, 10 % failing, calm", int(tenth["time"].isna().sum())
+    worst = statistics.mean(tenth["worst"])._replace(ours=float(tenth["worst"].max()), low=None, high=None)
     found = [
-        Claim(
-            id="display.placed", statement="200 drones, five shapes, 10 % failing: largest distance from the point, m",
-            source="Kidger, section 7", test="every surviving drone within 1 m of its point, in every shape",
-            **statistics.mean(tenth["worst"]).fields(),
-            **judged(placed, f"largest of all {tenth['worst'].max():.2g} m"),
+        Measured(
+            "display.placed", "distance to the point", f"{at}, largest of all", worst, f"{never} shapes never complete"
         ),
-        Claim(
-            id="display.collisions", statement="the same flights: collisions per shape",
-            source="Kidger, section 7", test="none of two drones, none with one that hovers",
-            **statistics.mean(tenth["collisions"] + tenth["hulls"]).fields(),
-            **judged(
-                hits["collisions"] + hits["hulls"] == 0,
-                f"{hits['collisions']} of two drones, {hits['hulls']} with one that hovers; "
-                f"{hits['struck']} struck by one that fell, of {len(tenth)} shapes",
-            ),
+        Measured(
+            "display.collisions",
+            "n_coll",
+            at,
+            statistics.mean(tenth["collisions"] + tenth["hulls"]),
+            f"{hits['struck']} struck by one that fell, of {len(tenth)} shapes",
         ),
-    ]  # fmt: skip
+    ]
     for (share, wind), rows in table.groupby(level=[0, 1]):
         hit = rows[["collisions", "hulls", "struck"]].sum().tolist()
-        found.append(
-            Claim(
-                id=f"display.{wind}.{100 * share:.0f}", statement=f"s to form a shape, {share:.0%} failing, {wind}",
-                source="Kidger, section 7", test="none: a wish", **statistics.mean(rows["time"]).fields(),
-                verdict="finding",
-                reason=f"residual error {rows['error'].mean():.2g} m in the mean, {rows['worst'].max():.2g} m at most; "
-                f"{hit[0]} collisions of two drones, {hit[1]} with one that hovers, {hit[2]} struck by one that fell; "
-                f"{rows['time'].isna().sum()} of {len(rows)} shapes never complete",
-            )
-        )  # fmt: skip
+        note = (
+            f"residual error {rows['error'].mean():.2g} m in the mean, {rows['worst'].max():.2g} m at most; {hit[0]} "
+            f"collisions of two drones, {hit[1]} with one that hovers, {hit[2]} struck by one that fell; "
+            f"{rows['time'].isna().sum()} of {len(rows)} shapes never complete"
+        )
+        name, at = f"display.{wind}.{100 * share:.0f}", f"s to form a shape, {share:.0%} failing, {wind}"
+        found.append(Measured(name, "time to form", at, statistics.mean(rows["time"]), note))
     return found

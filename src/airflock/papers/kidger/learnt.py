@@ -5,38 +5,17 @@ sets fly the same seeds, and so the same scenes, goals and starts; no seed of a 
 scenes are of a density that no study had.
 """
 
-from typing import NamedTuple
-
 import pandas as pd
 
 from airflock.papers import statistics
-from airflock.papers.claims import Claim, judged
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.scenarios.files import load
 
 SEEDS = 20
 SETS = {"city": "kidger/learnt_city", "forest": "kidger/learnt_forest"}
 DENSITIES = {"city": (1.0, 0.5), "forest": (1.0, 2.0)}
-SOURCE = "Kidger, section 7: tuning by generational learning from the measures"
-
-
-class Measure(NamedTuple):
-    """An order parameter, what it is, and +1 if more of it is better."""
-
-    name: str
-    words: str
-    better: int
-
-
-MEASURES = (
-    Measure("flocked", "share flocked", 1),
-    Measure("time_to_flock", "s to all flocked", -1),
-    Measure("goals_reached", "goals reached", 1),
-    Measure("f_goals", "share of goals reached, averaged over the flight", 1),
-    Measure("n_coll", "collisions of two boids", -1),
-    Measure("phi_coll", "share of pairs in contact", -1),
-    Measure("n_env_coll", "collisions with the scene", -1),
-)
+MEASURES = ("flocked", "time_to_flock", "goals_reached", "f_goals", "n_coll", "phi_coll", "n_env_coll")
 
 
 def fly(flights: Flights) -> pd.DataFrame:
@@ -52,14 +31,20 @@ def fly(flights: Flights) -> pd.DataFrame:
     return flights.score("Learnt parameters", scenarios, flights.count(SEEDS, 3)).sort_index()
 
 
-def claims(table: pd.DataFrame) -> list[Claim]:
+def measured(table: pd.DataFrame) -> list[Measured]:
     """Fitness, every measure behind it, and how the sets do in the scene that they were not learnt in."""
     found = []
     for scene, densities in DENSITIES.items():
         for density in densities:
-            place = table.loc[(scene, density)]
-            found += [_fitness(place, scene, density), *(_measure(place, scene, density, m) for m in MEASURES)]
-            found.append(_other(place, scene, density))
+            place, at = table.loc[(scene, density)], f"{scene}, density {density:g}"
+            for name in ("fitness", *MEASURES):
+                gap, words = _gap(place, name)
+                found.append(
+                    Measured(f"learnt.{scene}.{density:g}.{name}", name, f"{at}, learnt less final", gap, words)
+                )
+            gap, words = _gap(place, "fitness", "other")
+            at += ", learnt in the other scene less final"
+            found.append(Measured(f"learnt.{scene}.{density:g}.other", "fitness", at, gap, words))
     return found
 
 
@@ -70,35 +55,3 @@ def _gap(place: pd.DataFrame, name: str, kind: str = "learnt") -> tuple[statisti
     count = "" if len(both) == len(place.loc["final"]) else f", of the {len(both)} scenes in which both have one"
     words = f"{kind} {means[kind]:.3g}, final {means['final']:.3g}{count}"
     return statistics.mean(both[kind] - both["final"]), words
-
-
-def _fitness(place: pd.DataFrame, scene: str, density: float) -> Claim:
-    gap, words = _gap(place, "fitness")
-    return Claim(
-        id=f"learnt.{scene}.{density:g}.fitness",
-        statement=f"learnt parameters beat the final set in unknown scenes: {scene}, density {density:g}: difference",
-        source=SOURCE, test="95 % interval of the paired difference above 0", **gap.fields(),
-        **judged(gap.low > 0.0, words),
-    )  # fmt: skip
-
-
-def _measure(place: pd.DataFrame, scene: str, density: float, measure: Measure) -> Claim:
-    gap, words = _gap(place, measure.name)
-    sign = measure.better
-    better, worse = (gap.low if sign > 0 else -gap.high) > 0.0, (gap.high if sign > 0 else -gap.low) < 0.0
-    said = "better" if better else "worse" if worse else "no difference"
-    return Claim(
-        id=f"learnt.{scene}.{density:g}.{measure.name}",
-        statement=f"{measure.words}, {scene}, density {density:g}: learnt less final",
-        source=SOURCE, test="none: a part of the fitness", verdict="finding", **gap.fields(),
-        reason=f"{said}: {words}",
-    )  # fmt: skip
-
-
-def _other(place: pd.DataFrame, scene: str, density: float) -> Claim:
-    gap, words = _gap(place, "fitness", "other")
-    return Claim(
-        id=f"learnt.{scene}.{density:g}.other",
-        statement=f"fitness of the set learnt in the other scene, {scene}, density {density:g}: less final",
-        source=SOURCE, test="none", verdict="finding", **gap.fields(), reason=words,
-    )  # fmt: skip

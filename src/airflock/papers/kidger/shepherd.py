@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from airflock.papers import statistics
-from airflock.papers.claims import Claim, judged
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
@@ -40,19 +40,23 @@ def fly(flights: Flights) -> Flown:
     return Flown(farther, flights.score("Herding", {"herd": load("kidger/city", {**OPEN, **herd})}, seeds))
 
 
-def claims(flown: Flown) -> list[Claim]:
+def measured(flown: Flown) -> list[Measured]:
     """The goal repels; the shepherd succeeds."""
     away, near = (statistics.mean(flown.farther[scale]) for scale in (-0.25, 0.25))
     share = statistics.mean(flown.herded["goals_reached"] / flown.herded["goals"])
     return [
-        Claim(
-            id="shepherd.repels", statement="a negative goal scale repels: change of distance to the goal in 10 s, m",
-            source="Kidger, section 5.3, Goal Scale", test="95 % interval above 0", **away.fields(),
-            **judged(away.low > 0.0, f"with the positive scale {near.ours:.3g} m"),
+        Measured(
+            "shepherd.repels",
+            "distance to the goal",
+            "change in 10 s, goal scale -0.25",
+            away,
+            f"with the positive scale {near.ours:.3g} m",
         ),
-        Claim(
-            id="shepherd.herds", statement="a shepherd drives the flock to four points: share reached in 120 s",
-            source="ours, after Strömbom et al. 2014", test="none", verdict="finding", **share.fields(),
-            reason=f"flocked {flown.herded['flocked'].mean():.3g} of the time",
+        Measured(
+            "shepherd.herds",
+            "goals reached",
+            "share of four points in 120 s",
+            share,
+            f"flocked {flown.herded['flocked'].mean():.3g} of the time",
         ),
-    ]  # fmt: skip
+    ]

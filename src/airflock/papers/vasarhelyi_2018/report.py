@@ -3,50 +3,56 @@
 from pathlib import Path
 from typing import Any
 
-from airflock import __version__, atomic
-from airflock.papers import claims as records
-from airflock.papers.claims import VERDICTS, Claim
+from airflock.papers import page
+from airflock.papers.claims import Claim
+from airflock.papers.page import Section
 from airflock.papers.vasarhelyi_2018 import PAPER
 
 COMMAND = "airflock paper vasarhelyi_2018"
+ABOUT = (
+    "`python papers/vasarhelyi_2018/reproduce.py` also rewrites this folder. The evolution of Table S1 stands on "
+    "[a page of its own](EVOLVED.md), what the authors' program says on [another](../programs.md)."
+)
 SECTIONS = (
-    ("s2.", "Table S2", "s2", "Mean ± SD over 100 flights of 600 s a column. Printed parameters of Table S1."),
-    (
-        "program.",
-        "Table S1 flown by the authors' own program",
-        "",
-        "The rounding of Table S1 cancels here: both sides fly the same digits. Per-run numbers stand in "
-        "`src/airflock/papers/vasarhelyi_2018/program_runs.csv`.",
+    Section(
+        "s2.",
+        "Table S2",
+        "Mean ± SD over 100 flights of 600 s a column, with the parameters as Table S1 prints them; Welch's test "
+        "against the printed mean and SD of 100 evaluations, not corrected for the number of rows.",
+        ("s2",),
     ),
-    ("fig1.", "Fig. 1: algorithm A (Virágh et al. 2014) against B", "fig1", ""),
-    (
+    Section("fig1.", "Fig. 1: algorithm A (Virágh et al. 2014) against B", "", ("fig1",)),
+    Section(
         "fig2.",
         "Fig. 2: range and delay of the radio at 32 m/s",
-        "fig2",
-        "20 flights a bin; dashed: the caption's safe region.",
+        "The map is of 20 flights a bin, the safe region (dashed) of 40.",
+        ("fig2",),
     ),
-    (
+    Section(
         "fig3.",
         "Fig. 3: 30 drones with the parameters that flew outdoors",
-        "fig34",
-        "Look-alikes of outdoor flights; where obstacles stand is ours. Middle five minutes, 20 flights each. "
-        "Shown is the flight of each scene whose mean φ_LAP is nearest 0.",
+        "Look-alikes of outdoor flights; where obstacles stand is ours. Middle five minutes, 20 flights each. Shown is "
+        "the flight of each scene whose mean φ_LAP is nearest 0.",
+        ("fig34",),
     ),
-    ("fig4.", "Fig. 4: patterns", "", ""),
-    ("fig7.", "Fig. 7 and Eqs 17-22", "", ""),
-    ("pressure.", "Pressure: 30 to 1000 drones", "pressure", "At 4 m/s, side of the arena 250 m · sqrt(N/100)."),
+    Section("fig4.", "Fig. 4: patterns"),
+    Section("pressure.", "30 to 1000 drones", "At 4 m/s, side of the arena 250 m · sqrt(N/100).", ("pressure",)),
+    Section(
+        "tuning.",
+        "Tables S3 and S4: what each parameter does",
+        "Paired flights on the same seeds, 40 scored and 10 recorded a side: the changed side less the other. "
+        "`s1` is Table S1, `s4` Table S4; the cases stand in `vasarhelyi_2018/tuning.py`, with how oscillation (m/s), "
+        "agility (1/s) and reach (m) are measured.",
+    ),
 )
 
 
-def write(folder: Path, claims: list[Claim], flown: dict[str, Any], seeds: int | None = None) -> None:
+def write(folder: Path, claims: list[Claim], flown: dict[str, Any]) -> None:
     """Write claims.toml, README.md and the figures into a folder."""
     from airflock.papers.vasarhelyi_2018.figures import draw
 
-    folder.mkdir(parents=True, exist_ok=True)
     draw(folder / "figures", flown)
-    records.write_claims(folder / "claims.toml", claims, records.header(PAPER.title, COMMAND, seeds))
-    # from the file, so that both show the same rounded numbers
-    atomic.write(folder / "README.md", page(records.read_claims(folder / "claims.toml")[1]))
+    page.write(folder, PAPER.title, COMMAND, claims, SECTIONS, ABOUT)
 
 
 def reproduce(folder: Path, threads: int | None = None) -> list[Claim]:
@@ -54,33 +60,3 @@ def reproduce(folder: Path, threads: int | None = None) -> list[Claim]:
     claims, flown = PAPER.recompute(None, False, None, threads, None)
     write(folder, claims, flown)
     return claims
-
-
-def page(claims: list[Claim]) -> str:
-    """README.md: verdicts, tables and figures."""
-    count = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
-    lines = [
-        f"# {PAPER.title}",
-        "",
-        f"`{COMMAND}` flies all this again; `python papers/vasarhelyi_2018/reproduce.py` also rewrites this folder. "
-        f"Airflock {__version__}. Tests and sources of each claim stand in [claims.toml](claims.toml). "
-        "The evolution of Table S1 stands on [a page of its own](EVOLVED.md).",
-        "",
-        f"**{count['reproduced']} reproduced, {count['not reproduced']} not reproduced, {count['finding']} findings.** "
-        "A finding has nothing printed to agree with.",
-        "",
-        "## Not reproduced",
-        "",
-        records.markdown([claim for claim in claims if claim.verdict == "not reproduced"]),
-    ]
-    for start, title, figure, words in SECTIONS:
-        part = [claim for claim in claims if claim.id.startswith(start)]
-        if not part:
-            continue
-        lines += [f"## {title}", ""]
-        lines += [words, ""] if words else []
-        lines += [f"![{title}](figures/{figure}.png)", ""] if figure else []
-        told = [claim for claim in part if claim.reason and claim.verdict != "not reproduced"]
-        lines += [records.markdown(part, reasons=False)]
-        lines += [*(f"* `{claim.id}`: {claim.reason}" for claim in told), ""] if told else []
-    return "\n".join(lines).rstrip() + "\n"

@@ -5,7 +5,8 @@ r_s and r_a in {0, 10, .. 50} cm and compares extension, polarization, collision
 evolved (radii, fields of view and weights evolved for quality), which is flown only when it is asked for by name.
 
 The figures were measured by the authors' program, so the first two parts count collisions as it does
-(`metrics.count = "program"`); printed counts by Eq. 18, and one claim shows what Eq. 18 would change.
+(`metrics.count = "program"`); printed counts by Eq. 18, and one claim shows what Eq. 18 would change. The sentences of
+the paper are judged by the sequential flights.
 """
 
 import csv
@@ -15,9 +16,9 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.papers.claims import Claim
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
-from airflock.papers.paper import Found, Paper
+from airflock.papers.paper import Flown, Paper
 from airflock.papers.zapotecatl_2016 import evolved, verdicts
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
@@ -46,22 +47,22 @@ def published() -> pd.DataFrame:
     return table.astype({"r_s": int, "r_a": int}).set_index(["r_s", "r_a"]).rename_axis([None, None])
 
 
-def fly(wanted: Sequence[str], flights: Flights) -> Found:
+def fly(wanted: Sequence[str], flights: Flights) -> Flown:
     """Fly the parts that are wanted; without a name, a quick run leaves the synchronous boids out."""
     found: dict[str, Any] = {}
-    claims: list[Claim] = []
+    measured: list[Measured] = []
     for part in wanted:
         if part == "synchronous" and flights.quick and len(wanted) > 1:
             continue
         if part == "evolved":
             found[part] = evolved.fly(flights)
-            claims += evolved.claims(found[part])
+            measured += evolved.measured(found[part])
             continue
         found[part] = _fly(part, flights)
-        claims += verdicts.claims(part, found[part], published().drop(COARSE_OFF if flights.quick else []))
+        measured += verdicts.measured(part, found[part], published().drop(COARSE_OFF if flights.quick else []))
         if part == "sequential" and not flights.quick:
-            claims.append(verdicts.by_eq_18(_fly_by_eq_18(flights)))
-    return claims, found
+            measured.append(verdicts.by_eq_18(_fly_by_eq_18(flights)))
+    return measured, found
 
 
 def _fly(part: str, flights: Flights) -> pd.DataFrame:
@@ -81,6 +82,7 @@ def _fly_by_eq_18(flights: Flights) -> pd.DataFrame:
 
 PAPER = Paper(
     "Zapotecatl et al. 2016, Performance Metrics of Collective Coordinated Motion in Flocks",
+    __name__,
     ("sequential", "synchronous", "printed"),
     fly,
     long=("evolved",),

@@ -11,7 +11,7 @@ import pandas as pd
 from airflock.evolve.after import Result
 from airflock.evolve.space import with_parameters
 from airflock.papers import statistics
-from airflock.papers.claims import Claim
+from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.papers.studies import evolve
 from airflock.scenarios.files import load
@@ -38,22 +38,17 @@ def fly(flights: Flights) -> Data:
     return Data(result, flown.loc["evolved"], flown.loc["best"])
 
 
-def claims(data: Data) -> list[Claim]:
+def measured(data: Data) -> list[Measured]:
     """What evolution gains on the best of the paper's grid, by each of its measures."""
     told = ", ".join(f"{key.removeprefix('model.')} {value:.3g}" for key, value in data.result.parameters.items())
-    found = []
-    for name in MEASURES:
-        gap = statistics.mean(data.ours[name] - data.published[name])
-        found.append(
-            Claim(
-                id=f"evolved.{name}",
-                statement=f"{name} of boids evolved for quality less that of the best of the paper's radii",
-                source="Concluding Remarks and Future Work",
-                test="none: the paper has not done it",
-                verdict="finding",
-                **gap.fields(),
-                reason=f"{data.ours[name].mean():.4g} against {data.published[name].mean():.4g}"
-                + (f"; {told}" if name == "quality" else ""),
-            )
+    return [
+        Measured(
+            f"evolved.{name}",
+            name,
+            "evolved boids less the best of the radii",
+            statistics.mean(data.ours[name] - data.published[name]),
+            f"{data.ours[name].mean():.4g} against {data.published[name].mean():.4g}"
+            + f"; {told}" * (name == "quality"),
         )
-    return found
+        for name in MEASURES
+    ]

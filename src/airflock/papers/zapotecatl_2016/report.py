@@ -6,9 +6,11 @@ import numpy as np
 import pandas as pd
 
 from airflock import atomic
-from airflock.papers import claims as records
+from airflock.papers import page
 from airflock.papers.claims import Claim
+from airflock.papers.page import Section
 from airflock.papers.zapotecatl_2016 import PAPER, RADII
+from airflock.papers.zapotecatl_2016.verdicts import BEST
 
 COMMAND = "airflock paper zapotecatl_2016"
 COUNTED = (
@@ -26,26 +28,29 @@ SURFACES = {
 def reproduce(folder: Path, seeds: int | None = None, threads: int | None = None) -> list[Claim]:
     """Fly everything, then write claims.toml, README.md and the figures."""
     claims, flown = PAPER.recompute(None, False, seeds, threads, None)
-    write(folder, claims, flown, seeds)
+    write(folder, claims, flown)
     return claims
 
 
-def write(folder: Path, claims: list[Claim], flown: dict[str, pd.DataFrame], seeds: int | None = None) -> None:
+def write(folder: Path, claims: list[Claim], flown: dict[str, pd.DataFrame]) -> None:
     """Write the report into a folder."""
-    (folder / "figures").mkdir(parents=True, exist_ok=True)
-    header = records.header(PAPER.title, COMMAND, seeds)
-    records.write_claims(folder / "claims.toml", claims, header)
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
     means = {part: table.groupby(level=[0, 1]).mean() for part, table in flown.items()}
     for part, table in means.items():
-        surfaces(folder / "figures" / f"{part}.png", table)
-    best = means["sequential"]["quality"].idxmax()
-    radii(folder / "figures" / "radii.png", best)
-    text = [f"# {PAPER.title}\n", f"`{header['command']}` recomputes this page. {COUNTED}\n", records.markdown(claims)]
-    for part, table in means.items():
-        text += [f"\n## {part}: quality over r_s (rows) and r_a (columns), cm\n", _grid(table["quality"])]
-        text += [f"\n![Figs 4-7, {part}](figures/{part}.png)\n"]
-    text += ["\n## Fig. 8: the radii of the best configuration\n", "\n![radii](figures/radii.png)\n"]
-    atomic.write(folder / "README.md", "\n".join(text))
+        surfaces(figures / f"{part}.png", table)
+    radii(figures / "radii.png", means["sequential"]["quality"].idxmax())
+    columns = [*SURFACES, "cns_ext", "cns_pol"]
+    rounded = means["sequential"][columns].rename_axis(["r_s", "r_a"]).map(lambda value: float(f"{value:.5g}"))
+    atomic.write(folder / "configurations.csv", rounded.to_csv())
+    sections = [
+        Section(part, f"{part}: quality over r_s (rows) and r_a (columns), cm", _grid(table["quality"]), (part,))
+        for part, table in means.items()
+    ]
+    words = "Left the paper's best radii, (r_s, r_a) = (20, 30) cm, right the best of our 36 configurations."
+    page.write(
+        folder, PAPER.title, COMMAND, claims, [*sections, Section("radii", "Fig. 8", words, ("radii",))], COUNTED
+    )
 
 
 def _grid(values: pd.Series) -> str:
@@ -73,19 +78,20 @@ def surfaces(path: Path, means: pd.DataFrame) -> None:
 
 
 def radii(path: Path, best: tuple[int, int], r_c: int = 50) -> None:
-    """Areas of perception of the best configuration, like Fig. 8."""
+    """Areas of perception of the paper's best configuration, Fig. 8, and of ours."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
     from matplotlib.patches import Circle
 
-    figure, axes = pyplot.subplots(figsize=(5, 5), layout="constrained")
-    shown = ((r_c, "tab:green", "cohesion"), (best[1], "tab:blue", "alignment"), (best[0], "tab:red", "separation"))
-    for radius, colour, name in shown:
-        axes.add_patch(Circle((0, 0), radius, color=colour, alpha=0.3, label=f"{name} {radius} cm"))
-    axes.plot(0, 0, "k>", markersize=8)
-    axes.set(xlim=(-55, 55), ylim=(-55, 55), aspect="equal", xlabel="cm", ylabel="cm")
-    axes.legend(loc="upper right")
+    figure, both = pyplot.subplots(1, 2, figsize=(10, 5), layout="constrained")
+    for axes, (r_s, r_a), title in zip(both, (BEST, best), ("Fig. 8 of the paper", "ours"), strict=True):
+        shown = ((r_c, "tab:green", "cohesion"), (r_a, "tab:blue", "alignment"), (r_s, "tab:red", "separation"))
+        for radius, colour, name in shown:
+            axes.add_patch(Circle((0, 0), radius, color=colour, alpha=0.3, label=f"{name} {radius} cm"))
+        axes.plot(0, 0, "k>", markersize=8)
+        axes.set(xlim=(-55, 55), ylim=(-55, 55), aspect="equal", xlabel="cm", ylabel="cm", title=title)
+        axes.legend(loc="upper right")
     figure.savefig(path, dpi=110)
     pyplot.close(figure)

@@ -1,4 +1,4 @@
-"""Verdicts: the surfaces of Figs 4-7 against the digitised figures, and the minima that the text quotes."""
+"""What is measured for Figs 4-8: the captions' values and places, the trends of the text, distances to the figures."""
 
 from typing import Any
 
@@ -6,215 +6,161 @@ import numpy as np
 import pandas as pd
 
 from airflock.papers import statistics
-from airflock.papers.claims import Claim, judged
+from airflock.papers.claims import Measured
 
-# fixed beforehand: distance to the figures over the configurations, and bands of the columns that spread little
-LIMIT = {"sequential": 0.05, "synchronous": 0.065}
 NOISY_COLUMN = 10  # r_a in cm: there the order of updates changes the result
-ROW_0 = 0.02
-BANDS = {10: (0.55, 0.57), 20: (0.69, 0.70), 30: (0.69, 0.71), 40: (0.64, 0.67), 50: (0.49, 0.51)}  # quality at r_a = 0
-GOOD = (0.90, 0.945)
+WITHOUT = (10, 20, 30, 40, 50)  # r_s in cm: columns without alignment, which spread little
 DENSE = 10  # r_s in cm: there a quarter of the boids collide, so that the way of counting shows
-FLOOR = (1e-4, 1e-3)  # frequency of collision
-# the captions' minima are of the authors' program, which moves one boid after another; what is known of synchronous
-# flights is one flight of each configuration by an independent program
-ALONE = "one synchronous flight of an independent program (dt = 1 ms)"
-MINIMA: dict[str, dict[str, tuple[tuple[int, int], float, str]]] = {
-    "sequential": {
-        "extension_cm": ((0, 30), 1.64, "Fig. 4, caption"),
-        "polarization_deg": ((50, 50), 0.79, "Fig. 5, caption"),
-    },
-    "synchronous": {"extension_cm": ((0, 30), 1.49, ALONE), "polarization_deg": ((50, 50), 0.49, ALONE)},
+FLIGHTS = 15  # behind each number of the captions
+# the captions' minima: place in cm and value
+MINIMA = {
+    "extension_cm": ((0, 30), 1.64),
+    "polarization_deg": ((50, 50), 0.79),
+    "f_collision": ((50, 50), 0.0001),
 }
+BEST = (20, 30)  # cm, Fig. 8
+# Figs 4-6: a measure falls as a radius grows (-1) or grows with it (+1); axis 0 is r_s, axis 1 is r_a
+TRENDS = {"extension_cm": {0: 1, 1: -1}, "polarization_deg": {1: -1}, "f_collision": {0: -1}}
 
 
-def claims(part: str, flown: pd.DataFrame, figures: pd.DataFrame) -> list[Claim]:
-    """All claims of one part; `flown` has the index (r_s, r_a, seed)."""
+def measured(part: str, flown: pd.DataFrame, figures: pd.DataFrame) -> list[Measured]:
+    """Everything measured in one part; `flown` has the index (r_s, r_a, seed) in cm."""
     means = flown.groupby(level=[0, 1]).mean()
     if part == "printed":
-        return [printed(flown, means)]
-    return [
+        best = means["quality"].idxmax()
+        note = (
+            f"at {_cm(best)}, polarization there {means['polarization_deg'][best]:.0f}°: without dt a step is a second"
+        )
+        return [Measured("printed.quality", "quality", "best of 36 configurations", _peak(means, len(flown)), note)]
+    found = [
         *(distance(part, column, flown, means, figures) for column in ("quality", "cns_ext", "cns_pol")),
         row_without_separation(part, means, figures),
-        *(band(part, r_s, flown) for r_s in BANDS),
-        good_region(part, means),
-        *minima(part, flown, means),
+        *(band(part, r_s, flown) for r_s in WITHOUT),
+    ]
+    return found + (sentences(flown, means) if part == "sequential" else [])
+
+
+def sentences(flown: pd.DataFrame, means: pd.DataFrame) -> list[Measured]:
+    """What the text and the captions print."""
+    q = means["quality"]
+    region = q[[(s, a) for s, a in q.index if 20 <= s <= a <= 50]]
+    ranked = ", ".join(f"{_cm(place)} {value:.3f}" for place, value in q.nlargest(3).items())
+    worst = flown.loc[region.idxmin(), "quality"]
+    return [
+        Measured(
+            "quality.maximum", "quality", "best of 36 configurations", _peak(means, len(flown)), f"best: {ranked}"
+        ),
+        Measured(
+            "quality.region",
+            "quality",
+            "least of those with 20 <= r_s <= r_a <= 50 cm",
+            statistics.mean(worst),
+            f"least at {_cm(region.idxmin())}; {(region >= 0.9).sum()} of {len(region)} reach 0.90",
+        ),
+        Measured("quality.best", "rank by quality", _at(BEST), _rank(-q, BEST), f"best: {ranked}"),
+        *(part for column, (at, value) in MINIMA.items() for part in minimum(column, at, value, flown, means)),
+        *(trend(column, axis, sign, flown) for column, axes in TRENDS.items() for axis, sign in axes.items()),
+        Measured(
+            "alignment.f_collision",
+            "f_collision",
+            "r_s = 20 cm, r_a = 30 cm less r_a = 0 cm",
+            _gap(flown, "f_collision", (20, 30), (20, 0)),
+        ),
+        Measured(
+            "separation.f_collision",
+            "f_collision",
+            "r_a = 30 cm, r_s = 0 cm less r_s = 30 cm",
+            _gap(flown, "f_collision", (0, 30), (30, 30)),
+        ),
     ]
 
 
-def distance(part: str, column: str, flown: pd.DataFrame, means: pd.DataFrame, figures: pd.DataFrame) -> Claim:
+def minimum(column: str, at: tuple[int, int], value: float, flown: pd.DataFrame, means: pd.DataFrame) -> list[Measured]:
+    """Value and place of a minimum that a caption prints."""
+    found = statistics.mean(flown.loc[at, column])
+    p = statistics.welch(found, value, found.sd or 0.0, FLIGHTS)  # the caption has no SD: ours for both
+    least: Any = means[column].idxmin()
+    values = flown.loc[at, column]
+    note = f"least of ours {means[column].min():.3g} at {_cm(least)}; median here {values.median():.3g}"
+    return [
+        Measured(f"minimum.{column}.value", column, _at(at), found, note, p),
+        Measured(f"minimum.{column}.place", f"rank by {column}", _at(at), _rank(means[column], at), note),
+    ]
+
+
+def trend(column: str, axis: int, sign: int, flown: pd.DataFrame) -> Measured:
+    """Share of the steps from one radius to the next whose sign is wrong beyond the 95 % interval."""
+    places = sorted(set(flown.index.droplevel(2)))
+    wrong = []
+    for place in places:
+        following = (place[0] + 10, place[1]) if axis == 0 else (place[0], place[1] + 10)
+        if following in places:
+            gap = _gap(flown, column, following, place)
+            wrong.append(bool((gap.high or 0.0) < 0.0 if sign > 0 else (gap.low or 0.0) > 0.0))
+    name = ("r_s", "r_a")[axis]
+    note = f"{sum(wrong)} of {len(wrong)} steps"
+    share = statistics.one(float(np.mean(wrong)), len(flown))
+    return Measured(
+        f"trend.{column}.{name}", f"steps with the wrong sign, {column}", f"steps of 10 cm in {name}", share, note
+    )
+
+
+def distance(part: str, column: str, flown: pd.DataFrame, means: pd.DataFrame, figures: pd.DataFrame) -> Measured:
     """Root mean square distance of one surface to the digitised figure."""
     off = (means[column] - figures[column]).dropna()
-    note = ""
+    at = "all configurations"
     if part == "synchronous":
         off = off[off.index.get_level_values(1) != NOISY_COLUMN]
-        note = f" without the column r_a = {NOISY_COLUMN}"
-    rmse = float(np.sqrt((off**2).mean()))
+        at = f"without the column r_a = {NOISY_COLUMN}"
     worst = off.abs().idxmax()
-    return Claim(
-        id=f"{part}.rmse.{column}",
-        statement=f"{column} over the configurations, distance to the figure",
-        source="Figs 4-7, digitised from the authors' slides",
-        test=f"RMSE at most {LIMIT[part]:g} over all configurations{note}",
-        published=0.0,
-        ours=rmse,
-        runs=len(flown),
-        **judged(rmse <= LIMIT[part], f"largest at (r_s, r_a) = {_cm(worst)}: {off[worst]:+.3f}"),
+    rmse = statistics.one(float(np.sqrt((off**2).mean())), len(flown))
+    return Measured(
+        f"{part}.rmse.{column}", column, f"RMS distance, {at}", rmse, f"largest at {_cm(worst)}: {off[worst]:+.3f}"
     )
 
 
-def row_without_separation(part: str, means: pd.DataFrame, figures: pd.DataFrame) -> Claim:
-    """The row r_s = 0, where everybody collides."""
+def row_without_separation(part: str, means: pd.DataFrame, figures: pd.DataFrame) -> Measured:
+    """The row r_s = 0, where everybody collides; synchronous boids differ at (0, 0), which is left out."""
     off = (means["quality"] - figures["quality"]).dropna().xs(0, level=0)
-    most = {r_a: (0.04 if part == "synchronous" and r_a == 0 else ROW_0) for r_a in off.index}
+    off = off.drop(0) if part == "synchronous" and 0 in off.index else off
     worst = off.abs().idxmax()
-    return Claim(
-        id=f"{part}.row.0",
-        statement="quality at r_s = 0, largest deviation of the row from Fig. 7",
-        source="Fig. 7, digitised",
-        test="each within 0.02 of the figure" + (", (0, 0) within 0.04" if part == "synchronous" else ""),
-        ours=float(off[worst]),
-        **judged(all(abs(off[r_a]) <= most[r_a] for r_a in off.index), f"at r_a = {worst} cm"),
+    return Measured(
+        f"{part}.row.0",
+        "quality",
+        "r_s = 0 cm, largest distance",
+        statistics.one(float(off[worst])),
+        f"at r_a = {worst} cm",
     )
 
 
-def band(part: str, r_s: int, flown: pd.DataFrame) -> Claim:
+def band(part: str, r_s: int, flown: pd.DataFrame) -> Measured:
     """Quality without alignment, which hardly spreads over seeds."""
-    low, high = BANDS[r_s]
-    found = statistics.mean(flown.loc[(r_s, 0), "quality"])
-    inside = low <= found.ours <= high
-    return Claim(
-        id=f"{part}.band.{r_s}",
-        statement=f"quality at r_s = {r_s} cm without alignment",
-        source="Fig. 7 and runs of the authors' program",
-        test=f"mean in [{low:g}, {high:g}]",
-        **found.fields(),
-        **judged(inside, "" if inside else f"{found.ours:.4f} lies outside"),
+    return Measured(
+        f"{part}.band.{r_s}", "quality", f"r_s = {r_s} cm, r_a = 0 cm", statistics.mean(flown.loc[(r_s, 0), "quality"])
     )
 
 
-def by_eq_18(flown: pd.DataFrame) -> Claim:
+def by_eq_18(flown: pd.DataFrame) -> Measured:
     """The same at the densest flock with every colliding boid counted."""
-    low, high = BANDS[DENSE]
     found = statistics.mean(flown.loc[(DENSE, 0), "quality"])
-    return Claim(
-        id=f"sequential.band.{DENSE}.eq_18",
-        statement=f"quality at r_s = {DENSE} cm without alignment, every colliding boid counted (Eq. 18)",
-        source="Fig. 7 and runs of the authors' program",
-        test=f"mean in [{low:g}, {high:g}]",
-        **found.fields(),
-        **judged(
-            low <= found.ours <= high,
-            f"the figure and the band were counted by the program, which misses boids in chains; that of the same "
-            f"flights is sequential.band.{DENSE}",
-        ),
-    )
+    return Measured("eq_18.band.10", "quality", f"r_s = {DENSE} cm, r_a = 0 cm", found)
 
 
-def good_region(part: str, means: pd.DataFrame) -> Claim:
-    """All configurations with r_s >= 20 and r_a >= 30 cm are good."""
-    q = means["quality"]
-    region = q[(q.index.get_level_values(0) >= 20) & (q.index.get_level_values(1) >= 30)]
-    return Claim(
-        id=f"{part}.good",
-        statement="the maximum of quality is about 0.93, in several configurations",
-        source="Results and Fig. 7",
-        test=f"all with r_s >= 20 and r_a >= 30 cm in [{GOOD[0]:g}, {GOOD[1]:g}], the best at least 0.93",
-        published=0.93,
-        ours=float(region.max()),
-        low=float(region.min()),
-        high=float(region.max()),
-        **judged(
-            GOOD[0] <= region.min() and region.max() <= GOOD[1] and region.max() >= 0.93,
-            f"from {region.min():.3f} to {region.max():.3f}; the best at (r_s, r_a) = {_cm(region.idxmax())}",
-        ),
-    )
+def _peak(means: pd.DataFrame, runs: int) -> statistics.Estimate:
+    return statistics.one(float(means["quality"].max()), runs)
 
 
-def minima(part: str, flown: pd.DataFrame, means: pd.DataFrame) -> list[Claim]:
-    """The minima that the captions of Figs 4-6 quote, or for synchronous flights those that are known of such."""
-    quoted = [_minimum(part, column, *known, flown, means) for column, known in MINIMA[part].items()]
-    return [*quoted, collision_floor(part, flown), collision_mean(part, flown, means)]
+def _rank(values: pd.Series, at: tuple[int, int]) -> statistics.Estimate:
+    return statistics.one(float(values.rank()[at]))
 
 
-def collision_floor(part: str, flown: pd.DataFrame) -> Claim:
-    """The least frequency of collision: the overlap of the random start, as most flights have it.
-
-    The median over the flights of a configuration, because one flight of fifteen with a pair that sticks together has
-    a hundred times as much; runs of the authors' program do the same.
-    """
-    middle = flown["f_collision"].groupby(level=[0, 1]).median()
-    place = middle.idxmin()
-    found = statistics.median(flown.loc[place, "f_collision"])
-    return Claim(
-        id=f"{part}.minimum.f_collision",
-        statement="least frequency of collision, as most flights have it",
-        source="Fig. 6, caption, and medians over runs of the authors' program",
-        test="least median over the flights of a configuration between 1e-4, the paper's, and 1e-3",
-        published=1e-4,
-        **found.fields(),
-        **judged(FLOOR[0] <= found.ours <= FLOOR[1], f"at (r_s, r_a) = {_cm(place)}, its place is chance"),
-    )
+def _gap(flown: pd.DataFrame, column: str, a: tuple[int, int], b: tuple[int, int]) -> statistics.Estimate:
+    return statistics.difference(flown.loc[a, column], flown.loc[b, column])
 
 
-def collision_mean(part: str, flown: pd.DataFrame, means: pd.DataFrame) -> Claim:
-    """The same by the mean, which is what Fig. 6 shows."""
-    place = means["f_collision"].idxmin()
-    values = flown.loc[place, "f_collision"]
-    found = statistics.mean(values)
-    return Claim(
-        id=f"{part}.minimum.f_collision.mean",
-        statement="least frequency of collision, mean over the flights of a configuration",
-        source="Fig. 6, caption",
-        test="least mean between 1e-4, the paper's, and 1e-3",
-        published=1e-4,
-        **found.fields(),
-        **judged(
-            FLOOR[0] <= found.ours <= FLOOR[1],
-            f"at (r_s, r_a) = {_cm(place)}; the flight with most has {values.max():.2g}, the others "
-            f"{values.sort_values().iloc[:-1].mean():.2g}: where a pair sticks together it is 1e-2 and more",
-        ),
-    )
-
-
-def _minimum(
-    part: str, column: str, at: tuple[int, int], value: float, source: str, flown: pd.DataFrame, means: pd.DataFrame
-) -> Claim:
-    found = statistics.mean(flown.loc[at, column])
-    place: Any = means[column].idxmin()
-    caption = MINIMA["sequential"][column][1]
-    note = f"; the caption's {caption:g} is of boids moved one after another" if part == "synchronous" else ""
-    holds = abs(found.ours - value) <= 2.0 * (found.sd or 0.0)
-    return Claim(
-        id=f"{part}.minimum.{column}",
-        statement=f"least {column}, at (r_s, r_a) = {at} cm",
-        source=source,
-        test="published value within 2 SD of single flights around our mean",
-        published=value,
-        **found.fields(),
-        **judged(holds, f"our minimum, {means[column].min():.3g}, is at {_cm(place)}{note}"),
-    )
+def _at(place: tuple[int, int]) -> str:
+    return f"r_s = {place[0]} cm, r_a = {place[1]} cm"
 
 
 def _cm(place: Any) -> str:
     return f"({int(place[0])}, {int(place[1])}) cm"
-
-
-def printed(flown: pd.DataFrame, means: pd.DataFrame) -> Claim:
-    """Eqs 2-12 as they stand do not lead to the figures."""
-    best = means["quality"]
-    return Claim(
-        id="printed.quality",
-        statement="the maximum of quality is about 0.93 (with Eqs 2-12 as printed)",
-        source="Fig. 7",
-        test="a configuration reaches 0.90",
-        published=0.93,
-        ours=float(best.max()),
-        runs=len(flown),
-        **judged(
-            bool(best.max() >= 0.90),
-            f"best {best.max():.3f} at (r_s, r_a) = {_cm(best.idxmax())}, polarization there "
-            f"{means['polarization_deg'][best.idxmax()]:.0f}°: without dt a step is as long as a second, and forces of "
-            "any length saturate; the program's unit vectors are what flew",
-        ),
-    )

@@ -1,0 +1,20 @@
+"""Multirotor that holds one command: the closed form of `motion.move` without noise, over any time."""
+
+import math
+
+
+def decay_rate(tau, dt):
+    """Rate 1/s at which a gap to the command closes below saturation, flown in steps of dt (s).
+
+    A step of `motion.move` keeps the share 1 - dt/tau of the gap; for dt = 0 the rate is 1/tau.
+    """
+    return -math.log1p(-dt / tau) / dt if dt > 0.0 else 1.0 / tau
+
+
+def gap_left(gap, time, tau, rate, a_max):
+    """What is left of a velocity gap (m/s) after `time` (s), and for how long of it a_max limited the motion (s).
+
+    Saturated while the gap exceeds a_max tau, where it falls by a_max; then exponential with `rate` (`decay_rate`).
+    """
+    limited = min(max((gap - a_max * tau) / a_max, 0.0), time)
+    return (gap - a_max * limited) * math.exp(-(time - limited) * rate), limited

@@ -1,0 +1,132 @@
+"""The standing list for a body: symmetries, rest, time step, units, single precision."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.checking.report import Report, reported
+from airflock.checking.scenes import turn_about_vertical
+from airflock.checking.single import run
+from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled
+from airflock.core.agent import answer
+from airflock.core.contract import Body, body
+from airflock.core.parameters import choices
+from airflock.core.vocabulary import asks
+from airflock.engine import law
+from airflock.errors import ScenarioError
+from airflock.scenarios import checks
+
+MOTIONS = 40  # random motions that each truth is tried on
+CLOSE = 1e-9
+VECTORS = {"v": "m/s", "m": "m/s", "c": "", "g": "1", "w": "m/s"}  # what `move` may ask for; c: as ACCEPTS says
+Motion = dict[str, NDArray[np.float64]]
+
+
+def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
+    """Run the standing list of truths on a body and return a report with one line a truth.
+
+    what       : a Body, a module, a class, a mapping such as globals(), a name of ours, or a file that ends in .py
+    parameters : values that differ from the defaults, by name; seed: of the random motions, in every fault
+
+    A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is finite; a halved time
+    step halves the error; in other units it is the same motion; the rule stays in single precision. A body that
+    rightly breaks one of them says which and why: VIOLATES = {"mirror": "a propeller turns one way"}. Raises CheckError
+    for any other.
+    """
+    found = _named(what) if isinstance(what, str) else what if isinstance(what, Body) else body(what)
+    b = found.Parameters(**dict(parameters or {}))
+    speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
+    rng = np.random.default_rng(seed)
+    motions = [_motion(found, rng, speed) for _ in range(MOTIONS)]
+    turn, flip = turn_about_vertical(1.1), np.diag([1.0, -1.0, 1.0])
+    truths: dict[str, tuple[str, Callable[[], str]]] = {
+        "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(found.move)[:1])),
+        "rotation": ("a motion turned about the vertical turns", lambda: _turns(found, b, motions, turn, seed)),
+        "mirror": ("a motion seen in a mirror is mirrored", lambda: _turns(found, b, motions, flip, seed)),
+        "rest": ("at rest, without a command, the velocity is finite", lambda: _rest(found, b)),
+        "time step": ("halving dt shrinks the error", lambda: _time_step(found, b, motions)),
+        "units": ("in metres and seconds of another length it is the same", lambda: _units(found, b, motions, seed)),
+        "single precision": ("the rule does not turn float32 into doubles", lambda: _single(found, b, motions)),
+    }
+    return reported(f"body {found.name}", truths, found.violates)
+
+
+def _named(name: str) -> Body:
+    found, faults = checks.body_of({"kind": name}, None)
+    if faults:
+        raise ScenarioError(faults)
+    return found
+
+
+def _motion(found: Body, rng: np.random.Generator, speed: float) -> Motion:
+    """Velocities, a command, noise and wind at random."""
+    made = {name: rng.normal(size=3) for name in VECTORS}
+    for name in ("v", "m", "c", "w"):
+        made[name] = speed * made[name]
+    if found.accepts == "heading":
+        made["c"] = made["c"] / np.linalg.norm(made["c"])
+    return made
+
+
+def _moved(found: Body, b: Any, motion: Motion, dt: float) -> NDArray[np.float64]:
+    """Velocity after one step, m/s."""
+    given: dict[str, Any] = {f"{k}{a}": float(v[c]) for k, v in motion.items() for c, a in enumerate("xyz")}
+    return np.array(answer(found.move, "move", given | {"dt": dt, "b": b}, found.name))
+
+
+def _apart(a: NDArray[np.float64], b: NDArray[np.float64], number: int, seed: int) -> str:
+    if np.abs(a - b).max() <= CLOSE * max(float(np.abs(b).max()), 1e-3):
+        return ""
+    one, other = (", ".join(f"{x:.6g}" for x in v) for v in (a, b))
+    return f"motion {number} of seed {seed}: the velocity is ({one}) instead of ({other})"
+
+
+def _turns(found: Body, b: Any, motions: list[Motion], turn: NDArray[np.float64], seed: int) -> str:
+    faults = (
+        _apart(_moved(found, b, {k: turn @ v for k, v in m.items()}, 0.02), turn @ _moved(found, b, m, 0.02), i, seed)
+        for i, m in enumerate(motions)
+    )
+    return next(filter(None, faults), "")
+
+
+def _rest(found: Body, b: Any) -> str:
+    after = _moved(found, b, {name: np.zeros(3) for name in VECTORS}, 0.02)
+    return "" if np.isfinite(after).all() else f"the velocity is {after}"
+
+
+def _time_step(found: Body, b: Any, motions: list[Motion]) -> str:
+    """Without noise: velocities after a tenth of a second differ ever less."""
+    for number, motion in enumerate(motions[:10]):
+        ends = []
+        for steps in (2, 4, 8, 16):
+            state = motion | {"g": np.zeros(3), "m": motion["v"]}
+            for _ in range(steps):
+                velocity = _moved(found, b, state, 0.1 / steps)
+                state = state | {"v": velocity, "m": velocity}
+            ends.append(state["v"])
+        errors = [float(np.abs(x - y).max()) for x, y in zip(ends, ends[1:], strict=False)]
+        if errors[-1] > max(0.6 * errors[0], 1e-9):
+            return f"motion {number}: velocities change by {errors[0]:.2g}, then {errors[1]:.2g}, {errors[2]:.2g} m/s"
+    return ""
+
+
+def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
+    for units in OTHERS:
+        scale = {name: factor(unit or COMMAND_UNITS[found.accepts], units) for name, unit in VECTORS.items()}
+        other = rescaled(b, units)
+        for number, motion in enumerate(motions):
+            moved = _moved(found, other, {k: scale[k] * v for k, v in motion.items()}, 0.02 * units.second)
+            fault = _apart(moved / scale["v"], _moved(found, b, motion, 0.02), number, seed)
+            if fault:
+                return f"{fault}: a unit is declared wrong, or a number with a unit stands in the rule"
+    return ""
+
+
+def _single(found: Body, b: Any, motions: list[Motion]) -> str:
+    for motion in motions[:5]:
+        given: dict[str, Any] = {f"{k}{a}": float(v[c]) for k, v in motion.items() for c, a in enumerate("xyz")}
+        given |= {"dt": 0.02, "b": b}
+        run(found.move, {"b": choices(b)}, given, asks(found.move, "move", found.name))
+    return ""

@@ -1,0 +1,246 @@
+"""Verb fly: prepare a mission on the ground, run a node, give orders, fly a log again."""
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from airflock.cli import options, tables
+from airflock.errors import CardError, ScenarioError
+
+DATAGRAM = 95  # bytes of a signed status packet
+OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
+PREAMBLE = 2e-4  # s of a packet before its first bit; WiFi's long preamble
+SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
+FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
+
+
+class Fly(TyperGroup):
+    """Subcommands; anything else is a flight card, which is flown."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """A subcommand by its name, else `card`."""
+        if args and args[0] not in self.commands and not args[0].startswith("-"):
+            args = ["card", *args]
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    cls=Fly, no_args_is_help=True, rich_markup_mode="rich",
+    help="""Fly the same law on real drones: a card for all, a node beside each autopilot, orders of one operator.
+
+    Example: [bold]airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10[/bold],
+    then on each drone [bold]airflock fly mission.json --member 3 --autopilot udp:127.0.0.1:14540 --radio ...[/bold]
+    """,
+)  # fmt: skip
+
+
+@app.command(
+    "card", context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+)
+def card(ctx: typer.Context) -> None:
+    """Run a node: the same as python -m airflock.onboard CARD ...; `airflock fly card --help` tells its options."""
+    from airflock.onboard.run import main
+
+    raise typer.Exit(main(ctx.args))
+
+
+@app.command("prepare")
+def prepare(
+    scenario: options.Where,
+    site: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground: degrees, m.")],
+    members: Annotated[str, typer.Option(metavar="1-10", help="System ids of the drones, such as 1-10 or 1,2,5.")],
+    changes: options.Set = None,
+    autopilot: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
+    height: Annotated[
+        float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
+    ] = None,
+    margin: Annotated[float, typer.Option(min=0.0, help="Fence outside the law's walls, m.")] = 30.0,
+    hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="For how long card and key are good.")] = 12.0,
+    limits: Annotated[
+        list[str] | None, typer.Option("--limit", metavar="KEY=VALUE", help="Change a limit, for instance brake=2.")
+    ] = None,
+    fast_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the fast radio.")] = FAST_BITS,
+    slow_bits: Annotated[float, typer.Option(min=100.0, help="Bits per second of the slow radio.")] = SLOW_BITS,
+    out: Annotated[Path, typer.Option(metavar="FILE.json", help="The card; keys are written beside it.")] = Path(
+        "mission.json"
+    ),
+    as_json: options.Json = False,
+) -> None:
+    """Write the flight card, the mission's key and the operator's key.
+
+    Card and mission.key go to every drone; mission.operator stays with the operator.
+
+    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10 --out mission.json
+    """
+    import secrets
+
+    from airflock.fleet.prepare import card_document
+    from airflock.mavlink.keys import write_key
+    from airflock.mavlink.orders import new_keys
+    from airflock.onboard.card import write_card
+    from airflock.scenarios.files import load
+
+    faults: list[str] = []
+    where, systems = _site(site, faults), _members(members, faults)
+    with options.gathering(faults):
+        options.writable((out, (".json",)))
+    for path in (out, out.with_suffix(".key"), out.with_suffix(".operator")):
+        if path.exists():
+            faults.append(f"{path}: exists; a mission is never overwritten")
+    with options.gathering(faults):
+        found = load(scenario, options.settings(changes))
+    with options.gathering(faults):
+        safety = options.settings(limits)
+    options.refuse(faults)
+    private, public = new_keys()
+    try:
+        document = card_document(
+            found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
+            expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
+            margin=margin, safety=safety,
+        )  # fmt: skip
+    except TypeError as fault:
+        raise CardError([f"--limit: {str(fault).rpartition(' ')[2]} is not a limit"]) from fault
+    loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits)
+    full = [
+        f"{name} radio: {len(systems)} drones would take {share:.0%} of its time; at most {SHARE:.0%}: "
+        f"lower the rate (--limit {key}=...) or raise --{name}-bits"
+        for name, key, share in loads
+        if share > SHARE
+    ]
+    if full:
+        raise CardError(full)
+    made = write_card(out, document)
+    write_key(out.with_suffix(".key"), secrets.token_bytes(32))
+    write_key(out.with_suffix(".operator"), private)
+    if as_json:
+        radio = {name: share for name, _, share in loads}
+        tables.emit_json({"card": str(out), "hash": made.hash, "members": list(made.members), "airtime": radio})
+        return
+    tables.say(f"wrote {out} (hash {made.hash[:8]}), {out.with_suffix('.key')}, {out.with_suffix('.operator')}")
+    tables.say(f"fence {made.low:g} to {made.high:g} m above the site; layers up to {made.layer(systems[-1]):g} m")
+    for name, _, share in loads:
+        tables.say(f"{name} radio: {share:.0%} of its time, by an estimate from its bit rate")
+    for guard in made.autopilot.guards:
+        tables.say(f"set {guard.name} within [{guard.low:g}, {guard.high:g}]: {guard.why}")
+
+
+def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[tuple[str, str, float]]:
+    """Name, limit that sets its rate, and share of the time taken, of the fast and the slow radio."""
+    found = []
+    for name, key, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
+        packet = PREAMBLE + 8.0 * (DATAGRAM + OVERHEAD) / bits
+        found.append((name, key, count * packet / float(safety[key])))
+    return found
+
+
+@app.command("order")
+def order(
+    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
+    do: Annotated[
+        str, typer.Argument(metavar="ORDER", help="start, go, goto, hold, resume, return, land, kill, ping.")
+    ],
+    radio: Annotated[str, typer.Option(metavar="PORT", help="udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")],
+    target: Annotated[int, typer.Option(min=0, max=250, help="System id; 0 for all.")] = 0,
+    delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="s until a start.")] = 3.0,
+    point: Annotated[str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to, for goto.")] = None,
+    confirm: Annotated[bool, typer.Option("--confirm", help="Second step of a kill, within 5 s of the first.")] = False,
+) -> None:
+    """Give an order, signed with the operator's key beside the card. Sent five times; each drone obeys it once.
+
+    Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
+    """
+    from airflock.mavlink import orders
+    from airflock.mavlink.keys import read_key
+    from airflock.mavlink.signing import Signer
+    from airflock.onboard.card import read_card
+    from airflock.onboard.ports import open_port
+
+    faults: list[str] = []
+    what = orders.Do.__members__.get("CONFIRM_KILL" if confirm and do == "kill" else do.upper())
+    if what is None or do == "confirm_kill":
+        faults.append(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
+    if (do == "goto") != (point is not None):
+        faults.append("--point LAT,LON,ALT belongs to goto, and goto needs it")
+    where = _site(point, faults) if point else (0.0, 0.0, 0.0)
+    with options.gathering(faults):
+        found = read_card(card_file)
+        if target and target not in found.members:
+            faults.append(f"--target {target}: the card's members are {', '.join(map(str, found.members))}")
+    with options.gathering(faults):
+        key, private = read_key(card_file.with_suffix(".key")), read_key(card_file.with_suffix(".operator"))
+    options.refuse(faults)
+    assert what is not None
+    port = open_port(radio)
+    try:
+        utc = time.time_ns() // 1000
+        place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
+        made = orders.Order(what, target, found.mission, utc, utc + round(delay * 1e6), place)
+        message, sign = orders.message(made, private), Signer(key, orders.OPERATOR)
+        for _ in range(5):
+            if not port.write(sign(message, time.time_ns() // 1000)):
+                raise CardError([f"{radio}: cannot send; does the port name where to (>HOST:PORT)?"])
+            time.sleep(0.1)
+    finally:
+        port.close()
+    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}")
+
+
+@app.command("replay")
+def replay(
+    card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a node.", show_default=False)],
+    as_json: options.Json = False,
+) -> None:
+    """Fly the log of a node again: the same inputs must give the same outputs, to the bit.
+
+    Example: airflock fly replay mission.json mission-3-20270115T101500Z.log
+    """
+    from airflock.mavlink.keys import read_key
+    from airflock.onboard.card import read_card
+    from airflock.onboard.log import replay as again
+
+    found, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
+    ticks, different, notes = 0, [], []
+    try:
+        with open(log, encoding="utf-8") as lines:
+            for tick in again(lines, found, key):
+                ticks += 1
+                notes += [(tick.time, note) for note in tick.out.notes]
+                if not tick.same:
+                    different.append(tick.time)
+    except UnicodeDecodeError as fault:
+        raise CardError([f"{log}: is not a log of a flight on board"]) from fault
+    if as_json:
+        tables.emit_json({"ticks": ticks, "different": different, "notes": notes})
+    else:
+        for at, note in notes:
+            tables.say(f"{at:10.2f} s  {note}")
+        tables.say(f"{ticks} ticks, {len(different)} with another output than was logged")
+    if different:
+        raise ScenarioError(
+            [f"{log}: {len(different)} of {ticks} ticks differ when flown again, first at {different[0]:g} s"]
+        )
+
+
+def _site(text: str, faults: list[str]) -> tuple[float, float, float]:
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+    except ValueError:
+        faults.append(f"{text!r} is not LAT,LON,ALT, for instance 47.50,19.04,120")
+        return 0.0, 0.0, 0.0
+    return latitude, longitude, altitude
+
+
+def _members(text: str, faults: list[str]) -> list[int]:
+    found: list[int] = []
+    for part in text.split(","):
+        first, _, last = part.partition("-")
+        if not first.isdigit() or (last and not last.isdigit()) or int(last or first) - int(first) > 250:
+            faults.append(f"--members {text}: write 1-10 or 1,2,5")
+            return [1]
+        found += range(int(first), int(last or first) + 1)
+    return found

@@ -1,0 +1,201 @@
+"""Verb identify: flight logs to the numbers of a scenario."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import imports, options, tables
+from airflock.endings import PICTURES, SCENARIOS
+from airflock.errors import AirflockError
+
+
+def identify(
+    files: imports.Files,
+    like: Annotated[str, typer.Option(metavar="PRESET|FILE", help="Scenario whose law the logs flew.")],
+    heard: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="Packets: receiver, sender, t, stamp (s), distance (m), got (0 or 1)."),
+    ] = None,
+    standing: Annotated[
+        str,
+        typer.Option(
+            metavar="BEGIN:END", help="Time on the ground, s after each log begins.", show_default="as logged"
+        ),
+    ] = "",
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario to write.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Six panels of what was found.")] = None,
+    conservative: Annotated[
+        float | None, typer.Option(help="Write the pessimistic ends of intervals of this level, such as 0.95.")
+    ] = None,
+    uncertain: Annotated[bool, typer.Option("--uncertain", help="Also write the intervals into the scenario.")] = False,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="Print the test flights that make every number identifiable.")
+    ] = False,
+    flights: Annotated[int, typer.Option("--check", min=0, help="Flights to compare with the log; 0: none.")] = 100,
+    changes: options.Set = None,
+    map: imports.Map = None,
+    unit: imports.Unit = "",
+    time_unit: imports.TimeUnit = "",
+    axes: imports.Axes = "enu",
+    same_clock: imports.SameClock = False,
+    accept: imports.Accept = None,
+    decimal: imports.Decimal = ".",
+    delimiter: imports.Delimiter = "",
+    as_json: options.Json = False,
+) -> None:
+    """Find the lag, limits, noise, sensor error and radio of a fleet in its own logs, with 95 % intervals.
+
+    What the logs cannot tell is refused with the reason, and stays as in --like. Logs need commands and raw velocities.
+
+    Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
+    """
+    from airflock.identify.run import identify as find
+    from airflock.identify.run import read_heard
+    from airflock.recordings.imports.track import Options
+    from airflock.scenarios.files import load
+
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable((out, SCENARIOS), (plot, PICTURES))
+    with options.gathering(faults):
+        scenario = load(like, options.settings(changes))
+    with options.gathering(faults):
+        how = imports.mapped(map)
+    with options.gathering(faults):
+        ground = _span(standing)
+    with options.gathering(faults):
+        packets = None if heard is None else read_heard(heard)
+    if conservative is not None and not 0.0 < conservative < 1.0:
+        faults.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")
+    options.refuse(faults)
+    with imports.reading(len(files), as_json) as done:
+        reading = Options(
+            map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
+        )
+        found = find(
+            files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading, accept=accept or ()
+        )
+    check = _checked(found, flights, as_json)
+    if out is not None:
+        from airflock.evolve.folder import write
+
+        write(out, found.document(conservative, uncertain=uncertain))
+        tables.say(f"saved {out}")
+    if plot is not None:
+        from airflock.plots.identified import identified
+        from airflock.plots.save import save_figure
+
+        save_figure(identified(found, check), plot)
+        tables.say(f"saved {plot}")
+    if as_json:
+        tables.emit_json(_plain(found, check))
+        return
+    for note in found.notes:
+        tables.say(f"note: {note}")
+    _table(found)
+    if check is not None:
+        _verdicts(check, found, flights)
+    if plan:
+        _card(found)
+
+
+def _span(text: str) -> tuple[float, float] | None:
+    if not text:
+        return None
+    begin, colon, end = text.partition(":")
+    try:
+        span = float(begin or 0.0), float(end)
+    except ValueError as fault:
+        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60") from fault
+    if not colon or not 0.0 <= span[0] < span[1]:
+        raise AirflockError(f"--standing {text}: write BEGIN:END in s, such as 0:60")
+    return span
+
+
+def _checked(found: Any, flights: int, quiet: bool) -> Any:
+    """Posterior check, if there is something to check."""
+    from airflock.identify.check import posterior
+
+    if not flights or not found.settings():
+        return None
+    with options.progress("check: flights", flights, quiet=quiet) as done:
+        return posterior(found.scenario(), found.logs, flights, done, comparable=found.comparable)
+
+
+def _table(found: Any) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from airflock.identify.run import NEVER, UNITS
+
+    table = Table(
+        title=f"{found.logs.drones} drones, like {found.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
+    )
+    for name, justify in (
+        ("number", "left"),
+        ("value", "right"),
+        ("95 %", "right"),
+        ("unit", "left"),
+        ("like", "right"),
+    ):
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    origins: dict[str, None] = {}
+    for key, number in found.numbers.items():
+        if number.told:
+            like = "" if number.like is None else tables.number(number.like)
+            span = f"{number.low:.3g} to {number.high:.3g}"
+            table.add_row(
+                key, tables.number(number.value), span, UNITS[key] if UNITS[key] != "1" else "", like, number.origin
+            )
+    console = Console()
+    console.print(table)
+    console.print(f"from {'; '.join(origins)}", highlight=False, markup=False)
+    console.print("not identified, kept from --like:")
+    for key, number in found.numbers.items():
+        if not number.told:
+            console.print(f"  {key}: {number.reason}", highlight=False, markup=False)
+    for key, reason in NEVER.items():
+        console.print(f"  {key}: {reason}", highlight=False, markup=False)
+
+
+def _verdicts(check: Any, found: Any, flights: int) -> None:
+    from rich.console import Console
+
+    console = Console()
+    console.print(f"check: {flights} flights of the identified scenario against the log")
+    for name, (own, low, high) in check.found.items():
+        verdict = "ok" if low <= own <= high else "OUTSIDE: not explained"
+        line = f"  {name} {tables.number(own)} in [{low:.4g}, {high:.4g}] {verdict}"
+        console.print(line, highlight=False, markup=False)
+    if not found.comparable:
+        console.print("  distances are left out: nothing says that the clocks agree (--same-clock)")
+
+
+def _card(found: Any) -> None:
+    from rich.console import Console
+
+    from airflock.identify.plan import flight_card
+
+    console = Console()
+    card = flight_card(found.like)
+    console.print(f"test flights, {sum(part.seconds for part in card) / 60.0:.0f} min:")
+    for number, part in enumerate(card, 1):
+        lacking = [key for key in part.keys if key not in found.numbers or not found.numbers[key].told]
+        need = f"for {', '.join(lacking)}" if lacking else "all told already"
+        console.print(f"{number}. {part.title}, {part.seconds:.0f} s ({need})", highlight=False, markup=False)
+        console.print(f"   {part.how}", highlight=False, markup=False)
+
+
+def _plain(found: Any, check: Any) -> dict[str, Any]:
+    from airflock.identify.plan import flight_card
+
+    numbers = {
+        key: {"like": n.like, "from": n.origin, "reason": n.reason}
+        | {name: getattr(n, name) if n.told else None for name in ("value", "low", "high")}
+        for key, n in found.numbers.items()
+    }  # fmt: skip
+    told = {} if check is None else {k: {"log": o, "low": lo, "high": hi} for k, (o, lo, hi) in check.found.items()}
+    card = [part._asdict() for part in flight_card(found.like)]
+    return {"like": found.like.name, "numbers": numbers, "check": told, "plan": card, "notes": found.notes}

@@ -1,0 +1,217 @@
+"""The pilot of one agent, in plain Python: it hears its neighbours, decides, and says at which velocity to fly.
+
+Checked once, when it is made: a law that asks for what a drone does not have is refused then, never in flight.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Protocol
+
+from airflock.core import random
+from airflock.core.agent import Decision, Heard, State, answer, decide, first_memory
+from airflock.core.contract import Body, Model
+from airflock.core.maths import norm
+from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import could_be_near
+from airflock.core.vocabulary import Percept, asks
+from airflock.errors import RuleError
+
+EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by two clocks that differ
+
+
+class World(Protocol):
+    """What a pilot asks of the world: `world.place.Place` answers from a map."""
+
+    def surfaces(self, x: float, y: float, z: float, /) -> Iterable[tuple[float, float, float, float]]:
+        """Distance (m) and unit normal of every wall and obstacle."""
+
+    def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, /) -> float:
+        """Free distance of a thin ray, m."""
+
+    def cast(
+        self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float, /
+    ) -> float:  # fmt: skip
+        """Free distance of a sphere, m."""
+
+
+@dataclass(frozen=True)
+class Hearing:
+    """What is done with neighbours' data.
+
+    extrapolate : carry them forward with their own velocity to the moment of the decision
+    forget      : age (s) beyond which they say nothing; the rule of silence has its own
+    """
+
+    extrapolate: bool = True
+    forget: float = 5.0
+
+
+class Packet:
+    """The newest state of one neighbour, and when it held, s."""
+
+    __slots__ = ("sent_at", "state")
+
+    def __init__(self, state: State, sent_at: float):
+        self.state, self.sent_at = state, sent_at
+
+    def carried(self, now: float) -> State:
+        """The state carried forward with its own velocity."""
+        age = now - self.sent_at
+        x, y, z, vx, vy, vz = self.state
+        return State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz)
+
+
+class Senses(Percept):
+    """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
+
+    place: World
+    at: State
+    asker: tuple[int, int, int]
+
+    @classmethod
+    def of(
+        cls, place: World, own: State, time: float, goal: tuple[float, float, float], asker: tuple[int, int, int]
+    ) -> "Senses":
+        """Percept at a position; goal: offset to it (m); asker: seed, number of the decision, index of the agent."""
+        found = cls(time, -own.x, -own.y, -own.z, *goal)
+        found.place, found.at, found.asker = place, own, asker
+        return found
+
+    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
+        """Free distance along the unit vector u, at most length, m."""
+        return self.place.ray(*self.at[:3], ux, uy, uz, length)
+
+    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
+        """Free distance of a sphere of this radius along the unit vector u, at most length, m."""
+        return self.place.cast(*self.at[:3], ux, uy, uz, length, radius)
+
+    def normal(self, draw: int) -> float:
+        """Normal random number of this agent and decision."""
+        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
+        return float(random.normal_pair(words[0], words[1])[0])
+
+    def uniform(self, draw: int) -> float:
+        """Uniform random number of this agent and decision."""
+        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
+        return float(random.uniform(words[0]))
+
+
+class Pilot:
+    """One agent's law, with the packets that it has heard and the memory of its model.
+
+    model, p : flocking law and its parameters
+    place    : the world, asked for surfaces, rays and casts
+    index    : own index in the flock; period : between two decisions, s
+    hearing  : what is done with neighbours' data
+    body, b  : of a law that commands an acceleration or a heading: what turns it into a velocity
+    silence  : the rule for neighbours that are lost; None: they are forgotten, as in a simulation without it
+    flat     : fly in a plane: every z is zero
+    seed     : of the random numbers that a law may ask for
+
+    Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
+    """
+
+    def __init__(
+        self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
+        body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
+        wing: Any = None,
+    ):  # fmt: skip
+        self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
+        self.hearing, self.silence, self.flat, self.seed, self.wing = hearing or Hearing(), silence, flat, seed, wing
+        self.body, self.b = body, b
+        self.memory = first_memory(model)
+        self.packets: dict[int, Packet] = {}
+        self.decisions = 0
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
+        if self.model.flock is not None or "shared" in asks(self.model.decide, "decide", self.model.name):
+            raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
+        if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
+            raise RuleError(
+                f"{self.model.name} commands {self.model.command}; give a body that turns it into a velocity"
+            )
+        if not self.period > 0.0:
+            raise RuleError(f"period = {self.period:g} s between two decisions is not positive")
+        own, other = State(0.0, 0.0, 0.0, 1.0, 0.5, 0.0), State(7.0, -3.0, 0.0, -0.5, 1.0, 0.0)
+        walls = [(5.0, 1.0, 0.0, 0.0), *self.place.surfaces(0.0, 0.0, 0.0)]
+        for near in ([], [Heard(self.index + 1, other, 0.0)]):
+            made = decide(
+                self.model, self.p, own, near, walls, self.memory, time=0.0, period=self.period, index=self.index,
+                percept=Senses.of(self.place, own, 0.0, (0.0, 0.0, 0.0), (self.seed, 0, self.index)), wing=self.wing,
+            )  # fmt: skip
+            setpoint = self.setpoint(own, made.command)
+            if not all(map(isfinite, setpoint)):
+                raise RuleError(f"{self.model.name} commands {setpoint}, which is no velocity")
+
+    def hear(self, who: int, state: State, sent_at: float, now: float) -> bool:
+        """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan."""
+        known = self.packets.get(who)
+        if who == self.index or not all(map(isfinite, state)) or not sent_at <= now + EARLY:
+            return False
+        if known is not None and sent_at <= known.sent_at:
+            return False
+        self.packets[who] = Packet(state, sent_at)
+        return True
+
+    def forget(self, who: int) -> None:
+        """Drop what is known of a neighbour: it has told that it is on the ground, or has left the flock."""
+        self.packets.pop(who, None)
+
+    def heard(self, now: float) -> list[Heard]:
+        """All neighbours whose data are fresh enough, by their number."""
+        found = []
+        for who, packet in sorted(self.packets.items()):
+            age = now - packet.sent_at
+            if age <= self.hearing.forget:
+                state = packet.carried(now) if self.hearing.extrapolate else packet.state
+                found.append(Heard(who, state._replace(z=0.0, vz=0.0) if self.flat else state, age))
+        return found
+
+    def lost_near(self, own: State, now: float) -> bool:
+        """Whether a neighbour that is not heard any more could be near by now."""
+        if self.silence is None:
+            return False
+        for packet in self.packets.values():
+            s = packet.state
+            distance = norm(s.x - own.x, s.y - own.y, 0.0 if self.flat else s.z - own.z)
+            if could_be_near(distance, now - packet.sent_at, self.silence) > 0.5:
+                return True
+        return False
+
+    def decide(
+        self, own: State, now: float, percept: Percept | None = None, goal: tuple[float, float, float] | None = None
+    ) -> Decision:
+        """Velocity to fly at (m/s) from the own state as measured, and the law's new memory.
+
+        now     : time of the flight, s
+        percept : of a real range finder; without it the map answers
+        goal    : where the law is to go, m; without one its offset is zero
+        """
+        if self.flat:
+            own = own._replace(z=0.0, vz=0.0)
+        offset = (0.0, 0.0, 0.0) if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
+        percept = percept or Senses.of(self.place, own, now, offset, (self.seed, self.decisions, self.index))
+        made = decide(
+            self.model, self.p, own, self.heard(now), self.place.surfaces(own.x, own.y, own.z), self.memory, time=now,
+            period=self.period, index=self.index, percept=percept, wing=self.wing,
+        )  # fmt: skip
+        self.decisions += 1
+        self.memory = made.memory
+        velocity = self.setpoint(own, made.command)
+        if self.lost_near(own, now):
+            velocity = (0.0, 0.0, 0.0)
+        return Decision((velocity[0], velocity[1], 0.0) if self.flat else velocity, made.memory)
+
+    def setpoint(self, own: State, command: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A law's command as a velocity, m/s: itself, or where its body would be at the next decision, in still air."""
+        if self.model.command == "velocity":
+            return command
+        assert self.body is not None
+        still = {"g": (0.0, 0.0, 0.0), "w": (0.0, 0.0, 0.0), "v": own[3:], "m": own[3:], "c": command}
+        given: dict[str, Any] = {a + axis: v[c] for a, v in still.items() for c, axis in enumerate("xyz")}
+        rule: Callable[..., Any] = self.body.move
+        x, y, z = answer(rule, "move", given | {"dt": self.period, "b": self.b}, self.body.name)[:3]
+        return x, y, z

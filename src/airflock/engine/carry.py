@@ -1,0 +1,97 @@
+"""Carry: the state of a flight handed to another driver, by the names of its rows, so that the flight goes on."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.passes.flock import scratch_of
+from airflock.engine.state import BEGUN, State
+
+
+def carry(old: State, new: State, step: int) -> None:
+    """Fill `new`, of the same agents and dimensions, with what `old` holds before `step`.
+
+    Rows that only the new plan has are filled from what they stand for: a measured position from the true one. What is
+    under way by radio stays under way. Sums over time begin anew, what metrics remember of each agent goes on.
+    Pairs are looked at again (`held` is new): the new numbers may call a distance a collision that the old did not.
+    """
+    _rows(old, new)
+    new.arrays["past"][...] = _under_way(old, new, step)
+    new.arrays["gust"][:] = old.arrays["gust"]
+    if old.plan.links and new.plan.links:
+        new.arrays["store"][...] = old.arrays["store"]
+    if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
+        new.arrays["mem"][...] = old.arrays["mem"]
+    _remembered(old, new)
+    if np.array_equal(old.tables.shapes, new.tables.shapes) and old.arrays["later"].shape == new.arrays["later"].shape:
+        for name in ("counts", "later", "shapes"):
+            new.arrays[name][...] = old.arrays[name]
+    if old.plan.goals and new.plan.goals and old.arrays["reached"].shape == new.arrays["reached"].shape:
+        for name in ("aim", "reached"):
+            new.arrays[name][...] = old.arrays[name]
+    for name in _solved(old, new):
+        new.arrays[name][...] = old.arrays[name]
+    new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]
+
+
+def _rows(old: State, new: State) -> None:
+    """Rows of the work table, whole lanes, each agent in the slot of the new driver."""
+    work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
+    m, kind = work.shape[1], np.int32 if new.plan.bits == 32 else np.int64
+    slots = np.arange(m)
+    if old.slots is not None and not new.has_slots:
+        slots[: old.agents] = old.slots
+    truth = {*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)}
+    for name, place in new.driver.ROWS.items():
+        source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in truth else None
+        if source is not None:
+            work[place] = before[had[source]][slots]
+    if new.has_slots and "order" not in had:
+        work[new.driver.ROWS["order"]].view(kind)[:] = np.arange(m)
+
+
+def _under_way(old: State, new: State, step: int) -> NDArray[Any]:
+    """The ring of past states for the delay of the new plan, (slot, component, lane).
+
+    Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a shorter delay newer
+    states replace what was under way in time; with a longer one the last packet is heard again meanwhile.
+    """
+    past, every = old.arrays["past"], old.whole("decide_every")
+    made = np.empty_like(new.arrays["past"])
+    if not (old.plan.noisy or old.plan.delayed) or every != new.whole("decide_every"):
+        names = [*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)]
+        made[:] = new.arrays["work"][[new.driver.ROWS[name] for name in names]]
+        return made
+    coming, newest = -(-step // every), (step - 1 + old.whole("delay")) // every
+    for k in range(coming, coming + len(made)):
+        made[k % len(made)] = past[max(0, min(k, newest)) % len(past)]
+    return made
+
+
+def _remembered(old: State, new: State) -> None:
+    """What metrics of both plans remember of each agent."""
+    places, first = {}, 0
+    for metric in old.plan.metrics:
+        places[metric.name, metric.Memory] = first
+        first += len(getattr(metric.Memory, "_fields", ()))
+    first = 0
+    for metric in new.plan.metrics:
+        count = len(getattr(metric.Memory, "_fields", ()))
+        place = places.get((metric.name, metric.Memory))
+        if count and place is not None:
+            new.arrays["memory"][first : first + count] = old.arrays["memory"][place : place + count]
+        first += count
+
+
+def _solved(old: State, new: State) -> list[str]:
+    """What rules of the whole flock carry from call to call, where wings are what they were; else it is found anew."""
+    first = 0
+    for letter, names in new.plan.records.items():
+        if letter == "wing" and old.plan == new.plan:
+            wing = slice(first, first + len(names))
+            if np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
+                scratch = scratch_of(new.plan, new.tables.row, new.agents)
+                return [name for parts in scratch for name, _, spare in parts if not spare]
+        first += len(names)
+    return []

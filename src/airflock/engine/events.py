@@ -1,0 +1,64 @@
+"""Events: what was done to a flight from outside, each at a step. With scenario and seed they give the same bits."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.errors import FlightError
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something done to a flight before it flew `step`.
+
+    kind : change (keys of the scenario), command (of one agent, instead of its law's), push (of one agent, m/s),
+           place (of one agent, m), or branch (another world's random numbers)
+    data : plain values, as the method of `Flight` of the same name takes them
+    """
+
+    step: int
+    kind: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def plain(self) -> dict[str, Any]:
+        """The event as a dict of plain values, for JSON."""
+        return {"step": self.step, "kind": self.kind, "data": dict(self.data)}
+
+
+KINDS = ("change", "command", "push", "place", "branch")
+
+
+def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
+    """Events from events or their plain dicts, in the order of their steps. Raises FlightError for one that is none."""
+    events = []
+    for number, entry in enumerate(given):
+        try:
+            event = entry if isinstance(entry, Event) else Event(int(entry["step"]), str(entry["kind"]), entry["data"])
+        except (KeyError, TypeError, ValueError) as fault:
+            raise FlightError(f"events[{number}]: needs step, kind and data") from fault
+        if event.kind not in KINDS or event.step < 0 or not isinstance(event.data, Mapping):
+            raise FlightError(
+                f"events[{number}]: kind = {event.kind!r} at step {event.step}; known kinds: {', '.join(KINDS)}"
+            )
+        events.append(event)
+    return sorted(events, key=lambda event: event.step)
+
+
+def vector(what: str, given: Any, dimensions: int, unit: str) -> list[float]:
+    """A finite vector of plain floats. Raises FlightError in one line."""
+    try:
+        found = [float(c) for c in given]
+    except (TypeError, ValueError):
+        found = []
+    if len(found) != dimensions or not all(math.isfinite(c) for c in found):
+        axes = ("east", "north", "up")[:dimensions]
+        raise FlightError(f"{what} = {given!r} is not [{', '.join(axes)}] in {unit or '1'}, each finite")
+    return found
+
+
+def agent_number(given: Any, agents: int) -> int:
+    """Number of an agent of the flock. Raises FlightError in one line."""
+    if isinstance(given, bool) or not hasattr(given, "__index__") or not 0 <= int(given) < agents:
+        raise FlightError(f"agent = {given!r}: this flight has the agents 0 to {agents - 1}")
+    return int(given)

@@ -1,0 +1,37 @@
+"""Failure: what to say of a flight that could not be started or went wrong, and the step at which it did."""
+
+from airflock.engine.state import State
+from airflock.scenarios.scenario import Scenario
+
+
+def no_place(scenario: Scenario, seed: int, agent: int) -> str:
+    """One line for an agent that found no place at the start."""
+    return (
+        f"{scenario.name}: seed {seed}: agent {agent} of {scenario.agents} found no place at "
+        f"start.separation = {scenario.separation():g} m; enlarge the arena or lower start.separation"
+    )
+
+
+def not_finite(scenario: Scenario, seed: int, agent: int, step: int) -> str:
+    """One line for an agent whose state stopped being finite at a step."""
+    return (
+        f"{scenario.name}: seed {seed}: agent {agent} left the finite numbers at step {step} "
+        f"(t = {step * scenario.flight.dt:g} s)"
+    )
+
+
+def first_bad_step(state: State, low: int, high: int, half: int = 0) -> int:
+    """First step after which a state is not finite, by halves.
+
+    state : of a flight that is about to fly the step `low`, is finite there, and is not before the step `high`
+    half  : as in `State.advance`, for the step `low`
+    """
+    while high - low > 1:
+        middle, kept = (low + high) // 2, state.buffer.copy()
+        state.advance(low, middle, half)
+        if state.finite:
+            low, half = middle, 0
+        else:
+            high = middle
+            state.buffer[:] = kept
+    return high

@@ -1,0 +1,441 @@
+"""Flight: a flight that can be advanced, looked at, changed, kept and branched. Whatever the cuts, the same bits."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock import __version__
+from airflock.engine import cpu, failure
+from airflock.engine.carry import carry
+from airflock.engine.events import Event, agent_number, events_of, vector
+from airflock.engine.look import View, view
+from airflock.engine.moments import Snapshot, Window
+from airflock.engine.simulate import finish, opened
+from airflock.engine.state import State
+from airflock.engine.threads import in_background
+from airflock.errors import FlightError
+from airflock.scenarios.change import changed
+from airflock.scenarios.files import loaded
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
+
+DEVICES = ("cpu", "python")
+COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
+
+
+class Flight:
+    """One flight of a scenario, open: it goes on when it is told to, and may be changed on its way.
+
+    Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is a scenario: checked
+    whole, in force from the next step or decision on, and the beginning of a new window of scores.
+
+    scenario  : a Scenario, the name of a preset or a scenario file
+    seed      : any integer from 0 to 2^64 - 1; the same seed gives the same bits
+    precision : 32 or 64 bits per number
+    record    : keep a frame every metrics.period
+    start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
+    device    : cpu, or python: the same stages uncompiled, for debuggers, in double precision
+    world     : which of 2^32 independent streams of random numbers of this seed
+    events    : what is done to the flight on its way, as `events` of an earlier flight holds it
+
+    Raises ScenarioError and FlightError, one line per fault.
+
+    >>> import airflock
+    >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
+    >>> flight.advance(0.5).change({"model.p_rep": 0.2}).advance(0.5).time
+    1.0
+    """
+
+    def __init__(
+        self,
+        scenario: Any,
+        seed: int = 0,
+        *,
+        precision: int = 32,
+        record: bool = False,
+        start: Any = None,
+        world: int = 0,
+        device: str = "cpu",
+        events: Sequence[Event | Mapping[str, Any]] = (),
+    ):
+        self.seed, self.world = sound_seed(seed), 0
+        self.scenario = loaded(scenario).in_flight(self.seed)
+        self.precision, self.records = precision, record
+        if device not in DEVICES:
+            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(DEVICES)}")
+        self.device = device
+        self._state = opened(self.scenario, self.seed, precision, record, start, device=device)
+        self.origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
+        self._steps, self.step, self._since = self._state.whole("steps"), 0, 0
+        self._sensed = False
+        self.events: list[Event] = []
+        self.windows: list[Window] = []
+        self._frames: list[NDArray[Any]] = []
+        self._sampled: list[NDArray[Any]] = []
+        self._planned = events_of(events)
+        self._coming: tuple[Scenario, dict[str, Any], Future[State]] | None = None
+        if world:
+            self._to_world(world)
+        while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
+            self._to_world(int(self._planned.pop(0).data["world"]))  # before the start is drawn
+
+    # ------------------------------------------------------------------------------------------------- time
+
+    @property
+    def agents(self) -> int:
+        """Number of agents."""
+        return int(self.scenario.agents)
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return min(self.step, self._steps) * self.scenario.flight.dt
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has reached its duration, or has ended at a collision."""
+        return self.step >= self._steps or self._state.ended
+
+    @property
+    def state(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
+        self._begin()
+        return self._state.motion
+
+    def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
+        """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
+
+        Raises FlightError where the flight is over, where the agents find no place at the start, and where a state
+        stops being finite.
+        """
+        count = self._count(seconds, steps)
+        if self.over:
+            raise FlightError(f"{self.scenario.name}: the flight is over at t = {self.time:g} s; finish() closes it")
+        self._fly_to(min(self.step + count, self._steps))
+        return self
+
+    def _count(self, seconds: float | None, steps: int | None) -> int:
+        """Steps to fly."""
+        if (seconds is None) == (steps is None):
+            raise FlightError("advance: give seconds or steps")
+        dt = self.scenario.flight.dt
+        try:
+            count = int(steps) if steps is not None else round(float(seconds) / dt)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            count = 0
+        if count < 1:
+            asked = f"steps = {steps!r}" if steps is not None else f"seconds = {seconds!r}"
+            raise FlightError(f"advance: {asked} is not at least one motion step of {dt:g} s")
+        return count
+
+    def _fly_to(self, last: int) -> None:
+        """Fly all steps before `last`, with what is planned on the way."""
+        while self._planned and self._planned[0].step < last:
+            event = self._planned.pop(0)
+            self._advance(event.step)
+            self.event(event.kind, **event.data)
+        self._advance(last)
+
+    def _advance(self, last: int) -> None:
+        self._take_over()
+        state, every = self._state, self._state.whole("sample_every")
+        if last <= self.step:
+            return
+        frames = None
+        if self.records:
+            count = -(-last // every) - -(-self.step // every)
+            frames = np.zeros((count, 3 * state.plan.dimensions, state.agents), state.tables.row.dtype)
+        first, before = self.step, state.samples() if frames is not None else 0
+        with cpu.compiling(state.plan.model.name):
+            done = cpu.advance(state, first, last, frames, 1 if self._sensed else 0)
+        if done < 0:
+            raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
+        self.step, self._sensed = done, False
+        if frames is not None:
+            frames = frames[: state.samples() - before] if state.ended else frames
+            self._frames.append(frames)
+            self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
+        if not state.finite:
+            self._fail(first)
+
+    def _fail(self, first: int) -> NoReturn:
+        """Say which agent stopped being finite, and at which step from `first` on."""
+        bad = int(np.flatnonzero(~np.isfinite(self._state.motion).all(axis=0))[0])
+        twin = self.again()
+        twin._fly_to(first)
+        for event in twin._planned:
+            twin.event(event.kind, **event.data)
+        step = failure.first_bad_step(twin._state, first, self.step, 1 if twin._sensed else 0)
+        raise FlightError(failure.not_finite(self.scenario, self.seed, bad, step))
+
+    def _begin(self) -> None:
+        """Place the agents, where that has not been done: the driver draws the start."""
+        if not self._state.begun:
+            self._call(self.step, self.step)
+
+    def _call(self, first: int, last: int, half: int = 0) -> None:
+        """One call of the driver, for what is not a part of the flight itself."""
+        with cpu.compiling(self._state.plan.model.name):
+            done = self._state.advance(first, last, half)
+        if done < 0:
+            raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
+
+    def finish(self) -> dict[str, Any]:
+        """Fly to the end, take the last sample, and return the scores of the last window.
+
+        Of a flight that was never changed these are the scores of the closed flight.
+        """
+        if not self.over:
+            self._fly_to(self._steps)
+        if self.step == self._steps and not self._state.ended:
+            self._advance(self._steps + 1)
+        return self.scores()
+
+    # ---------------------------------------------------------------------------------------------- looking
+
+    def scores(self) -> dict[str, Any]:
+        """Order parameters and fitness of the window since the last change, up to now."""
+        return finish(self.scenario, self._state.values())
+
+    @property
+    def frame_times(self) -> NDArray[Any]:
+        """Times of the samples in `frames`, s."""
+        return np.concatenate([np.zeros(0), *self._sampled])
+
+    @property
+    def frames(self) -> NDArray[Any]:
+        """Samples flown so far, (time, component, agent): positions, velocities, commands. Needs record=True."""
+        if not self.records:
+            raise FlightError(f"{self.scenario.name}: the flight keeps no frames; open it with record=True")
+        empty = np.zeros((0, 3 * self._state.plan.dimensions, self.agents), self._state.tables.row.dtype)
+        return np.concatenate([empty, *self._frames])
+
+    def look(self, agent: int) -> View:
+        """What an agent perceives, and the parts of its command.
+
+        Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
+        """
+        number = agent_number(agent, self.agents)
+        self._take_over()
+        self._begin()
+        if not self.decides or self._sensed or self._state.plan.sequential:
+            return view(self.scenario, self._state, number, self.step, self.seed, self.world)
+        kept = self._state.buffer.copy()
+        self._state.advance(self.step, self.step + 1, 2)
+        found = view(self.scenario, self._state, number, self.step, self.seed, self.world)
+        self._state.buffer[:] = kept
+        return found
+
+    @property
+    def decides(self) -> bool:
+        """Whether the agents decide at the next step to be flown."""
+        return self.step % self._state.whole("decide_every") == 0
+
+    # ------------------------------------------------------------------------------------- sensing and acting
+
+    def sense(self) -> "Flight":
+        """Let all agents perceive and decide at the present step without moving; `command` may then overrule them.
+
+        Raises FlightError between decisions, and where agents decide and move one after another.
+        """
+        if self._state.plan.sequential:
+            raise FlightError("sense: with update = 'sequential' each agent moves before the next one perceives")
+        if self.over:
+            raise FlightError(f"sense: the flight is over at t = {self.time:g} s")
+        every = self._state.whole("decide_every")
+        if not self.decides:
+            coming = -(-self.step // every) * every
+            raise FlightError(
+                f"sense: agents decide every {every} steps; the next decision is at step {coming}, this is {self.step}"
+            )
+        self._take_over()
+        if not self._sensed:
+            self._call(self.step, self.step + 1, 2)
+            self._sensed = True
+        return self
+
+    @property
+    def commands(self) -> NDArray[Any]:
+        """Commands of all agents as last decided, (component, agent), in the unit of the law's command; a copy."""
+        return self._state.rows([f"c{axis}" for axis in self._state.plan.axes])
+
+    def command(self, agent: int, value: Any) -> "Flight":
+        """Overrule what an agent decided at this step, until its next decision.
+
+        value : one number per axis, m/s, m/s² or a direction, as the law commands
+        """
+        number, unit = agent_number(agent, self.agents), COMMANDS.get(self.scenario.model.command, "")
+        given = vector("command", value, self.scenario.dimensions, unit)
+        self.sense()
+        self._put("c", number, given)
+        self._note("command", agent=number, value=given)
+        return self
+
+    # ----------------------------------------------------------------------------------------------- changing
+
+    def change(self, settings: Mapping[str, Any], *, wait: bool = True) -> "Flight":
+        """Set keys of the scenario anew, such as {"model.p_rep": 0.2}; from the next step or decision on.
+
+        Everything that a scenario file says may change but agents, dimensions, dt and start. A new window of scores
+        begins. Where other text must be compiled, `wait` says whether to wait for it; if not, the flight goes on under
+        the old scenario until the next `advance` after the new one is ready.
+        Raises ScenarioError, and the flight is as it was.
+        """
+        if self._state.ended or self.step > self._steps:
+            raise FlightError(f"{self.scenario.name}: the flight has ended at t = {self.time:g} s; nothing can change")
+        base = self._coming[0] if self._coming else self.scenario
+        known = self._coming[1] if self._coming else {}
+        new = changed(base, settings)
+        state = opened(
+            new, self.seed, self.precision, self.records, world=self.world, device=self.device,
+            given_start=self._state.plan.given_start,
+        )  # fmt: skip
+        if state.whole("steps") < self.step:
+            raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
+        said = {**known, **settings}
+        if state.driver is self._state.driver or wait:
+            self._coming = None
+            self._take(new, said, state)
+            return self
+        self._coming = (new, said, in_background(lambda: _compiled(state)))
+        return self
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a change waits for its compiler."""
+        return self._coming is not None
+
+    def _take_over(self) -> None:
+        """Take the change over that has been compiled meanwhile."""
+        if self._coming and self._coming[2].done():
+            (new, said, compiled), self._coming = self._coming, None
+            self._take(new, said, compiled.result())
+
+    def _take(self, scenario: Scenario, settings: Mapping[str, Any], state: State) -> None:
+        """Go on as another scenario."""
+        self._begin()
+        if self.step > self._since:
+            begin = self._since * self.scenario.flight.dt
+            self.windows.append(Window(self.scenario, begin, self.time, self.scores()))
+        carry(self._state, state, self.step)
+        self._note("change", **settings)
+        self.scenario, self._state, self._steps, self._since = scenario, state, state.whole("steps"), self.step
+
+    def push(self, agent: int, velocity: Any) -> "Flight":
+        """Add to an agent's velocity, m/s, one number per axis: a gust, a collision, a hand."""
+        number = agent_number(agent, self.agents)
+        given = vector("velocity", velocity, self.scenario.dimensions, "m/s")
+        self._begin()
+        self._put("v", number, given, add=True)
+        self._note("push", agent=number, velocity=given)
+        return self
+
+    def place(self, agent: int, position: Any) -> "Flight":
+        """Put an agent somewhere else, m, one number per axis."""
+        number = agent_number(agent, self.agents)
+        given = vector("position", position, self.scenario.dimensions, "m")
+        self._begin()
+        self._put("", number, given)
+        self._state.look_at_pairs()
+        self._note("place", agent=number, position=given)
+        return self
+
+    def event(self, kind: str, **data: Any) -> "Flight":
+        """Do what an event says: the method of the same name."""
+        if kind == "change":
+            return self.change(data)
+        if kind == "branch":
+            self._to_world(int(data["world"]))
+            return self
+        (event,) = events_of([Event(self.step, kind, data)])
+        try:
+            done: Flight = getattr(self, event.kind)(**data)
+        except TypeError as fault:
+            raise FlightError(f"event {kind}: {', '.join(data)} are not what it needs") from fault
+        return done
+
+    def _put(self, prefix: str, agent: int, values: Sequence[float], add: bool = False) -> None:
+        names = [f"{prefix}{axis}" for axis in self._state.plan.axes]
+        rows = self._state.rows(names)
+        rows[:, agent] = np.array(values, rows.dtype) + (rows[:, agent] if add else 0)
+        self._state.put(names, rows)
+
+    def _note(self, kind: str, **data: Any) -> None:
+        self.events.append(Event(self.step, kind, data))
+
+    # ------------------------------------------------------------------------------------------------ branching
+
+    def snapshot(self) -> Snapshot:
+        """Keep the present moment, to go back to with `restore`."""
+        return Snapshot(
+            __version__, self.origin, self.scenario, self._state, self._state.buffer.copy(), self.step, self._sensed,
+            self._since, tuple(self.events), tuple(self.windows), tuple(self._frames),
+            tuple(self._sampled),
+        )  # fmt: skip
+
+    def restore(self, snapshot: Snapshot) -> "Flight":
+        """Go back (or on) to a moment of this flight or of a branch of it.
+
+        Raises FlightError for a moment of another scenario, seed, precision, start or version.
+        """
+        if snapshot.version != __version__:
+            raise FlightError(f"snapshot: made by version {snapshot.version}, this is {__version__}")
+        if snapshot.origin is not self.origin:
+            theirs, seed = snapshot.origin[0].name, snapshot.origin[1]
+            raise FlightError(f"snapshot: of {theirs}, seed {seed}, in a flight of its own; not of this flight")
+        self._coming, self._planned = None, []
+        if self._state is not snapshot.state:
+            self._state = snapshot.state.twin()
+        self._state.buffer[:] = snapshot.bytes
+        self.scenario, self.step, self._sensed = snapshot.scenario, snapshot.step, snapshot.sensed
+        self._since, self._steps = snapshot.begin, self._state.whole("steps")
+        self.events, self.windows = list(snapshot.events), list(snapshot.windows)
+        self._frames, self._sampled = list(snapshot.frames), list(snapshot.sampled)
+        self.world = self._state.whole("world")
+        return self
+
+    def branch(self, world: int | None = None) -> "Flight":
+        """Another flight that goes on from here.
+
+        world : the same (default) meets the same noise, another one an independent future
+        """
+        twin = object.__new__(Flight)
+        twin.__dict__.update(self.__dict__)
+        twin._state = self._state.twin()
+        twin._planned, twin._coming = list(self._planned), None
+        twin.events, twin.windows = list(self.events), list(self.windows)
+        twin._frames, twin._sampled = list(self._frames), list(self._sampled)
+        if world is not None and world != self.world:
+            twin._to_world(world)
+        return twin
+
+    def _to_world(self, world: int) -> None:
+        """Draw from another world's random numbers from now on."""
+        if isinstance(world, bool) or not isinstance(world, int) or not 0 <= world < 2**32:
+            raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
+        self.world = world
+        self._state.set_whole("world", world)
+        self._note("branch", world=world)
+
+    def again(self) -> "Flight":
+        """The same flight from its start, with the same events to come."""
+        scenario, seed, precision, start = self.origin
+        return Flight(
+            scenario,
+            seed,
+            precision=precision,
+            record=self.records,
+            start=start,
+            events=self.events,
+            device=self.device,
+        )
+
+
+def _compiled(state: State) -> State:
+    """A state whose driver has been compiled; nothing is flown."""
+    with cpu.compiling(state.plan.model.name):
+        state.compile()
+    return state

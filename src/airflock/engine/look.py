@@ -1,0 +1,138 @@
+"""Look: what one agent perceives, and the parts of its command, by the law's own rules in plain Python."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from airflock.body import radio
+from airflock.core import agent as one
+from airflock.core import random
+from airflock.core.agent import Heard
+from airflock.core.agent import State as Motion
+from airflock.engine.state import NEVER, State
+from airflock.engine.tables import clock
+from airflock.scenarios.scenario import Scenario
+from airflock.world import edges
+
+
+@dataclass(frozen=True)
+class View:
+    """What one agent perceived at a decision, and what came of it.
+
+    agent, time : its number; time of the decision, s
+    true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
+    heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
+    terms       : of each of them, in the same order, what the neighbour rule made of it; 0 beyond the law's reach
+    sums, walls : what the law was given of all neighbours, and of all surfaces
+    memory      : the law's memory after the decision
+    command     : in the unit of the law's command
+    """
+
+    agent: int
+    time: float
+    true: Motion
+    own: Motion
+    heard: tuple[Heard, ...]
+    terms: tuple[Any, ...]
+    sums: Any
+    walls: Any
+    memory: Any
+    command: tuple[float, ...]
+
+
+def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, world: int) -> View:
+    """What `agent` perceived at the last decision up to `step`. Exact where the driver has just decided there."""
+    plan, model = state.plan, scenario.model
+    every = state.whole("decide_every")
+    number = step // every
+    measured, said = [motion(state, prefix) for prefix in ("m", "eh" if plan.links else "h")]
+    truth = motion(state, "")
+    own = measured[agent]
+    heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
+    near = one.answer(model.reach, "reach", {"p": scenario.parameters}, model.name) if model.reach else math.inf
+    terms = []
+    for other in heard:
+        if model.neighbour is None:
+            break
+        given = one.pair_percept(own, Heard(other.who, _beside(scenario, own, other.state), other.age), agent)
+        far = given["r"] > near
+        rule = one.answer(model.neighbour, "neighbour", given | {"p": scenario.parameters}, model.name)
+        terms.append(type(rule)(*(0.0 for _ in rule)) if far else rule)
+    memory = model.Memory(*(float(x) for x in state.arrays["mem"][:, _slot(state, agent)])) if model.Memory else None
+    command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
+    return View(
+        agent, number * every * scenario.flight.dt, truth[agent], own, heard, tuple(terms),
+        _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
+    )  # fmt: skip
+
+
+def motion(state: State, prefix: str) -> list[Motion]:
+    """States of all agents from the rows with a prefix, or the true ones where the plan keeps no such rows."""
+    axes, had = state.plan.axes, state.driver.ROWS
+    if prefix == "eh":  # a row of one agent's ear at a time: the packets themselves are in the store
+        prefix = "h"
+    names = [f"{prefix}{name}" for name in (*axes, *(f"v{axis}" for axis in axes))]
+    rows = state.rows([name if name in had else name[len(prefix) :] for name in names]).astype(float)
+    flat = [0.0] * (3 - len(axes))
+    half = len(axes)
+    return [Motion(*row[:half], *flat, *row[half:], *flat) for row in rows.T.tolist()]
+
+
+def _heard(
+    scenario: Scenario,
+    state: State,
+    i: int,
+    number: int,
+    truth: list[Motion],
+    said: list[Motion],
+    seed: int,
+    world: int,
+) -> Iterator[Heard]:
+    """Everybody in range whose packet agent i has: as the driver drew it, from the same counters."""
+    k, plan, n = scenario.radio, state.plan, state.agents
+    late = clock(scenario)["delay"] * scenario.flight.dt
+    now = number * state.whole("decide_every") * scenario.flight.dt
+    for j in range(n):
+        true = _beside(scenario, truth[i], truth[j])
+        distance = math.dist(true[:3], truth[i][:3])
+        if j == i or distance > min(k.range, 1e8):
+            continue
+        if plan.links:
+            packet = state.arrays["store"][i, :, j].tolist()
+            axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
+            if stamp <= NEVER / 10.0:
+                continue
+            age, flat = now - stamp, [0.0] * (3 - axes)
+            at, v = packet[:axes], packet[axes : 2 * axes]
+            yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age)
+        elif not plan.lossy or random.uniform(
+            random.words(seed, random.LOSS, world, number, i * n + j)[0]
+        ) >= radio.lost(distance, k):
+            yield Heard(j, said[j], late)
+
+
+def _beside(scenario: Scenario, own: Motion, other: Motion) -> Motion:
+    """A state at its image nearest to another one, where the world is periodic."""
+    if scenario.world.edges != "periodic":
+        return other
+    halves = (0.5 * scenario.world.side, 0.5 * scenario.world.side, 0.5 * scenario.world.height)
+    x, y, z = (
+        a + edges.nearest_image(b - a, half) if half > 0.0 else b
+        for a, b, half in zip(own[:3], other[:3], halves, strict=True)
+    )
+    return other._replace(x=x, y=y, z=z)
+
+
+def _record(state: State, record: Any, prefix: str, agent: int) -> Any:
+    """Sums or Walls of one agent as the law was given them; a field that nobody reads is 0. None without such."""
+    if record is None:
+        return None
+    had = state.driver.ROWS
+    names = [f"{prefix}{c}" for c in range(len(record._fields))]
+    values = [float(state.rows([name])[0, agent]) if name in had else 0.0 for name in names]
+    return record(*values)
+
+
+def _slot(state: State, agent: int) -> int:
+    return agent if state.slots is None else int(state.slots[agent])

@@ -1,0 +1,42 @@
+"""Moments: a stretch of a flight with its scores, and a moment of one to go back to."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.events import Event
+from airflock.engine.state import State
+from airflock.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of a flight under one scenario: its order parameters belong to it alone.
+
+    begin, end : s; scores : order parameters and fitness
+    """
+
+    scenario: Scenario
+    begin: float
+    end: float
+    scores: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A moment of a flight: all that it had carried so far, as one block of bytes, and what had been noted of it."""
+
+    version: str
+    origin: tuple[Scenario, int, int, Any]
+    scenario: Scenario
+    state: State
+    bytes: NDArray[np.uint8]
+    step: int
+    sensed: bool
+    begin: int
+    events: tuple[Event, ...]
+    windows: tuple[Window, ...]
+    frames: tuple[NDArray[Any], ...]
+    sampled: tuple[NDArray[Any], ...]

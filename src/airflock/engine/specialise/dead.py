@@ -1,0 +1,46 @@
+"""Dead: drop what a stage computes and nobody reads."""
+
+import ast
+from collections.abc import Iterable
+
+
+def read(nodes: Iterable[ast.AST]) -> set[str]:
+    """Names that are read."""
+    return {
+        item.id
+        for node in nodes
+        for item in ast.walk(node)
+        if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load)
+    }
+
+
+def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:
+    """Statements without variables that nobody reads, and without loops and branches that nothing is left of.
+
+    What a stage calls to set a variable has no other effect; a call that has one stands alone, or sets several.
+
+    kept : names that are read elsewhere
+    """
+    while True:
+        needed, count = read(statements) | kept, [0]
+        statements = _without(statements, needed, count)
+        if not count[0]:
+            return statements
+
+
+def _without(statements: list[ast.stmt], needed: set[str], count: list[int]) -> list[ast.stmt]:
+    left = []
+    for statement in statements:
+        if isinstance(statement, ast.Assign):
+            (target,) = statement.targets
+            dead = isinstance(target, ast.Name) and target.id not in needed
+        elif isinstance(statement, (ast.For, ast.If)):
+            statement.body = _without(statement.body, needed, count)
+            statement.orelse = _without(statement.orelse, needed, count)
+            dead = not statement.body and not statement.orelse
+        else:
+            dead = False
+        count[0] += dead
+        if not dead:
+            left.append(statement)
+    return left

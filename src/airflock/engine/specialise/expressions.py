@@ -1,0 +1,287 @@
+"""Expressions of a stage: each is either known while the driver is made, or syntax of the driver."""
+
+import ast
+import builtins
+import inspect
+import math
+import operator
+import types
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.engine.specialise.values import LOAD, STORE, Call, Components, StageError, Text, given, kind_of, text_of
+from airflock.engine.stages import words
+from airflock.engine.stages.words import Itself, Named, Nothing
+
+# of the driver, whatever they are called with
+KEPT: dict[Any, str] = {
+    words.real: "real",
+    words.integer: "integer",
+    words.least: "least",
+    words.most: "most",
+    words.choose: "choose",
+}
+LOCALS: dict[Any, str] = {words.vector: "vector", words.totals: "totals", words.aliases: "aliases"}
+STAGES = words.__name__.rpartition(".")[0]
+OPERATORS: dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow, ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_, ast.USub: operator.neg, ast.Not: operator.not_, ast.Eq: operator.eq,
+    ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.Is: operator.is_, ast.IsNot: operator.is_not, ast.In: lambda a, b: a in b,
+    ast.NotIn: lambda a, b: a not in b,
+}  # fmt: skip
+MISSING = object()
+
+
+@dataclass
+class Scope:
+    """What the names of a stage, or of a helper in it, stand for."""
+
+    text: Text
+    known: dict[str, object] = field(default_factory=dict)
+
+    def fault(self, node: ast.AST, what: str) -> StageError:
+        """An error that names the line of the stage."""
+        line = getattr(node, "lineno", self.text.node.lineno)
+        return StageError(f"{self.text.where}:{line}: {self.text.node.name}: {what}")
+
+
+def residual(value: object) -> bool:
+    """Whether a value is syntax of the driver."""
+    return isinstance(value, ast.expr)
+
+
+def settled(value: object) -> bool:
+    """Whether a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
+    return not residual(value) or kind_of(value) not in (None, "rule")
+
+
+class Expressions:
+    """Values of expressions, by the type of their node."""
+
+    def value(self, node: ast.expr, scope: Scope) -> Any:
+        """A known Python object, or syntax of the driver."""
+        method = getattr(self, f"_{type(node).__name__}", None)
+        if method is None:
+            raise scope.fault(node, f"{type(node).__name__} is not specialised")
+        return method(node, scope)
+
+    def expr(self, node: ast.expr, scope: Scope) -> ast.expr:
+        """Syntax of the driver for an expression."""
+        return self.printed(self.value(node, scope), node, scope)
+
+    def printed(self, value: object, node: ast.AST, scope: Scope) -> ast.expr:
+        """A value as syntax of the driver."""
+        if isinstance(value, ast.expr):
+            return value
+        if isinstance(value, Named):
+            name = ast.Name(value.spelled.lstrip("-"), LOAD)
+            return ast.UnaryOp(ast.USub(), name) if value.spelled[0] == "-" else name
+        if isinstance(value, float):
+            return ast.Call(ast.Name("real", LOAD), [ast.Constant(value)], [])
+        if isinstance(value, (bool, int, str)):
+            return ast.Constant(value)
+        if isinstance(value, (tuple, list)):
+            return ast.Tuple([self.printed(part, node, scope) for part in value], LOAD)
+        if isinstance(value, types.BuiltinFunctionType) or value in (range, abs, min, max):
+            return ast.Name(value.__name__, LOAD)  # type: ignore[union-attr]
+        if isinstance(value, types.FunctionType) and value in KEPT:
+            return ast.Name(KEPT[value], LOAD)
+        if isinstance(value, (types.FunctionType, type)):
+            return given(value.__name__, "rule", value)
+        raise scope.fault(node, f"{value!r} has no text in a driver")
+
+    def _Constant(self, node: ast.Constant, scope: Scope) -> object:
+        return node.value
+
+    def _Name(self, node: ast.Name, scope: Scope) -> object:
+        if node.id in scope.known:
+            return scope.known[node.id]
+        if node.id in scope.text.local:
+            return ast.Name(node.id, LOAD)
+        value = scope.text.names.get(node.id, getattr(builtins, node.id, MISSING))
+        if value is MISSING:
+            raise scope.fault(node, f"{node.id} is not defined")
+        return value
+
+    def _Attribute(self, node: ast.Attribute, scope: Scope) -> object:
+        value = self.value(node.value, scope)
+        if value is math:
+            return ast.Attribute(ast.Name("math", LOAD), node.attr, LOAD)
+        if residual(value):
+            return ast.Attribute(value, node.attr, LOAD)
+        try:
+            return getattr(value, node.attr)
+        except AttributeError as fault:
+            raise scope.fault(node, str(fault)) from None
+
+    def _Subscript(self, node: ast.Subscript, scope: Scope) -> object:
+        value, at = self.value(node.value, scope), self.value(node.slice, scope)
+        if residual(value):
+            return ast.Subscript(value, self.printed(at, node, scope), LOAD)
+        if residual(at) and not isinstance(value, (Nothing, Itself)):
+            raise scope.fault(node, f"{ast.unparse(node)} is asked of what is known, by what is not")
+        return value[at]
+
+    def _Slice(self, node: ast.Slice, scope: Scope) -> object:
+        return slice(
+            *(None if part is None else self.value(part, scope) for part in (node.lower, node.upper, node.step))
+        )
+
+    def _BinOp(self, node: ast.BinOp, scope: Scope) -> object:
+        left, right = self.value(node.left, scope), self.value(node.right, scope)
+        if not residual(left) and not residual(right):
+            return OPERATORS[type(node.op)](left, right)
+        return ast.BinOp(self.printed(left, node, scope), node.op, self.printed(right, node, scope))
+
+    def _UnaryOp(self, node: ast.UnaryOp, scope: Scope) -> object:
+        value = self.value(node.operand, scope)
+        return ast.UnaryOp(node.op, value) if residual(value) else OPERATORS[type(node.op)](value)
+
+    def _Compare(self, node: ast.Compare, scope: Scope) -> object:
+        values = [self.value(part, scope) for part in (node.left, *node.comparators)]
+        if len(values) == 2 and isinstance(node.ops[0], (ast.Is, ast.IsNot)):
+            return OPERATORS[type(node.ops[0])](*values)
+        if not any(residual(value) for value in values):
+            pairs = zip(node.ops, values, values[1:], strict=False)
+            return all(OPERATORS[type(operation)](a, b) for operation, a, b in pairs)
+        left, *others = [self.printed(value, node, scope) for value in values]
+        return ast.Compare(left, node.ops, others)
+
+    def _BoolOp(self, node: ast.BoolOp, scope: Scope) -> object:
+        ends = isinstance(node.op, ast.Or)  # a known value that ends it
+        left: list[ast.expr] = []
+        value: object = not ends
+        for part in node.values:
+            value = self.value(part, scope)
+            if residual(value):
+                left.append(value)  # type: ignore[arg-type]
+            elif bool(value) is ends:
+                if left:
+                    break
+                return value
+        if not left:
+            return value
+        if not residual(value) and bool(value) is ends:
+            left.append(self.printed(value, node, scope))
+        return left[0] if len(left) == 1 else ast.BoolOp(node.op, left)
+
+    def _IfExp(self, node: ast.IfExp, scope: Scope) -> object:
+        test = self.value(node.test, scope)
+        if not residual(test):
+            return self.value(node.body if test else node.orelse, scope)
+        return ast.IfExp(test, self.expr(node.body, scope), self.expr(node.orelse, scope))
+
+    def _Tuple(self, node: ast.Tuple, scope: Scope) -> object:
+        return tuple(self._items(node.elts, scope))
+
+    def _List(self, node: ast.List, scope: Scope) -> object:
+        return self._items(node.elts, scope)
+
+    def _Set(self, node: ast.Set, scope: Scope) -> object:
+        return set(self._items(node.elts, scope))
+
+    def _items(self, nodes: Iterable[ast.expr], scope: Scope) -> list[Any]:
+        found: list[Any] = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                found += self.value(node.value, scope)
+            else:
+                found.append(self.value(node, scope))
+        return found
+
+    def _GeneratorExp(self, node: ast.GeneratorExp | ast.ListComp, scope: Scope) -> object:
+        (part,) = node.generators
+        found = []
+        for item in self.value(part.iter, scope):
+            inner = Scope(scope.text, dict(scope.known))
+            self.bind(part.target, item, inner)
+            if all(self.value(test, inner) for test in part.ifs):
+                found.append(self.value(node.elt, inner))
+        return found
+
+    _ListComp = _GeneratorExp
+
+    def _Call(self, node: ast.Call, scope: Scope) -> object:
+        called = self.value(node.func, scope)
+        if called is words.ask:
+            return self._asked(node, scope)
+        arguments = self._items(node.args, scope)
+        if called is sum:
+            total, *terms = [self.printed(term, node, scope) for term in arguments[0]]
+            for term in terms:
+                total = ast.BinOp(total, ast.Add(), term)
+            return total
+        if called is getattr and residual(arguments[0]):
+            return ast.Attribute(arguments[0], arguments[1], LOAD)
+        if isinstance(called, Call):
+            return ast.parse(called.text, mode="eval").body
+        if isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES) and called not in KEPT:
+            if called.__module__ == words.__name__ and not any(residual(a) for a in arguments):
+                return called(*arguments)
+            return self.helper(called, node, arguments, scope)
+        keywords = {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg}
+        late = residual(called) or isinstance(called, types.FunctionType) or _record(called)
+        if not late and not any(residual(a) for a in (*arguments, *keywords.values())):
+            return called(*arguments, **keywords)
+        return ast.Call(
+            self.printed(called, node, scope),
+            [self.printed(argument, node, scope) for argument in arguments],
+            [ast.keyword(name, self.printed(value, node, scope)) for name, value in keywords.items()],
+        )
+
+    def _asked(self, node: ast.Call, scope: Scope) -> ast.expr:
+        """A call of a rule with what it asks for, in its order; nothing else that is offered is looked at."""
+        rule = self.value(node.args[0], scope)
+        offered = {k.arg: k.value for k in node.keywords}
+        names = inspect.signature(rule).parameters
+        for name in names:
+            if name not in offered:
+                raise scope.fault(node, f"{rule.__name__} asks for {name}, which is not offered")
+        return ast.Call(given(rule.__name__, "rule", rule), [self.expr(offered[n], scope) for n in names], [])
+
+    def helper(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> object:
+        """Value of a helper that consists of a docstring and an expression, in place of its call."""
+        inner = self.entered(called, node, arguments, scope)
+        last = inner.text.node.body[-1]
+        if len(inner.text.node.body) > 2 or not isinstance(last, ast.Return) or last.value is None:
+            raise scope.fault(node, f"{called.__name__} is more than one expression")
+        return self.value(last.value, inner)
+
+    def entered(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> Scope:
+        """Scope of a helper: what it is handed stands wherever it names it."""
+        text = text_of(called)
+        names = [a.arg for a in (*text.node.args.args, *text.node.args.kwonlyargs)]
+        handed = dict(zip(names, arguments, strict=False))
+        return Scope(text, handed | {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg})
+
+    def bind(self, target: ast.expr, value: Any, scope: Scope) -> None:
+        """Names of a target stand for what is known from now on."""
+        if isinstance(target, ast.Name):
+            scope.known[target.id] = value
+        elif isinstance(target, (ast.Tuple, ast.List)):
+            for part, one in zip(target.elts, value, strict=True):
+                self.bind(part, one, scope)
+        else:
+            raise scope.fault(target, f"{ast.unparse(target)} cannot be known")
+
+    def target(self, node: ast.expr, scope: Scope) -> ast.expr:
+        """Syntax of the driver for what is assigned to."""
+        if isinstance(node, ast.Name):
+            scope.known.pop(node.id, None)
+            return ast.Name(node.id, STORE)
+        if isinstance(node, ast.Tuple):
+            return ast.Tuple([self.target(part, scope) for part in node.elts], STORE)
+        if isinstance(node, ast.Subscript):
+            value, at = self.value(node.value, scope), self.value(node.slice, scope)
+            if isinstance(value, Components):
+                return value.store(at)
+            return ast.Subscript(self.printed(value, node, scope), self.printed(at, node, scope), STORE)
+        raise scope.fault(node, f"{ast.unparse(node)} cannot be assigned to")
+
+
+def _record(value: object) -> bool:
+    """Whether a value is a class of records of numbers, which a driver makes."""
+    return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")

@@ -1,0 +1,222 @@
+"""Stage: the statements of a stage for one plan, split into what is done once and what is done for the agents."""
+
+import ast
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+from airflock.engine.passes.build import Builder
+from airflock.engine.plan import WHOLE
+from airflock.engine.specialise.dead import read, without_dead
+from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
+from airflock.engine.specialise.values import LOAD, Components, Loop, given, kind_of, text_of
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import Itself
+
+UNROLLED = (range, tuple, list, enumerate, zip)
+
+
+@dataclass(frozen=True)
+class Specialised:
+    """Text of a stage for one plan.
+
+    bindings : lines that bind rows, records and integers
+    first    : what is done once per step
+    rest     : what is done for all agents or, in a sequential update, for agent i
+    answer   : what the stage returns
+    """
+
+    bindings: list[str]
+    first: list[ast.stmt]
+    rest: list[ast.stmt]
+    answer: str
+
+    @property
+    def once(self) -> list[str]:
+        """Lines of what is done before anything is done for an agent."""
+        return [*self.bindings, *lines_of(self.first)]
+
+    @property
+    def body(self) -> list[str]:
+        """Lines of what is done for agents."""
+        return lines_of(self.rest)
+
+    @property
+    def lines(self) -> list[str]:
+        """All of them, for a function that is no stage of its own."""
+        return [*self.once, *self.body]
+
+
+def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Specialised:
+    """Text of a stage for a builder's plan.
+
+    known : what parameters of the stage stand for; others keep their names
+    """
+    made = _Statements(build)
+    once, body, answer = made.run(stage, known)
+    kept = read([answer]) if answer is not None else set()
+    whole = without_dead([*once, *body], kept)
+    first = {id(statement) for statement in once}
+    names = [node for statement in whole for node in ast.walk(statement) if kind_of(node)]
+    for node in names:
+        if kind_of(node) == "rule":
+            node.id = build.source.name(node.item)  # type: ignore[attr-defined]
+    return Specialised(
+        _bindings(build, names),
+        [statement for statement in whole if id(statement) in first],
+        [statement for statement in whole if id(statement) not in first],
+        "0" if answer is None else ast.unparse(answer),
+    )
+
+
+def lines_of(statements: list[ast.stmt]) -> list[str]:
+    """Lines of statements."""
+    return [line for statement in statements for line in ast.unparse(statement).splitlines()]
+
+
+def _bindings(build: Builder, names: list[Any]) -> list[str]:
+    """Lines that bind the rows, records and integers of these names."""
+    found: dict[str, list[str]] = {"row": [], "number": [], "record": [], "whole": [], "word": []}
+    for kind, name in dict.fromkeys((kind_of(node), node.id) for node in names):
+        if kind in found:
+            found[kind].append(name)
+    lines = build.records(" ".join(found["record"])) + build.whole(*found["whole"]) + build.bind(found["row"])
+    lines += build.order() if found["number"] else []
+    return lines + [f"{name} = words[{name[1:]}]" for name in found["word"]]
+
+
+class _Statements(Expressions):
+    """Statements of one stage."""
+
+    def __init__(self, build: Builder):
+        self.build = build
+        self.split: int | None = None
+        self.depth = 0
+
+    def run(
+        self, stage: Callable[..., Any], known: dict[str, object]
+    ) -> tuple[list[ast.stmt], list[ast.stmt], ast.expr | None]:
+        """What is done once, what is done for agents, and the answer."""
+        plan = self.build.plan
+        rows: dict[str, ast.Name] = {}
+
+        def take(name: str) -> ast.Name:
+            if name not in rows:
+                rows[name] = given(name, "word" if name[0] == "u" and name[1:].isdigit() else "row")
+            return rows[name]
+
+        number: object = given("order", "number") if self.build.slots else Itself()
+        standing = {
+            "plan": plan,
+            "model": plan.model,
+            "flock": Flock(take, plan.dimensions, number),
+            "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records}),
+            "whole": SimpleNamespace(**{name: given(name, "whole") for name in WHOLE}),
+            "agents": Loop("n", agents=True),
+            "lanes": Loop("m", agents=True),
+            "others": Loop("m", agents=False),
+        }
+        text = text_of(stage)
+        names = [a.arg for a in (*text.node.args.args, *text.node.args.kwonlyargs)]
+        scope = Scope(text, {name: value for name, value in standing.items() if name in names} | known)
+        statements, answer = list(text.node.body), None
+        if isinstance(statements[-1], ast.Return):
+            last = statements.pop()
+            assert isinstance(last, ast.Return)
+        else:
+            last = None
+        done: list[ast.stmt] = []
+        for statement in statements:
+            before, looped = len(done), self.split is not None
+            done += self.statement(statement, scope)
+            if self.split is not None and not looped:
+                self.split = before
+        if last is not None and last.value is not None:
+            answer = self.expr(last.value, scope)
+        once, body = done[: self.split], done[len(done) if self.split is None else self.split :]
+        carried = {item.id for s in body for item in ast.walk(s) if isinstance(item, ast.Name) and _stored(item)}
+        first = [s for s in once if isinstance(s, ast.Assign) and _name(s.targets[0]) in carried]
+        return [s for s in once if s not in first], [*first, *body], answer
+
+    def block(self, statements: list[ast.stmt], scope: Scope) -> list[ast.stmt]:
+        """Statements of the driver for those of a block."""
+        return [made for statement in statements for made in self.statement(statement, scope)]
+
+    def statement(self, node: ast.stmt, scope: Scope) -> list[ast.stmt]:
+        """Statements of the driver for one of a stage."""
+        if isinstance(node, ast.Assign):
+            return self.assign(node, scope)
+        if isinstance(node, ast.AugAssign):
+            value = self.expr(node.value, scope)
+            return [ast.AugAssign(self.target(node.target, scope), node.op, value)]  # type: ignore[arg-type]
+        if isinstance(node, ast.For):
+            return self.loop(node, scope)
+        if isinstance(node, ast.If):
+            test = self.value(node.test, scope)
+            if not residual(test):
+                return self.block(node.body if test else node.orelse, scope)
+            return [ast.If(test, self.block(node.body, scope), self.block(node.orelse, scope))]
+        if isinstance(node, ast.Expr):
+            return self.call(node.value, scope)
+        raise scope.fault(node, f"{type(node).__name__} is not specialised")
+
+    def call(self, node: ast.expr, scope: Scope) -> list[ast.stmt]:
+        """A call that stands alone: of a helper, whose statements take its place, or of another stage."""
+        if isinstance(node, ast.Constant):
+            return []  # a docstring
+        if isinstance(node, ast.Call):
+            called = self.value(node.func, scope)
+            if isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES):
+                inner = self.entered(called, node, [self.value(argument, scope) for argument in node.args], scope)
+                return self.block(inner.text.node.body, inner)
+        return [ast.Expr(self.expr(node, scope))]
+
+    def loop(self, node: ast.For, scope: Scope) -> list[ast.stmt]:
+        """A loop: unrolled where it is known, over agents, or as it stands."""
+        over = self.value(node.iter, scope)
+        if isinstance(over, UNROLLED):
+            done: list[ast.stmt] = []
+            for item in over:
+                self.bind(node.target, item, scope)
+                done += self.block(node.body, scope)
+            return done
+        if isinstance(over, Loop):
+            self.split = 0 if over.agents and self.split is None else self.split
+            if over.agents and self.build.in_turn:
+                return self.block(node.body, scope)
+            over = ast.Call(ast.Name("range", LOAD), [ast.Name(over.bound, LOAD)], [])
+        if not residual(over):
+            raise scope.fault(node, f"{ast.unparse(node.iter)} is not looped over")
+        return [ast.For(self.target(node.target, scope), over, self.block(node.body, scope), [], lineno=0)]
+
+    def assign(self, node: ast.Assign, scope: Scope) -> list[ast.stmt]:
+        """An assignment; none where its name stands for what is known from then on."""
+        (target,) = node.targets
+        value = self.made(target, node.value, scope)
+        names = [_name(part) for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
+        parts = value if isinstance(target, ast.Tuple) and isinstance(value, (tuple, list)) else [value]
+        if all(name in scope.text.once for name in names) and all(map(settled, parts)):
+            self.bind(target, value, scope)
+            return []
+        made, stored = self.printed(value, node, scope), self.target(target, scope)
+        sum_ = made if isinstance(made, ast.BinOp) and isinstance(made.op, ast.Add) else None
+        if sum_ is not None and isinstance(stored, ast.Name) and _name(sum_.left) == stored.id:
+            return [ast.AugAssign(stored, sum_.op, sum_.right)]
+        return [ast.Assign([stored], made, lineno=0)]
+
+    def made(self, target: ast.expr, node: ast.expr, scope: Scope) -> Any:
+        """Value that is assigned; a local vector has the name of its variable."""
+        if isinstance(target, ast.Tuple) and isinstance(node, ast.Tuple):
+            return tuple(self.made(*pair, scope) for pair in zip(target.elts, node.elts, strict=True))
+        kind = LOCALS.get(self.value(node.func, scope)) if isinstance(node, ast.Call) and not node.args else None
+        return self.value(node, scope) if kind is None else Components(_name(target), kind)
+
+
+def _stored(node: ast.Name) -> bool:
+    return isinstance(node.ctx, ast.Store)
+
+
+def _name(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else ""

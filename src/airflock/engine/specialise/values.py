@@ -1,0 +1,110 @@
+"""Values that an expression of a stage can have while its driver is made, besides ordinary Python objects."""
+
+import ast
+import linecache
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from airflock.engine.stages.words import NOTHING, ZERO
+
+LOAD, STORE = ast.Load(), ast.Store()
+
+
+class StageError(Exception):
+    """A stage uses what the specialiser does not know; names file and line."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop over all agents (`agents`, `lanes`: in turn the one agent that is due) or over the others of one."""
+
+    bound: str
+    agents: bool
+
+
+@dataclass(frozen=True)
+class Call:
+    """Another stage that a stage is handed: the driver's call of it, whatever differs from call to call."""
+
+    text: str
+
+
+@dataclass
+class Components:
+    """A local vector, totals or aliases: one variable of the driver for each component that is set."""
+
+    name: str
+    kind: str
+    set: dict[int, str] = field(default_factory=dict)
+
+    def store(self, at: int) -> ast.Name:
+        """The variable of a component that is set."""
+        spelled = {"vector": "{0}_{1}", "aliases": "{0}{1}_", "totals": "{0}_{2}"}[self.kind]
+        return ast.Name(self.set.setdefault(at, spelled.format(self.name, "xyz"[at : at + 1], at)), STORE)
+
+    def __getitem__(self, at: int) -> object:
+        if at in self.set:
+            return ast.Name(self.set[at], LOAD)
+        return NOTHING if self.kind == "aliases" else ZERO
+
+
+def argument(name: str) -> ast.Name:
+    """A parameter of a stage under the name that the driver's function has for it."""
+    return ast.Name(name, LOAD)
+
+
+def given(name: str, kind: str, item: object = None) -> ast.Name:
+    """A name that the driver binds for a stage.
+
+    kind : row, number, record or whole; or rule, the plain function or class `item`, which is named at the end
+    """
+    made = ast.Name(name, LOAD)
+    made.kind, made.item = kind, item  # type: ignore[attr-defined]
+    return made
+
+
+def kind_of(value: object) -> str | None:
+    """Which kind of name a driver binds for a stage this is, if it is one."""
+    return getattr(value, "kind", None) if isinstance(value, ast.Name) else None
+
+
+@dataclass(frozen=True)
+class Text:
+    """Syntax of a stage or of a helper.
+
+    local : names that it binds, parameters among them
+    once  : those that it binds in one place only
+    """
+
+    node: ast.FunctionDef
+    local: frozenset[str]
+    once: frozenset[str]
+    names: dict[str, Any]
+    where: str
+
+
+@cache
+def _module(path: str) -> dict[tuple[str, int], ast.FunctionDef]:
+    """Functions of a file of stages by name and line: the whole file is read at once, as it has little else."""
+    found = ast.parse("".join(linecache.getlines(path))).body
+    return {(node.name, node.lineno): node for node in found if isinstance(node, ast.FunctionDef)}
+
+
+@cache
+def text_of(function: Callable[..., Any]) -> Text:
+    """Syntax of a function of a module, read once."""
+    code = function.__code__
+    node = _module(code.co_filename)[code.co_name, code.co_firstlineno]
+    loops = [item for item in ast.walk(node) if isinstance(item, ast.comprehension)]
+    inner = {id(name) for loop in loops for name in ast.walk(loop.target)}
+    bound = Counter(
+        item.id
+        for item in ast.walk(node)
+        if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store) and id(item) not in inner
+    )
+    parameters = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)}
+    once = frozenset(name for name, count in bound.items() if count == 1 and name not in parameters)
+    return Text(node, frozenset(bound) | parameters, once, function.__globals__, function.__code__.co_filename)

@@ -1,0 +1,63 @@
+"""Move: one motion step."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from airflock.engine.plan import Plan
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, most, wants
+
+
+def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
+    """Own velocity as agent i measures it along one axis, m/s."""
+    return flock.velocity[a][i] + flock.own_drift[a][i] if plan.noisy and a < plan.dimensions else flock.velocity[a][i]
+
+
+def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan) -> None:
+    """Velocities by the rule of the body."""
+    v, command = flock.velocity, flock.command
+    for i in lanes:
+        t = ask(
+            plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
+            mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
+            gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
+            dt=numbers.c.dt, b=numbers.b,
+        )  # fmt: skip
+        for a in range(plan.dimensions):
+            v[a][i] = t[a]
+
+
+def move(
+    agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int,
+    noise: Callable[[], None], gusts: Callable[[], Any], *, plan: Plan,
+) -> Any:  # fmt: skip
+    """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
+
+    noise, gusts : the stages of these names, for this step
+    """
+    x, v = flock.position, flock.velocity
+    g = aliases()
+    if wants(plan.body.move, "gx", "gy", "gz"):
+        noise()
+        for a in range(plan.dimensions):
+            g[a] = flock.outer[a] if plan.dimensions == 3 or step % 2 == 0 else flock.outer[a + 2]
+    wx = ZERO
+    wy = ZERO
+    wz = ZERO
+    if plan.windy:
+        wx, wy, wz = gusts()
+    if plan.integration != "old":
+        respond(lanes, flock, numbers, g, wx, wy, wz, plan=plan)
+    fastest = ZERO
+    for i in agents:
+        fastest = most(fastest, sum(v[a][i] * v[a][i] for a in range(plan.dimensions)))
+    for a in range(plan.dimensions):
+        for i in lanes:
+            x[a][i] += v[a][i] * numbers.c.dt
+    if plan.integration == "old":
+        respond(lanes, flock, numbers, g, wx, wy, wz, plan=plan)
+    if plan.edge:
+        for i in agents:
+            for a in range(plan.dimensions):
+                x[a][i], v[a][i] = plan.edge(x[a][i], v[a][i], getattr(numbers.w, SIDES[a]))
+    return fastest

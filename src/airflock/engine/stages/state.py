@@ -1,0 +1,77 @@
+"""State: the rows of a flock by what they hold, its numbers and its integers, as stages name them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from airflock.engine.stages.words import NOTHING
+
+Row = Any  # one number per agent: row[i]
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Rows of a vector, one per axis that is flown: rows[X][i]; zero along any other."""
+
+    prefix: str
+    take: Callable[[str], Row]
+    dimensions: int
+
+    def __getitem__(self, axis: int) -> Row:
+        return self.take(self.prefix + "xyz"[axis]) if axis < self.dimensions else NOTHING
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Rows of a record, one per field: rows[c][i]."""
+
+    prefix: str
+    take: Callable[[str], Row]
+
+    def __getitem__(self, column: int) -> Row:
+        return self.take(f"{self.prefix}{column}")
+
+
+class Flock:
+    """Rows of one flock, each with one number per agent.
+
+    number                               : of agent i, by which random numbers and others know it
+    position, velocity, command          : true state (m, m/s), and what was asked of the body
+    measured_position, measured_velocity : own state as the agent believes it
+    heard_position, heard_velocity       : its state as others hear it
+    latest_position, latest_velocity     : over two lossy links: from the newest packet, extrapolated, to one agent
+    heard, age                           : whether that agent hears each other one (1 or 0), and how old that is, s
+    own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
+    sent_error, sent_drift               : the same of what is sent to others
+    sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
+    errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
+
+    take       : the row of a name in the driver
+    dimensions : 2 or 3
+    number     : row of the numbers of agents
+    """
+
+    def __init__(self, take: Callable[[str], Row], dimensions: int, number: Row):
+        def axes(prefix: str) -> Axes:
+            return Axes(prefix, take, dimensions)
+
+        self.number = number
+        self.position, self.velocity, self.command = axes(""), axes("v"), axes("c")
+        self.measured_position, self.measured_velocity = axes("m"), axes("mv")
+        self.heard_position, self.heard_velocity = axes("h"), axes("hv")
+        self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
+        self.own_error, self.own_drift = axes("own_q"), axes("own_u")
+        self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
+        self.sums, self.walls = Columns("sum", take), Columns("wall", take)
+        self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
+        self._take = take
+
+    @property
+    def heard(self) -> Row:
+        """Whether each other agent is heard, 1 or 0."""
+        return self._take("heard")
+
+    @property
+    def age(self) -> Row:
+        """How old that is, s."""
+        return self._take("age")

@@ -1,0 +1,63 @@
+"""Surfaces: sum a law's boundary rule over walls, obstacles and what stands in the scene."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from airflock.core.contract import Model
+from airflock.engine.plan import Plan
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
+from airflock.world import arena, bvh
+
+
+def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> None:
+    """Add what agent i feels of one surface."""
+    v = vector()
+    for a in range(plan.dimensions):
+        v[a] = flock.measured_velocity[a][i]
+    t = ask(
+        model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
+        vx=v[X], vy=v[Y], vz=v[Z], p=numbers.p,
+    )  # fmt: skip
+    for c in live(model.Walls, plan.dimensions):
+        flock.walls[c][i] += t[c]
+
+
+def boundaries(
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, edges: Any, spans: Any, scene: Any,
+    *, plan: Plan, model: Model,
+) -> None:  # fmt: skip
+    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
+
+    Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
+    """
+    x = flock.measured_position
+    if plan.scene:
+        shapes = scene[0]
+        nodes = scene[1]
+        links = scene[2]
+        look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
+    for i in agents:
+        for c in live(model.Walls, plan.dimensions):
+            flock.walls[c][i] = ZERO
+    bounds = (0, whole.faces_0, whole.faces_0 + whole.faces_1)
+    for family, distance_to in enumerate(plan.surfaces):
+        for e in range(bounds[family], bounds[family + 1]):
+            ea = faces[e, 0]
+            eb = faces[e, 1]
+            ec = faces[e, 2]
+            ed = faces[e, 3]
+            for i in agents:
+                f = distance_to(x[X][i], x[Y][i], x[Z][i], ea, eb, ec, ed)
+                feel(i, f, flock, numbers, plan=plan, model=model)
+    if plan.obstacles and model.sight is None:  # who casts meets them in the scene
+        for o in range(whole.obstacles):
+            for i in agents:
+                f = arena.convex_obstacle(x[X][i], x[Y][i], x[Z][i], edges, spans[o, 0], spans[o, 1])
+                feel(i, f, flock, numbers, plan=plan, model=model)
+    if plan.scene:
+        for ground in (ZERO, ONE)[: plan.dimensions - 1]:
+            for i in agents:
+                f = bvh.nearest_of(x[X][i], x[Y][i], x[Z][i], look, ground, shapes, nodes, links)
+                if f.distance < look:
+                    feel(i, f, flock, numbers, plan=plan, model=model)

@@ -1,0 +1,108 @@
+"""Words that stages are written with, as they mean in plain Python. `engine.specialise` knows the same words.
+
+A stage is a plain function. It may use what is known when a driver is made (`plan`, `model`: tests of them choose what
+stays), the rows of a flock, numbers, and these words. A local that is bound in one place, to something known, does not
+appear in the driver; one that is bound in several is a variable there.
+"""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+X, Y, Z = 0, 1, 2
+SIDES = ("half_x", "half_y", "half_z")
+
+
+class Named(float):
+    """A number that a driver calls by a name, in its own precision."""
+
+    spelled: str
+
+    def __new__(cls, value: float, spelled: str) -> "Named":
+        """A number and its name."""
+        made = super().__new__(cls, value)
+        made.spelled = spelled
+        return made
+
+
+ZERO, HALF, ONE = Named(0.0, "ZERO"), Named(0.5, "HALF"), Named(1.0, "ONE")
+TINY, FAR, LIMIT = Named(1e-12, "TINY"), Named(1e30, "FAR"), Named(1e8, "LIMIT")
+START = {"sum": ZERO, "min": FAR, "max": Named(-1e30, "-FAR")}  # a total before its first term
+
+
+class Nothing:
+    """A row along an axis that is not flown: zero for every agent."""
+
+    def __getitem__(self, i: Any) -> Named:
+        return ZERO
+
+
+class Itself:
+    """The number of an agent, where agents lie in the order of their numbers."""
+
+    def __getitem__(self, i: Any) -> Any:
+        return i
+
+
+NOTHING = Nothing()
+
+
+def real(value: Any) -> Any:
+    """A number in the precision of the driver."""
+    return float(value)
+
+
+def integer(value: Any) -> Any:
+    """A whole number as wide as the driver's real numbers."""
+    return int(value)
+
+
+def least(a: Any, b: Any) -> Any:
+    """The lesser of two numbers."""
+    return a if a < b else b
+
+
+def most(a: Any, b: Any) -> Any:
+    """The greater of two numbers."""
+    return a if a > b else b
+
+
+def choose(test: Any, a: Any, b: Any) -> Any:
+    """`a` where the test holds, else `b`; both are computed, there is no branch."""
+    return a if test else b
+
+
+def vector() -> Any:
+    """A local vector, zero along each axis that is not set; in a driver one variable for each that is."""
+    return [ZERO, ZERO, ZERO]
+
+
+def totals() -> Any:
+    """Local totals by field; in a driver one variable for each."""
+    return {}
+
+
+def aliases() -> Any:
+    """Rows under another name, by axis; zero along each axis that is not set."""
+    return [NOTHING, NOTHING, NOTHING]
+
+
+def ask(rule: Callable[..., Any] | None, **offered: Any) -> Any:
+    """Call a rule with what it asks for by name. A driver computes only that."""
+    assert rule is not None
+    return rule(*(offered[name] for name in inspect.signature(rule).parameters))
+
+
+def wants(rule: Callable[..., Any], *names: str) -> bool:
+    """Whether a rule asks for any of these names."""
+    return bool(set(names) & set(inspect.signature(rule).parameters))
+
+
+def reduced(how: str, total: Any, term: Any) -> Any:
+    """A total with one more term: their sum, the lesser or the greater."""
+    return total + term if how == "sum" else least(total, term) if how == "min" else most(total, term)
+
+
+def live(record: Any, dimensions: int) -> list[int]:
+    """Fields of a record that can differ from zero: in a plane, a field that ends in z cannot."""
+    return [c for c, name in enumerate(getattr(record, "_fields", ())) if dimensions == 3 or not name.endswith("z")]

@@ -1,0 +1,274 @@
+"""State: the arrays of one flight. What it carries from step to step lies in one buffer, so that one copy keeps it."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.passes import grid
+from airflock.engine.passes.flock import scratch_of
+from airflock.engine.passes.scene import NEAR
+from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.tables import Tables
+from airflock.engine.totals import combined, goals_reached, samples, sums_of
+
+LANES = 16  # rows are padded to whole vectors of the widest machine
+LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
+AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
+NEVER = -1e9  # s; time stamp of a packet that has not come
+ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
+GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
+BEGUN = 4  # place in `held` of the mark that agents have their places
+
+
+class State:
+    """Memory of one flight and the driver that flies it.
+
+    plan, driver : what is fixed at compile time, and the functions that were made of it
+    tables       : what stands in the world and does not change; numbers that may change were copied from it
+    arrays       : everything that is carried from step to step, by name; views into `buffer`
+    agents       : number of agents
+    """
+
+    def __init__(self, plan: Plan, tables: Tables, driver: ModuleType, start: NDArray[Any] | None = None):
+        real = tables.row.dtype
+        agents, ring = int(tables.whole[AGENTS]), int(tables.whole[RING])
+        scratch = scratch_of(plan, tables.row, agents)
+        kept = tuple((name, size) for parts in scratch for name, size, spare in parts if not spare)
+        counts = (len(driver.ROWS), agents, ring, len(tables.goals), len(tables.later), tables.shapes.shape)
+        layout = _layout(plan, real, *counts, kept)
+        self.plan, self.driver, self.tables, self.agents = plan, driver, tables, agents
+        self.buffer, self.arrays = layout.filled()
+        own = self.arrays
+        own["row"][:], own["whole"][:] = tables.row, tables.whole
+        if len(tables.goals):
+            own["aim"][:3] = tables.goals[0]
+        if len(tables.later):
+            own["later"][:], own["shapes"][:] = tables.later, tables.shapes
+        self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
+        components = plan.dimensions
+        self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
+        self.no_frames = np.zeros((0, 3 * components, agents), real)
+        # what is used within a call only: its pages of zeros cost nothing until they are written
+        self.solvers = tuple(
+            tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
+        )
+        self.cells = grid.memory(plan, agents, rows)
+        self._given = self._arguments()
+
+    def _arguments(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """What the driver is called with before and after the frames; the arrays stay the same all flight long."""
+        own, tables = self.arrays, self.tables
+        before = (
+            own["held"], own["row"], own["whole"], tables.faces, tables.edges, tables.spans, self.scene, self.start,
+            own["work"], own["words"], own["past"], own["store"], own["gust"], own["mem"], own["memory"], own["labels"],
+            own["values"], own["sums"],
+        )  # fmt: skip
+        return before, (*self.scratch, *self.cells)
+
+    @property
+    def scratch(self) -> tuple[tuple[tuple[NDArray[Any], ...], ...], ...]:
+        """Scratch of the rules of the whole flock, as one last argument of a driver or none."""
+        return (self.solvers,) if self.solvers else ()
+
+    @property
+    def scene(self) -> tuple[NDArray[Any], ...]:
+        """What stands in the world and what is noted of it on the way, as `passes.scene` takes it."""
+        own, tables = self.arrays, self.tables
+        shapes = own["shapes"] if len(tables.later) else tables.shapes
+        return (
+            shapes, tables.nodes, tables.links, own["near"], own["counts"], tables.goals, own["aim"], own["reached"],
+            own["later"],
+        )  # fmt: skip
+
+    def advance(self, first: int, last: int, half: int = 0, frames: NDArray[Any] | None = None) -> int:
+        """Fly the steps first to last - 1; returns the next step, or minus the first agent (from 1) without a place.
+
+        half   : as in `passes.driver.flight`
+        frames : (sample, component, agent), filled with the samples of these steps where the plan records
+        """
+        before, after = self._given
+        return int(
+            self.driver.advance(first, last, half, *before, self.no_frames if frames is None else frames, *after)
+        )
+
+    @property
+    def ended(self) -> bool:
+        """Whether the flight has ended at a collision."""
+        return bool(self.arrays["held"][ENDED] > 0.5)
+
+    @property
+    def begun(self) -> bool:
+        """Whether agents have their places."""
+        return bool(self.arrays["held"][BEGUN] > 0.5)
+
+    @property
+    def finite(self) -> bool:
+        """Whether the positions and velocities of all agents are finite."""
+        return math.isfinite(self.arrays["work"][self._motion].sum())
+
+    def compile(self) -> None:
+        """Have the driver compiled; nothing is flown, and agents get no places."""
+        marks = self.arrays["held"]
+        begun, marks[BEGUN] = marks[BEGUN], 1.0
+        self.advance(0, 0)
+        marks[BEGUN] = begun
+
+    def twin(self) -> "State":
+        """The same state in memory of its own."""
+        made = State(self.plan, self.tables, self.driver, self.start)
+        made.buffer[:] = self.buffer
+        return made
+
+    def look_at_pairs(self) -> None:
+        """Forget how far pairs are apart: what was changed from outside may have brought them together."""
+        self.arrays["held"][GAP] = 0.0
+
+    def whole(self, name: str) -> int:
+        """An integer of this flight."""
+        return int(self.arrays["whole"][WHOLE.index(name)])
+
+    def set_whole(self, name: str, value: int) -> None:
+        """Set an integer of this flight."""
+        self.arrays["whole"][WHOLE.index(name)] = value
+
+    def rows(self, names: Sequence[str]) -> NDArray[Any]:
+        """Rows of the work table by name, (row, agent); agents by number. A copy.
+
+        KeyError for a row that this plan has not.
+        """
+        found: NDArray[Any] = self.arrays["work"][[self.driver.ROWS[name] for name in names], : self.agents]
+        return found if (slot := self.slots) is None else found[:, slot]
+
+    def put(self, names: Sequence[str], values: NDArray[Any]) -> None:
+        """Write rows of the work table, (row, agent), agents by number."""
+        places = [self.driver.ROWS[name] for name in names]
+        slot = np.arange(self.agents) if self.slots is None else self.slots
+        self.arrays["work"][np.ix_(places, slot)] = values
+
+    @property
+    def has_slots(self) -> bool:
+        """Whether the agents of a large flock lie in slots (`passes.slots`)."""
+        return "order" in self.driver.ROWS
+
+    @property
+    def slots(self) -> NDArray[Any] | None:
+        """Slot of each agent by number, where agents have slots."""
+        if not self.has_slots:
+            return None
+        kind = np.int32 if self.plan.bits == 32 else np.int64
+        order = self.arrays["work"][self.driver.ROWS["order"], : self.agents].view(kind)
+        slots = np.empty_like(order)
+        slots[order] = np.arange(self.agents)
+        return slots
+
+    @property
+    def motion(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s), (component, agent)."""
+        found: NDArray[Any] = self.arrays["work"][self._motion, : self.agents]
+        return found if (slot := self.slots) is None else found[:, slot]
+
+    def values(self) -> dict[str, Any]:
+        """Order parameters over the time that the sums hold, and when each goal was reached."""
+        return combined(self.plan, self.arrays["sums"]) | goals_reached(self.plan, self.arrays["reached"])
+
+    def samples(self) -> int:
+        """Number of samples that the sums hold."""
+        return samples(self.plan, self.arrays["sums"])
+
+    def reset_sums(self) -> None:
+        """Begin the sums over time anew. What a metric remembers of each agent stays: contacts go on."""
+        self.arrays["sums"][:] = sums_of(self.plan)[1]
+
+
+class Layout(NamedTuple):
+    """Where the arrays of a state lie in its buffer, and what they hold before a flight.
+
+    places : name, first byte, shape and kind of each array, each from a cache line on
+    """
+
+    places: tuple[tuple[str, int, tuple[int, ...], Any], ...]
+    beginning: NDArray[np.uint8]
+
+    def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
+        """A new buffer as it is before a flight, and its arrays by name."""
+        size = len(self.beginning)
+        room = np.empty(size + LINE, np.uint8)
+        first = -room.__array_interface__["data"][0] % LINE
+        buffer = room[first : first + size]
+        buffer[:] = self.beginning
+        arrays = {name: np.ndarray(shape, kind, room, first + place) for name, place, shape, kind in self.places}
+        return buffer, arrays
+
+
+@lru_cache(maxsize=64)
+def _layout(
+    plan: Plan,
+    real: Any,
+    count: int,
+    agents: int,
+    ring: int,
+    goals: int,
+    later: int,
+    shapes: tuple[int, int],
+    kept: tuple[Any, ...],
+) -> Layout:
+    """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
+    m, dims = lanes(agents), plan.dimensions
+    label = np.int32 if plan.bits == 32 else np.int64
+    packets = (agents, 2 * dims + 1, m) if plan.links else (1, 2 * dims + 1, 1)
+    values, sums = sums_of(plan)
+    beginnings = {
+        "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,
+        "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
+    }  # fmt: skip
+    beginnings["store"][:, 2 * dims] = NEVER
+    columns = sum(map(len, plan.records.values()))
+    shaped: dict[str, tuple[tuple[int, ...], Any]] = {
+        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": ((3,), real),
+        "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
+        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
+        "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
+        "labels": ((2, m), label),
+    }  # fmt: skip
+    shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
+    shaped |= {name: (size, real) for name, size in kept}
+    places, end = [], 0
+    for name, (shape, kind) in shaped.items():
+        places.append((name, end, shape, np.dtype(kind)))
+        end += -(-math.prod(shape) * np.dtype(kind).itemsize // LINE) * LINE
+    layout = Layout(tuple(places), np.zeros(end, np.uint8))
+    buffer, arrays = layout.filled()
+    for name, array in beginnings.items():
+        arrays[name][...] = array
+    return Layout(layout.places, buffer.copy())
+
+
+def lanes(agents: int) -> int:
+    """Agents of a row, filled up to whole vectors."""
+    return -(-agents // LANES) * LANES
+
+
+def rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
+    """Zeros whose rows begin on a cache line."""
+    count = math.prod(shape) * np.dtype(kind).itemsize
+    room = np.zeros(count + LINE, np.uint8)
+    first = -room.ctypes.data % LINE
+    found: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
+    return found
+
+
+def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
+    """What metrics remember of each agent, at its start: (field, lane)."""
+    blocks = [beginning(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
+    return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
+
+
+def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
+    """The defaults of a Memory for each of m lanes: (field, lane)."""
+    starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
+    return np.repeat(np.array(starts, real)[:, None], m, axis=1)

@@ -1,0 +1,45 @@
+"""Totals: what a flight's sums over time say, as named order parameters."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.passes.build import columns
+from airflock.engine.plan import Plan
+
+
+def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of an instant and sums over time at their start; the sums end with the counts of both clocks."""
+    start = {"min": 1e30, "max": -1e30}
+    found = [start.get(how, 0.0) for _, how, _ in columns(plan.metrics)]
+    return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
+
+
+def samples(plan: Plan, sums: NDArray[np.float64]) -> int:
+    """Number of samples that the sums hold."""
+    return int(sums[len(columns(plan.metrics))])
+
+
+def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
+    """Named order parameters from the sums over time."""
+    found = columns(plan.metrics)
+    counts = {"sample": sums[len(found)], "collision": sums[len(found) + 1]}
+    over_time = {
+        name: float(sums[c] / max(counts[when], 1.0) if how == "mean" else sums[c])
+        for c, (name, how, when) in enumerate(found)
+    }
+    named: dict[str, float] = {}
+    for metric in plan.metrics:
+        own = {name: over_time[name] for name in metric.Sample._fields}  # type: ignore[attr-defined]
+        named |= metric.total(own) if metric.total else own
+    return named
+
+
+def goals_reached(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:
+    """When each goal was reached, s (nan: never), and how many were."""
+    if not plan.goals:
+        return {}
+    times = [float(t) if t >= 0.0 else math.nan for t in reached]
+    return {"goals_reached": float(sum(t == t for t in times)), "goals": float(len(times)), "time_to_goal": times}

@@ -1,0 +1,233 @@
+"""A fleet in lock-step: nodes, vehicles and ether on one virtual clock in one process. The same seed, the same bits.
+
+At each motion step: telemetry and packets that are due arrive, nodes whose tick it is decide, vehicles move.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.body import sensors
+from airflock.core import random
+from airflock.core.agent import State
+from airflock.core.parameters import number_names
+from airflock.fleet.ether import Ether
+from airflock.fleet.faults import Fault
+from airflock.fleet.vehicle import OURS, PILOT, Vector, Vehicle
+from airflock.mavlink import orders
+from airflock.mavlink.coordinates import Geodetic
+from airflock.mavlink.orders import Do, Order
+from airflock.mavlink.signing import Signer
+from airflock.onboard.card import Card
+from airflock.onboard.mission import FLY, Phase
+from airflock.onboard.node import Node
+from airflock.scenarios.scenario import Scenario
+
+STARTED = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
+KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
+READY_TIME = 12.0  # s on the ground before a start is ordered
+
+
+class Fleet:
+    """N nodes with their vehicles.
+
+    scenario : body, sensors, radio and motion step of the simulated world; card: what the nodes carry
+    start    : state of each drone in the air, from which all flock at once; None: from the ground, by orders
+    operator : private key of the operator, to order from the ground
+    """
+
+    def __init__(
+        self, scenario: Scenario, card: Card, seed: int = 0, *, start: Sequence[State] | None = None,
+        faults: Sequence[Fault] = (), operator: bytes = b"",
+    ):  # fmt: skip
+        self.scenario, self.card, self.seed, self.faults = scenario, card, seed, tuple(faults)
+        self._dt = scenario.flight.dt
+        self._every = max(1, round(card.period / self._dt))
+        self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
+        self.steps, self.frames, self.log = 0, [], []  # type: ignore[var-annotated]
+        self.vehicles = [self._vehicle(i) for i in range(len(card.members))]
+        self.nodes = [
+            Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
+            for who in card.members
+        ]  # fmt: skip
+        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults)
+        self._errors = [State(*(0.0,) * 6)] * len(card.members)
+        self._given = 0
+        self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
+        if start is not None:
+            self._begin(start)
+
+    def _clock_fault(self, who: int) -> int:
+        return sum(round(f.amount * 1e6) for f in self.faults if f.kind == "clock" and f.holds(who, f.begin))
+
+    def _vehicle(self, i: int) -> Vehicle:
+        """A vehicle on the ground; grounds are a row of places 4 m apart."""
+        card, b = self.card, self.scenario.body
+        side = max(1, round(len(card.members) ** 0.5))
+        at = (4.0 * (i % side) - 2.0 * (side - 1), 4.0 * (i // side) - 2.0 * (side - 1), 0.0)
+        draw = self._draws(i) if "noise" in number_names(b) and b.noise > 0.0 else lambda step: (0.0, 0.0, 0.0)
+        made = Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
+        made.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
+        return made
+
+    def _draws(self, i: int) -> Callable[[int], Vector]:
+        """Outer noise of a drone at a motion step: the numbers that the simulated agent draws."""
+        three = not self.card.flat
+
+        def draw(step: int) -> Vector:
+            words = random.words(self.seed, random.OUTER, 0, step if three else step // 2, i)
+            four = (*random.normal_pair(words[0], words[1]), *random.normal_pair(words[2], words[3]))
+            if three:
+                return four[0], four[1], four[2]
+            x, y = four[:2] if step % 2 == 0 else four[2:]
+            return x, y, 0.0
+
+        return draw
+
+    def _begin(self, start: Sequence[State]) -> None:
+        """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""
+        for vehicle, node, s in zip(self.vehicles, self.nodes, start, strict=True):
+            vehicle.state = s._replace(z=s.z + (self.card.height if self.card.flat else self.lift))
+            vehicle.armed, vehicle.mode, vehicle.target_at, vehicle.first_at = True, OURS, 0.0, -9.0
+            node.phase, node.home = Phase.FLOCK, (*vehicle.home[:2], self.card.layer(node.member))
+            node.autopilot(vehicle.frame_origin(), 0.0)
+            node.autopilot(vehicle.telemetry(0.0), 0.0)
+        delay, period = self.scenario.radio.delay, self.card.safety.status_period
+        for who, (node, vehicle) in enumerate(zip(self.nodes, self.vehicles, strict=True)):
+            early = Node(self.card, node.member, KEY, now=-delay, utc=STARTED - round(1e6 * delay))
+            early.phase = Phase.FLOCK
+            early.autopilot(vehicle.frame_origin(), -delay)
+            for k in range(round(delay / period), 0, -1):
+                early.autopilot(vehicle.pack_state(), -k * period)
+                for datagram in early.say_status(-k * period):
+                    self.ether.send(-k * period, who, datagram)
+
+    # ------------------------------------------------------------------------------------------------------ flight
+
+    @property
+    def now(self) -> float:
+        """Virtual time, s."""
+        return self.steps * self._dt
+
+    @property
+    def lift(self) -> float:
+        """Height (m) above the site at which the law counts zero."""
+        return -self.card.law_state(State(*(0.0,) * 6)).z
+
+    def order(self, do: Do, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
+        """Give an order as the operator's station would; it reaches every drone at once."""
+        utc = max(STARTED + round(self.now * 1e6), self._given + 1)  # no two orders at one time
+        self._given = utc
+        p = point or Geodetic(0.0, 0.0, 0.0)
+        place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
+        given = Order(do, target, self.card.mission, utc, STARTED + round(at * 1e6), place)
+        datagram = self._orders(orders.message(given, self._operator), utc)
+        for node in self.nodes:
+            node.radio(datagram, self.now)
+
+    def advance(self, seconds: float, done: Callable[[], None] | None = None) -> None:
+        """Fly on."""
+        for _ in range(round(seconds / self._dt)):
+            self._step()
+            if done is not None and self.steps % 100 == 0:
+                done()
+
+    def _step(self) -> None:
+        now = self.now
+        if self.steps % self._tick == 0:
+            self._exchange(now)
+        if self.steps % self._every == 0:
+            self._keep()
+        self._break(now)
+        for vehicle in self.vehicles:
+            vehicle.step(now, self._dt)
+        self.steps += 1
+
+    def _exchange(self, now: float) -> None:
+        """Telemetry, packets and decisions of one tick."""
+        if self.steps % self._every == 0:
+            self._err(self.steps // self._every)
+        dead = [self._is("node", node.member, now) for node in self.nodes]
+        for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
+            told = vehicle.telemetry(now)
+            if not gone:
+                node.autopilot(told, now)
+        at = [vehicle.state[:3] for vehicle in self.vehicles]
+        for to, datagram in self.ether.deliver(now, at):
+            if not dead[to]:
+                self.nodes[to].radio(datagram, now)
+        for i, (node, vehicle) in enumerate(zip(self.nodes, self.vehicles, strict=True)):
+            if dead[i]:
+                continue
+            out = node.tick(now)
+            self.log += [(now, node.member, note) for note in out.notes]
+            for data in out.autopilot:
+                node.autopilot(vehicle.receive(data, now), now)
+            for datagram in out.radios[0]:
+                self.ether.send(now, i, datagram)
+
+    def _is(self, kind: str, who: int, now: float) -> bool:
+        return any(f.kind == kind and f.holds(who, now) for f in self.faults)
+
+    def _break(self, now: float) -> None:
+        """Let faults of vehicles act."""
+        for vehicle in self.vehicles if self.faults else ():
+            who = vehicle.system
+            vehicle.motor = not self._is("motor", who, now)
+            frozen = self._is("gnss", who, now)
+            vehicle.frozen = vehicle.frozen if frozen and vehicle.frozen else vehicle.measured if frozen else None
+            for f in self.faults:
+                if f.kind == "battery" and f.holds(who, now):
+                    vehicle.battery = f.amount
+                if f.kind == "pilot" and f.holds(who, now) and now - f.begin < self._dt:
+                    vehicle.mode = PILOT
+
+    def _err(self, number: int) -> None:
+        """Advance the error of each drone's navigation by one period, with the simulator's numbers."""
+        s = self.scenario.sensors
+        if s.noise == 0.0:
+            return
+        for i, vehicle in enumerate(self.vehicles):
+            words = random.words(self.seed, random.SENSOR, 0, number, i)
+            g = [*random.normal_pair(words[0], words[1])]
+            if not self.card.flat:
+                high = random.words(self.seed, random.SENSOR, 0, number, i, 1)
+                g.append(random.normal_pair(high[0], high[1])[0])
+            e = self._errors[i]
+            steps = [sensors.langevin(e[c], e[3 + c], g[c], self.card.period, s) for c in range(len(g))]
+            steps += [(0.0, 0.0)] * (3 - len(steps))
+            self._errors[i] = State(*(q for q, _ in steps), *(u for _, u in steps))
+            vehicle.error = self._errors[i]
+
+    # --------------------------------------------------------------------------------------------------- recording
+
+    def _keep(self) -> None:
+        self.frames.append(
+            [(*v.state, *n.command, *(n.wire.state or v.state)) for v, n in zip(self.vehicles, self.nodes, strict=True)]
+        )  # fmt: skip
+
+    def array(self) -> NDArray[np.float64]:
+        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
+        return np.array(self.frames)
+
+    def digest(self) -> str:
+        """SHA-256 of all that was flown."""
+        return hashlib.sha256(self.array().tobytes()).hexdigest()
+
+    def phases(self) -> list[Phase]:
+        """Phase of every node."""
+        return [node.phase for node in self.nodes]
+
+    @property
+    def airborne(self) -> bool:
+        """Whether any drone still flies by its node."""
+        return any(phase in FLY for phase in self.phases())
+
+
+def start_states(frames: Any, dims: int) -> list[State]:
+    """States from positions and velocities (component, agent)."""
+    pad = (0.0,) * (3 - dims)
+    return [State(*map(float, c[:dims]), *pad, *map(float, c[dims : 2 * dims]), *pad) for c in np.asarray(frames).T]

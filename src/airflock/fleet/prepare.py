@@ -1,0 +1,125 @@
+"""From a scenario to a flight card: the law, its world and its limits as the numbers that a drone carries."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+from airflock.body.motion import Parameters as Multirotor
+from airflock.core.parameters import Parameters
+from airflock.core.silence import Parameters as Silence
+from airflock.errors import CardError
+from airflock.onboard.card import VERSION
+from airflock.onboard.safety import Safety
+from airflock.scenarios.scenario import Scenario
+from airflock.world import arena
+from airflock.world.place import counter_clockwise, inward
+
+HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
+MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls
+SPARE = 10.0  # m between the highest layer and the fence
+CIRCLE = 16  # sides of the polygon around a circular arena
+
+
+def card_document(
+    scenario: Scenario, *, site: tuple[float, float, float], members: Sequence[int], mission: int, expires: int,
+    operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = MARGIN,
+    as_simulated: bool = False, safety: Mapping[str, Any] | None = None, silent: bool = True,
+) -> dict[str, Any]:  # fmt: skip
+    """Document of a flight card, without its hash.
+
+    site         : latitude and longitude (degrees), altitude (m) of the arena's centre on the ground
+    height       : at which the flock flies, m above the site; in space, of the arena's centre
+    margin       : of the fence around the law's walls, m
+    as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
+    safety       : limits that differ from those that follow from the scenario
+    silent       : whether the rule of silence stops a drone
+
+    Raises CardError where the scenario has no walls, or a law of its own that is not in the package.
+    """
+    if scenario.world.arena == "none":
+        raise CardError([f"{scenario.name}: world.arena = 'none': a card needs walls, and a fence around them"])
+    if not scenario.model.decide.__module__.startswith("airflock.models."):
+        raise CardError(
+            [f"{scenario.name}: the law {scenario.model.name} is not in the package; a card names laws only"]
+        )
+    limits = replace(limits_of(scenario), **(safety or {}))
+    half = 0.5 * scenario.world.height if scenario.dimensions == 3 else 0.0
+    height = max(HEIGHT, half + limits.base) if height is None else height
+    top = limits.base + limits.layer * (len(members) - 1)
+    stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
+    held = scenario.radio.kind == "constant" and as_simulated
+    silence = Silence(closing=2.0 * _speed(scenario)) if silent else Silence(closing=0.0, keep=0.0)
+    return {
+        "airflock_card": VERSION,
+        "name": scenario.name,
+        "mission": mission,
+        "expires": expires,
+        "site": dict(zip(("latitude", "longitude", "altitude"), site, strict=True)),
+        "members": list(members),
+        "operator": operator.hex(),
+        "autopilot": autopilot,
+        "law": {"kind": scenario.model.name, **plain(scenario.parameters)},
+        "body": {"kind": scenario.vehicle.name, **plain(scenario.body)},
+        "world": plain(scenario.world),
+        "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
+        "radio": {
+            "delay": scenario.radio.delay,
+            "extrapolate": not held,
+            "forget": scenario.radio.delay + 0.5 * period if held else 5.0,
+        },
+        "silence": plain(silence),
+        "safety": plain(limits),
+        "fence": {
+            "corners": outline(scenario.world, margin),
+            "low": min(2.0, 0.5 * limits.base),
+            "high": max(height + half, top) + SPARE,
+        },
+        "height": height,
+        "period": period,
+        "seed": 0,
+    }
+
+
+def limits_of(scenario: Scenario) -> Safety:
+    """Limits that follow from a scenario: half as fast again as its law prefers, as agile as its body."""
+    body = scenario.body if isinstance(scenario.body, Multirotor) else Multirotor()
+    return Safety(
+        speed_max=min(1.5 * _speed(scenario), 60.0),
+        accel=min(body.a_max, 50.0),
+        response=body.tau,
+        mission_time=min(max(scenario.flight.duration, 1.0), 36000.0),
+    )
+
+
+def _speed(scenario: Scenario) -> float:
+    preferred = scenario.model.preferred_speed
+    return float(preferred(scenario.parameters)) if preferred else 4.0
+
+
+def outline(world: arena.Parameters, margin: float) -> list[list[float]]:
+    """Corners of a convex fence around an arena, margin (m) outside its walls."""
+    if world.arena == "circle":
+        reach = (world.radius + margin) / math.cos(math.pi / CIRCLE)
+        angles = [2.0 * math.pi * k / CIRCLE for k in range(CIRCLE)]
+        return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
+    h = 0.5 * world.side
+    ring: Any = [(-h, -h), (h, -h), (h, h), (-h, h)] if world.arena == "square" else counter_clockwise(world.corners)
+    sides = [inward(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
+    corners = []
+    for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides
+        a, b, _, d = one
+        p, q, _, e = two
+        det = a * q - b * p
+        d, e = d + margin, e + margin
+        corners.append([(b * e - q * d) / det, (p * d - a * e) / det])
+    return corners
+
+
+def plain(record: Parameters) -> dict[str, Any]:
+    """A record as a table for JSON; numbers that were left to the scenario are left out."""
+    return {key: _listed(value) for key, value in asdict(record).items() if value is not None}
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(v) for v in value] if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,301 @@
+"""tau, a_max, outer noise and the log's own noise: likelihood of a Kalman filter through the saturated lag.
+
+State: the velocity of one drone, common variance of its axes. Between rows the command is held; the mean follows
+`body.held`, the variance that of an Ornstein-Uhlenbeck process below saturation and of a random walk above. White noise
+of the logged velocity is part of the model: without it, least squares takes 0.1 m/s of noise for a lag that is up to
+59 % too short. Intervals come from the curvature of the likelihood and the scatter of its slope between stretches of
+flight (Huber's sandwich), so that they hold where the noise is not quite what the filter assumes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import t as student
+
+from airflock.body import held
+from airflock.identify.logs import Logs
+
+NAMES = ("tau", "a_max", "noise", "white")
+STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
+BLOCK = 20.0  # s of one drone whose slopes are taken together
+FREE = 1e4  # m/s^2: no limit
+GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
+FEW = 200  # rows below which nothing is fitted
+DISAGREE = 0.15  # of two estimates of tau
+# Relative standard deviation of what the filter leaves out: commands come from the true velocity, so they know more of
+# it than the filter does. Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
+BEYOND = np.array([0.01, 0.01, 0.005, 0.005])
+
+
+@dataclass
+class BodyFit:
+    """What the log says about the body; values and 95 % intervals by name.
+
+    refused : name → reason, for numbers that cannot be told apart
+    gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
+    """
+
+    value: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    refused: dict[str, str]
+    saturated: int
+    rows: int
+    gain: float
+    second_tau: float
+    seen: float
+    dead_time: float
+    together: float
+    notes: list[str]
+
+
+@cache
+def _kernel() -> Any:
+    """Negative log-likelihood per block, compiled."""
+    from numba import njit
+
+    decay_rate, gap_left = njit(held.decay_rate), njit(held.gap_left)
+
+    @njit
+    def kernel(time, m, c, new, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
+        out[:] = 0.0
+        axes = m.shape[1]
+        v, e = np.zeros(3), np.zeros(3)
+        variance, r2 = 0.0, white * white
+        rate = decay_rate(tau, dt)
+        for k in range(len(time)):
+            if new[k]:
+                for i in range(axes):
+                    v[i] = m[k, i]
+                variance = r2
+                continue
+            h = time[k] - time[k - 1]
+            size = 1e-12
+            for i in range(axes):
+                e[i] = c[k - 1, i] - v[i]
+                size += e[i] * e[i]
+            size = np.sqrt(size)
+            left, limited = gap_left(size, h, tau, rate, a_max)
+            keep = np.exp(-2.0 * rate * (h - limited))
+            # across the gap a limited motion keeps errors as they are; along it both ends move alike
+            variance = keep * variance + 2.0 * noise * limited * keep + noise / rate * (1.0 - keep)
+            total, loss = variance + r2, 0.0
+            gain = variance / total
+            for i in range(axes):
+                predicted = c[k - 1, i] - e[i] * left / size
+                off = m[k, i] - predicted
+                loss += off * off
+                v[i] = predicted + gain * off
+            variance *= 1.0 - gain
+            out[block[k]] += 0.5 * axes * np.log(total) + 0.5 * loss / total
+        return out.sum()
+
+    return kernel
+
+
+def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
+    """Fit the body of `body.motion` to logs with commands.
+
+    dt   : motion step of the scenario that the numbers are for, s; 0 for continuous time
+    walk : what the sensor's own error adds to the noise of logged velocities, m²/s³: damping times noise of
+           `body.sensors`; it is taken off the outer noise
+    """
+    flying = logs.flying()
+    if len(flying.time) < FEW:
+        reason = f"{len(flying.time)} rows with a velocity and a command are fewer than {FEW}"
+        return _nothing(reason)
+    span = _blocks(flying)
+    out = np.zeros(int(span.max()) + 1)
+    arrays = (
+        flying.time,
+        np.ascontiguousarray(flying.velocity),
+        np.ascontiguousarray(flying.command),
+        flying.new,
+        span,
+    )
+    kernel = _kernel()
+
+    def loss(z: Any, blocks: Any = None) -> float:
+        tau, a_max, noise, white = np.exp(z)
+        if not dt < 0.9 * tau or max(z) > 12.0 or min(z) < -14.0:
+            return 1e15
+        return float(kernel(*arrays, out if blocks is None else blocks, tau, a_max, noise, white, dt))
+
+    z = _lowest(loss)
+    lowest = loss(z)
+    value = dict(zip(NAMES, np.exp(z), strict=True))
+    spread, freedom = _spread(loss, z, len(out))
+    wide = float(student.ppf(0.975, max(freedom, 1)))
+    interval = {
+        n: (float(np.exp(c - wide * s)), float(np.exp(c + wide * s))) for n, c, s in zip(NAMES, z, spread, strict=True)
+    }
+    low, high = interval["noise"]
+    value["noise"], interval["noise"] = value["noise"] - walk, (max(low - walk, 0.0), max(high - walk, 0.0))
+    gap = np.linalg.norm(flying.command - flying.velocity, axis=1)
+    saturated = int((gap > value["a_max"] * value["tau"]).sum())
+    free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
+    found = BodyFit(
+        value, interval, {}, saturated, len(flying.time), 2.0 * (free - lowest),
+        second_tau(flying, value["tau"], value["a_max"]), float(np.quantile(gap, 0.999) / value["tau"]),
+        0.0, together(flying, value), [],
+    )  # fmt: skip
+    found.dead_time = dead_time(flying, value)
+    _judge(found, flying)
+    return found
+
+
+def _nothing(reason: str) -> BodyFit:
+    nan = float("nan")
+    empty = dict.fromkeys(NAMES, nan)
+    return BodyFit(
+        empty, dict.fromkeys(NAMES, (nan, nan)), dict.fromkeys(NAMES, reason), 0, 0, 0.0, nan, 0.0, 0.0, 0.0, []
+    )
+
+
+def _blocks(logs: Logs) -> NDArray[np.int64]:
+    """Number of a stretch of BLOCK s of one drone, for every row."""
+    part = np.floor((logs.time - logs.time.min()) / BLOCK).astype(np.int64)
+    return np.unique(logs.who * (part.max() + 1) + part, return_inverse=True)[1].astype(np.int64)
+
+
+def _lowest(loss: Callable[[Any], float]) -> NDArray[np.float64]:
+    options = {"maxiter": 600, "xatol": 2e-4, "fatol": 2e-2}
+    first = [minimize(loss, np.log(s), method="Nelder-Mead", options={"maxiter": 120}) for s in STARTS]
+    best = min(first, key=lambda found: float(found.fun))
+    again = minimize(loss, best.x, method="Nelder-Mead", options=options)
+    return np.asarray(again.x, float)
+
+
+def _settled(loss: Callable[[Any], float], start: Any) -> float:
+    return float(minimize(loss, start, method="Nelder-Mead", options={"maxiter": 150}).fun)
+
+
+def _spread(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.float64], int]:
+    """Standard errors of log parameters, and degrees of freedom: curvature, slopes of each block, curvature."""
+    d, n = 0.01, len(z)
+    unit = np.eye(n) * d
+    curve = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i, n):
+            curve[i, j] = curve[j, i] = (
+                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
+                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
+            ) / (4.0 * d * d)  # fmt: skip
+    slopes = np.zeros((n, blocks))
+    for i in range(n):
+        up, down = np.zeros(blocks), np.zeros(blocks)
+        loss(z + unit[i], up)
+        loss(z - unit[i], down)
+        slopes[i] = (up - down) / (2.0 * d)
+    slopes -= slopes.mean(axis=1, keepdims=True)
+    inverse = np.linalg.pinv(curve)
+    robust = inverse @ (slopes @ slopes.T) @ inverse * blocks / max(blocks - 1, 1)
+    sampled = np.maximum(np.diag(robust), np.clip(np.diag(inverse), 0.0, None))
+    return np.minimum(np.sqrt(sampled + BEYOND**2), 3.0), blocks - 1
+
+
+def second_tau(logs: Logs, tau: float, a_max: float) -> float:
+    """Give tau (s) by another way: increments against the gap, with the gap to an earlier velocity as instrument.
+
+    White noise of the row is not in the earlier velocity, so it does not bias the ratio of covariances. Rows at the
+    limit are left out. Where commands run ahead of the vehicle (feed-forward) the two ways disagree.
+    """
+    lag = 3
+    gap = logs.command - logs.velocity
+    run = np.cumsum(logs.new)
+    k = np.arange(lag, len(logs.time) - 1)
+    sound = run[k - lag] == run[k + 1]
+    earlier = logs.command[lag:-1] - logs.velocity[: -lag - 1]  # to the velocity of `lag` rows before
+    calm = sound & (np.linalg.norm(earlier, axis=1) < 0.7 * a_max * tau)
+    k, earlier = k[calm], earlier[calm]
+    if len(k) < FEW:
+        return float("nan")
+    h = logs.time[k + 1] - logs.time[k]
+    moved = logs.velocity[k + 1] - logs.velocity[k]
+    instrument = earlier - earlier.mean(axis=0)
+    share = float((moved * instrument).sum() / (gap[k] * instrument).sum())
+    if not 0.0 < share < 1.0:
+        return float("nan")
+    return float(-np.median(h) / np.log1p(-share))
+
+
+def together(logs: Logs, value: dict[str, float]) -> float:
+    """Mean correlation of drones' unexplained accelerations: gusts that all feel, rather than noise of each one."""
+    if logs.drones < 2:
+        return 0.0
+    h = np.diff(logs.time)
+    gap = logs.command[:-1] - logs.velocity[:-1]
+    size = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
+    pull = np.minimum(size / value["tau"], value["a_max"])
+    off = np.diff(logs.velocity, axis=0) / np.maximum(h, 1e-9)[:, None] - gap * (pull / size)[:, None]
+    sound = ~logs.new[1:] & (h > 0.0)
+    slot = np.floor(logs.time[1:] - logs.time.min()).astype(np.int64)  # means over 1 s
+    table = np.full((logs.drones, int(slot.max()) + 1), np.nan)
+    total, count = np.zeros_like(table), np.zeros_like(table)
+    np.add.at(total, (logs.who[1:][sound], slot[sound]), off[sound, 0])
+    np.add.at(count, (logs.who[1:][sound], slot[sound]), 1.0)
+    table = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
+    shared = np.isfinite(table).all(axis=0)
+    if shared.sum() < 30:
+        return 0.0
+    alike = np.corrcoef(table[:, shared])
+    return float((alike.sum() - logs.drones) / (logs.drones * (logs.drones - 1)))
+
+
+def dead_time(logs: Logs, value: dict[str, float]) -> float:
+    """Delay of commands that explains the increments best, s, to a row: a body has none, so it is only told."""
+    best, kept = np.inf, 0.0
+    run = np.cumsum(logs.new)
+    for late in range(0, 11):
+        k = np.arange(late, len(logs.time) - 1)
+        k = k[run[k - late] == run[k + 1]]
+        gap = logs.command[k - late] - logs.velocity[k]
+        size = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
+        pull = np.minimum(size / value["tau"], value["a_max"])
+        h = (logs.time[k + 1] - logs.time[k])[:, None]
+        off = float(((logs.velocity[k + 1] - logs.velocity[k] - gap * (pull / size)[:, None] * h) ** 2).mean())
+        if off < 0.98 * best:
+            best, kept = off, late * logs.step
+    return kept
+
+
+def _judge(found: BodyFit, logs: Logs) -> None:
+    """Refuse what the log cannot tell, with the reason."""
+    tau, step = found.value["tau"], logs.step
+    relative = abs(np.log(max(found.second_tau, 1e-9) / tau)) if found.second_tau == found.second_tau else np.inf
+    width = np.log(found.interval["tau"][1] / found.interval["tau"][0]) / 3.92
+    if tau < 2.0 * step:
+        found.refused["tau"] = (
+            f"below about two steps of the log ({2.0 * step:.3g} s): log faster, or fly velocity steps"
+        )
+    elif relative > max(DISAGREE, 3.0 * width):
+        told = f"{found.second_tau:.2g} s" if found.second_tau == found.second_tau else "nothing"
+        found.refused["tau"] = (
+            f"two estimators disagree ({tau:.2g} s and {told}): set-points that the vehicle runs ahead of, "
+            "or smoothed velocities; fly velocity steps, log the raw estimate"
+        )
+    elif width > 0.5:
+        found.refused["tau"] = "the flight hardly excites it: fly velocity steps"
+    if "tau" in found.refused:
+        for name in ("a_max", "noise"):
+            found.refused[name] = "depends on tau, which is not identifiable here"
+        return
+    if found.gain < GAIN or found.saturated < SATURATED:
+        found.refused["a_max"] = (
+            f"at least {found.seen:.2g} m/s^2: {found.saturated} rows at the limit (needs {SATURATED}), gain of "
+            f"likelihood {found.gain:.0f} (needs {GAIN:.0f}); fly larger steps of velocity"
+        )
+    if not found.value["noise"] > 0.0:
+        found.refused["noise"] = "no larger than the walk of the sensor's own error"
+    if found.dead_time > 0.5 * tau:
+        found.notes.append(f"commands act {found.dead_time:.2g} s late, more than half of tau: this body does not fit")
+    elif found.dead_time > 1.5 * step:
+        found.notes.append(f"commands act about {found.dead_time:.2g} s late; a body has no number for that")
+    if found.together > 0.2:
+        found.notes.append(
+            f"unexplained accelerations of the drones correlate ({found.together:.2f}): gusts that all feel"
+        )

@@ -1,0 +1,240 @@
+"""Radio from packets that were heard: age and clocks by least squares, reception by distance by likelihood."""
+
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import minimize
+
+from airflock.body import radio
+from airflock.errors import RecordingError
+
+LINKS = ("near", "far", "received_near", "received_far")
+COLUMNS = ("receiver", "sender", "t", "stamp")
+ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
+# half of an interval, relative, beyond which a number is not told
+WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
+FEW = 500  # rows below which no curve is fitted
+
+
+@dataclass
+class RadioFit:
+    """Values and 95 % intervals by key of the section [radio]; reasons for what is refused; bins for a picture."""
+
+    value: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    refused: dict[str, str]
+    notes: list[str]
+    bins: pd.DataFrame
+
+
+class Curve(NamedTuple):
+    """What `body.radio.received` reads of the radio's parameters."""
+
+    near: float
+    far: float
+    received_near: float
+    received_far: float
+
+
+@cache
+def _kernel() -> Any:
+    """Probability that nothing arrives, by row, compiled from the rule itself."""
+    from numba import njit
+
+    received = njit(radio.received)
+
+    @njit
+    def kernel(distance, fast, slow, k):  # type: ignore[no-untyped-def]
+        missed = np.ones(len(distance))
+        for row in range(len(distance)):
+            for link in range(2):
+                sent = fast[row] if link == 0 else slow[row]
+                arrives = received(distance[row], float(link), k)
+                whole = np.floor(sent + 1e-9)
+                # a packet that is sent in a share of the decisions, where the log does not tell in which
+                missed[row] *= (1.0 - arrives) ** whole * (1.0 - (sent - whole) * arrives)
+            missed[row] = min(max(missed[row], 1e-9), 1.0 - 1e-9)
+        return missed
+
+    return kernel
+
+
+def checked(heard: pd.DataFrame) -> pd.DataFrame:
+    """A table of packets with the columns that are needed; raises RecordingError otherwise."""
+    lacking = [name for name in COLUMNS if name not in heard]
+    if lacking:
+        raise RecordingError(
+            f"heard: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
+            "stamp (sender's clock, s), and for reception distance (m) and got (0 or 1, one row per decision and pair)"
+        )
+    return heard
+
+
+@dataclass
+class DelayFit:
+    """radio.delay and its 95 % interval, a reason to refuse it, scatter of packets, clocks ahead by name, all s."""
+
+    value: float
+    interval: tuple[float, float]
+    reason: str = ""
+    scatter: float = float("nan")
+    ahead: dict[str, float] = field(default_factory=dict)
+
+
+def fit_delay(heard: pd.DataFrame) -> DelayFit:
+    """Fit the age of packets and the clocks of the drones by least squares.
+
+    The age of a packet is delay + clock of the receiver - clock of the sender; with both directions of a pair the
+    clocks cancel. An asymmetry of the two directions cannot be told from an offset of the clocks.
+    """
+    got = heard[heard["got"] > 0] if "got" in heard else heard
+    names = pd.unique(pd.concat([got["receiver"], got["sender"]]))
+    i, j = (pd.Categorical(got[name], names).codes.astype(int) for name in ("receiver", "sender"))
+    age = (got["t"] - got["stamp"]).to_numpy(float)
+    n = len(names)
+    key = i * n + j
+    pairs, where, count = np.unique(key, return_inverse=True, return_counts=True)
+    mean = np.bincount(where, age) / count
+    both = np.isin(pairs % n * n + pairs // n, pairs)
+    nan = float("nan")
+    if not both.any():
+        return DelayFit(nan, (nan, nan), "packets of one direction only: clocks and delay cannot be told apart")
+    a, b = pairs[both] // n, pairs[both] % n
+    design = np.zeros((both.sum() + 1, n + 1))
+    rows = np.arange(both.sum())
+    design[rows, a], design[rows, b] = 1.0, -1.0
+    design[:-1, n] = 1.0
+    design[-1, :n] = 1.0
+    weight = np.append(np.sqrt(count[both]), 1e3)
+    target = np.append(mean[both], 0.0)
+    found, *_ = np.linalg.lstsq(design * weight[:, None], target * weight, rcond=None)
+    left = target[:-1] - design[:-1] @ found
+    scatter = float(np.sqrt(np.mean((age - mean[where]) ** 2)))
+    freedom = max(int(both.sum()) - n, 1)
+    error = float(np.sqrt((count[both] * left**2).sum() / freedom / count[both].sum()))
+    wide = 1.96 * max(error, scatter / np.sqrt(len(age)))
+    delay = float(found[n])
+    ahead = {str(name): float(offset) for name, offset in zip(names, found[:n], strict=True)}
+    return DelayFit(delay, (delay - wide, delay + wide), "", scatter, ahead)
+
+
+def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
+    """Reception curve of `body.radio.received` from rows of got and not got per decision and pair.
+
+    heard  : receiver, sender, t, stamp, distance, got; if it is known, fast and slow: packets due on each link
+    period : time between decisions, s; k: radio parameters whose rates of packets are kept
+    """
+    nan = float("nan")
+    empty = RadioFit(dict.fromkeys(LINKS, nan), dict.fromkeys(LINKS, (nan, nan)), {}, [], pd.DataFrame())
+    lacking = [name for name in ("distance", "got") if name not in heard]
+    if lacking or len(heard) < FEW:
+        reason = (
+            f"no column {lacking[0]} in the table of packets" if lacking else f"{len(heard)} rows are fewer than {FEW}"
+        )
+        empty.refused = dict.fromkeys(LINKS, reason)
+        return empty
+    due = _due(heard, period, k)
+    d, n, g = (due[name].to_numpy(float) for name in ("distance", "due", "got"))
+    fast, slow = due["fast"].to_numpy(float), due["slow"].to_numpy(float)
+    kernel = _kernel()
+
+    def curve(z: Any) -> Any:
+        return kernel(d, fast, slow, Curve(*unpacked(z)))
+
+    def loss(z: Any) -> float:
+        if np.abs(z).max() > 12.0:
+            return 1e15
+        missed = curve(z)
+        return float(-(g * np.log(1.0 - missed) + (n - g) * np.log(missed)).sum())
+
+    z, *others = _lowest(loss, float(d.max()))
+    value = dict(zip(LINKS, unpacked(z), strict=True))
+    interval = _intervals(loss, z)
+    for other in others:  # a second hill of the likelihood belongs to the interval as well
+        for name, (low, high) in _intervals(loss, other).items():
+            interval[name] = min(low, interval[name][0]), max(high, interval[name][1])
+    found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
+    reach = float(found.bins["distance"][found.bins["due"] > 20].max()) if (found.bins["due"] > 20).any() else 0.0
+    flown = found.bins["distance"][found.bins["due"] > 20]
+    closest = float(flown.min()) if len(flown) else 0.0
+    if interval["near"][0] < closest:
+        for name in ("near", "received_near"):
+            found.refused[name] = (
+                f"nobody flew closer than {closest:.0f} m, and reception may be even only below: fly pairs"
+            )
+    if value["far"] > reach:
+        for name in ("far", "received_far"):
+            found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
+    for name in LINKS:
+        half = 0.5 * (interval[name][1] - interval[name][0]) / value[name]
+        if half > WIDEST[name] and name not in found.refused:
+            found.refused[name] = (
+                f"only known to ± {half:.0%} from {len(heard)} rows: fly more, and pairs farther apart"
+            )
+    return found
+
+
+def _lowest(loss: Any, farthest: float) -> list[Any]:
+    """Best of several descents, near and far on a grid first: a longer far hides behind a smaller share there.
+
+    Returns the best, and others that are nearly as likely.
+    """
+    options = {"maxiter": 400, "xatol": 1e-3, "fatol": 1e-2}
+    seconds = []
+    for far, ratio in product(np.geomspace(0.12, 0.8, 8) * farthest, (0.0, -1.5)):  # hills differ in both
+        first = []
+        for share in (0.2, 0.5):
+            start = [np.log(share * far), np.log((1.0 - share) * far), 2.5, ratio]
+            first.append(minimize(loss, start, method="Nelder-Mead", options={"maxiter": 100}))
+        start = min(first, key=lambda found: float(found.fun)).x
+        seconds.append(minimize(loss, start, method="Nelder-Mead", options=options))
+    best = min(seconds, key=lambda found: float(found.fun))
+    last = np.asarray(minimize(loss, best.x, method="Nelder-Mead", options=options).x)
+    return [last, *(np.asarray(found.x) for found in seconds if float(found.fun) < loss(last) + ALIKE)]
+
+
+def _due(heard: pd.DataFrame, period: float, k: Any) -> pd.DataFrame:
+    """Packets due and got by metre of distance and by how many each link sent: distance, fast, slow, due, got."""
+    table = pd.DataFrame({"distance": heard["distance"].astype(float), "got": heard["got"].astype(float)})
+    for link, rate in (("fast", k.fast_rate), ("slow", k.slow_rate)):
+        table[link] = heard[link].astype(float) if link in heard else rate * period
+    table["metre"] = np.floor(table["distance"])
+    sums = table.groupby(["metre", "fast", "slow"]).agg(
+        distance=("distance", "mean"), due=("got", "size"), got=("got", "sum")
+    )
+    found = sums.reset_index()
+    means = (found["distance"] * found["due"]).groupby(found["metre"]).sum() / found.groupby("metre")["due"].sum()
+    return found.assign(distance=found["metre"].map(means))
+
+
+def _pictured(due: pd.DataFrame) -> pd.DataFrame:
+    """By metre: distance, packets due, share that came, share of the model."""
+    due = due.assign(expected=due["model"] * due["due"])
+    sums = due.groupby("distance")[["due", "got", "expected"]].sum().reset_index()
+    return sums.assign(share=sums["got"] / sums["due"], model=sums["expected"] / sums["due"])
+
+
+def unpacked(z: Any) -> tuple[float, float, float, float]:
+    """Give near, far (m), received_near, received_far from unbounded numbers."""
+    near = float(np.exp(z[0]))
+    high = 1.0 / (1.0 + np.exp(-z[2]))
+    return near, near + float(np.exp(z[1])), float(high), float(high / (1.0 + np.exp(-z[3])))
+
+
+def _intervals(loss: Any, z: Any) -> dict[str, tuple[float, float]]:
+    """95 % intervals by the curvature and the derivative of the numbers by what is fitted."""
+    step, size = 0.02, len(z)
+    unit, curve = np.eye(size) * step, np.zeros((size, size))
+    for i in range(size):
+        for j in range(size):
+            curve[i, j] = (
+                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
+                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
+            ) / (4.0 * step * step)  # fmt: skip
+    by = np.array([(np.array(unpacked(z + u)) - np.array(unpacked(z - u))) / (2 * step) for u in unit]).T
+    spread = np.sqrt(np.clip(np.diag(by @ np.linalg.pinv(curve) @ by.T), 0.0, None))
+    return {n: (v - 1.96 * s, v + 1.96 * s) for n, v, s in zip(LINKS, unpacked(z), spread, strict=True)}

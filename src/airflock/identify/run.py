@@ -1,0 +1,242 @@
+"""From logs to the numbers of a scenario: `identify`, and what it found."""
+
+import datetime
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from scipy.stats import norm
+
+from airflock.body import motion
+from airflock.errors import AirflockError, RecordingError
+from airflock.identify import body, packets, periods, sensors
+from airflock.identify.logs import Logs, logs_of, logs_of_recording
+from airflock.recordings.imports.load import read_tracks
+from airflock.recordings.imports.track import Findings, Options
+from airflock.scenarios.files import loaded, make
+from airflock.scenarios.scenario import Scenario
+
+# key → whether a larger number makes a flight harder
+HARDER = {
+    "body.tau": True, "body.a_max": False, "body.noise": True, "sensors.period": True, "sensors.noise": True,
+    "sensors.damping": False, "sensors.scale": True, "radio.delay": True, "radio.near": False, "radio.far": False,
+    "radio.received_near": False, "radio.received_far": False, "model.v_max": True,
+}  # fmt: skip
+UNITS = {
+    "body.tau": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s", "sensors.noise": "m^2/s^2",
+    "sensors.damping": "1/s", "sensors.scale": "m", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
+    "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
+}  # fmt: skip
+NEVER = {
+    "wind.east, wind.north": "steady wind and drag act as one push; kept from --like",
+    "radio.range": "a flight shows no packet beyond the farthest pair; kept from --like",
+}
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a scenario: value and 95 % interval where the logs tell it, else the reason why not."""
+
+    key: str
+    value: float
+    low: float
+    high: float
+    like: float | None
+    origin: str
+    reason: str = ""
+
+    @property
+    def told(self) -> bool:
+        """Whether the logs tell it."""
+        return not self.reason and bool(np.isfinite(self.value))
+
+    def pessimistic(self, level: float) -> float:
+        """The end of the interval at which flying is harder, for a confidence level of both ends."""
+        end = self.high if HARDER[self.key] else self.low
+        ratio = max(end, 1e-12) / self.value
+        found = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
+        return min(found, 1.0) if UNITS[self.key] == "1" else found
+
+
+@dataclass
+class Identified:
+    """What identify found: numbers by key, notes, and the fits behind them for pictures."""
+
+    like: Scenario
+    numbers: dict[str, Number]
+    notes: list[str]
+    logs: Logs
+    body: body.BodyFit
+    sensors: sensors.SensorFit
+    radio: packets.RadioFit | None
+    comparable: bool
+    sources: list[str] = field(default_factory=list)
+
+    def settings(self, level: float | None = None) -> dict[str, float]:
+        """Keys and values that replace those of `like`: what was told, or its pessimistic end at a level."""
+        return {
+            key: number.value if level is None else number.pessimistic(level)
+            for key, number in self.numbers.items()
+            if number.told
+        }
+
+    def scenario(self, level: float | None = None) -> Scenario:
+        """The scenario `like` with these numbers; `published` is left out, for it speaks of other numbers."""
+        document = {key: value for key, value in self.like.document.items() if key != "published"}
+        return make(document, self.like.name, self.settings(level))
+
+    def document(self, level: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
+        """A scenario file's content: each number with unit and source, on request with its interval."""
+        found = _copied(self.like.document)
+        found.pop("published", None)
+        found["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
+        today = datetime.date.today().isoformat()
+        for key, value in self.settings(level).items():
+            section, _, name = key.partition(".")
+            number = self.numbers[key]
+            half = 0.5 * (number.high - number.low)
+            how = f"identify, {today}: {number.origin}, ± {half:.2g}"
+            entry: dict[str, Any] = {"value": _short(value)}
+            if UNITS[key] != "1":
+                entry["unit"] = UNITS[key]
+            entry["source"] = how + (f"; pessimistic end at {level:g}" if level is not None else "")
+            if uncertain:
+                entry["interval"] = [_short(max(number.low, 0.0)), _short(number.high)]
+            found.setdefault(section, {})[name] = entry
+        return found
+
+
+def identify(
+    what: Any,
+    like: Scenario | str,
+    *,
+    heard: pd.DataFrame | None = None,
+    standing: tuple[float, float] | None = None,
+    same_clock: bool = False,
+    options: Options | None = None,
+    accept: Iterable[str] = (),
+) -> Identified:
+    """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
+
+    what     : files (as in `load_tracks`), a recording, or Logs
+    like     : scenario or preset that is flown by the same law; what is not identified stays as it is there
+    heard    : packets: receiver, sender, t (receiver's clock, s), stamp (sender's clock, s), and for reception distance
+               (m) and got (0 or 1; one row per decision and pair)
+    standing : first and last time on the ground, s after each log begins, unless the logs tell it
+    """
+    scenario = loaded(like)
+    if not isinstance(scenario.body, motion.Parameters):
+        raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
+    findings = Findings(frozenset(accept))
+    logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
+    if heard is not None:
+        logs, aligned = _on_one_clock(logs, packets.checked(heard))
+        comparable = comparable or aligned
+        findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
+    notes = list(findings.notes)
+    numbers: dict[str, Number] = {}
+
+    def tell(key: str, value: float, interval: tuple[float, float], origin: str, reason: str = "") -> None:
+        low, high = interval
+        numbers[key] = Number(key, float(value), float(low), float(high), _like(scenario, key), origin, reason)
+
+    still = sensors.fit_sensors(logs, scenario.sensors.period)
+    for name in ("noise", "damping", "scale"):
+        origin = f"{still.seconds:.0f} s of standing"
+        tell(f"sensors.{name}", still.value[name], still.interval[name], origin, still.refused.get(name, ""))
+    told = {n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")}
+    moving = body.fit_body(logs, scenario.flight.dt, told["noise"] * told["damping"])
+    rows = f"{moving.rows} rows, {moving.saturated} limited"
+    for name in ("tau", "a_max", "noise"):
+        tell(f"body.{name}", moving.value[name], moving.interval[name], rows, moving.refused.get(name, ""))
+    notes += moving.notes
+    period, interval, reason = periods.decision_period(logs)
+    tell("sensors.period", period, interval, "changes of commands", reason)
+    links = _radio(heard, scenario, tell)
+    most, reason = periods.largest_command(logs, _like(scenario, "model.v_flock"))
+    if hasattr(scenario.parameters, "v_max"):
+        tell("model.v_max", most, (0.995 * most, most), "largest command", reason)
+    _in_range(numbers, scenario)
+    return Identified(scenario, numbers, notes, logs, moving, still, links, comparable, sources)
+
+
+def _logs(
+    what: Any, options: Options, findings: Findings, standing: tuple[float, float] | None, same_clock: bool
+) -> tuple[Logs, bool, list[str]]:
+    if isinstance(what, Logs):
+        return what, same_clock, []
+    if isinstance(what, xr.Dataset):
+        return logs_of_recording(what), bool(what.attrs.get("airflock_comparable", 1)), []
+    tracks, _ = read_tracks(what, options, findings, same_clock=True)
+    sources = sorted({track.source for track in tracks})
+    comparable = same_clock or len(sources) == 1 or all(track.clock == "utc" for track in tracks)
+    return logs_of(tracks, standing), comparable, sources
+
+
+def _on_one_clock(logs: Logs, heard: pd.DataFrame) -> tuple[Logs, bool]:
+    """Logs on one clock, by packets in both directions, if these name the drones as the logs do."""
+    ahead = packets.fit_delay(heard).ahead
+    if not set(logs.names) <= set(ahead):
+        return logs, False
+    own = np.array([ahead[name] for name in logs.names])
+    return replace(logs, time=logs.time - own[logs.who]), True
+
+
+def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets.RadioFit | None:
+    nan = float("nan")
+    if heard is None:
+        reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
+        for name in ("delay", *packets.LINKS):
+            tell(f"radio.{name}", nan, (nan, nan), "", reason)
+        return None
+    table = packets.checked(heard)
+    late = packets.fit_delay(table)
+    origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
+    tell("radio.delay", late.value, late.interval, origin, late.reason)
+    links = packets.fit_links(table, scenario.sensors.period, scenario.radio)
+    lossy = scenario.radio.kind == "links"
+    for name in packets.LINKS:
+        why = links.refused.get(name, "") or (
+            "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
+        )
+        tell(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets", why)
+    return links
+
+
+def _like(scenario: Scenario, key: str) -> float | None:
+    section, _, name = key.partition(".")
+    record = scenario.parameters if section == "model" else getattr(scenario, section)
+    value = getattr(record, name, None)
+    return None if value is None else float(value)
+
+
+def _in_range(numbers: dict[str, Number], scenario: Scenario) -> None:
+    """Refuse a number that the scenario would not take."""
+    for key, number in list(numbers.items()):
+        if not number.told:
+            continue
+        try:
+            document: Mapping[str, Any] = {k: v for k, v in scenario.document.items() if k != "published"}
+            make(document, scenario.name, {key: number.value})
+        except AirflockError as fault:
+            reason = str(fault).splitlines()[0].partition(": ")[2] or str(fault)
+            numbers[key] = Number(key, number.value, number.low, number.high, number.like, number.origin, reason)
+
+
+def _copied(document: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: _copied(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def read_heard(path: Any) -> pd.DataFrame:
+    """Read a table of packets (CSV); raises RecordingError for what is none."""
+    try:
+        return packets.checked(pd.read_csv(path, skipinitialspace=True))
+    except (OSError, ValueError, pd.errors.ParserError) as fault:
+        raise RecordingError(f"{path}: is no table of packets: {str(fault).splitlines()[0]}") from fault

@@ -1,0 +1,332 @@
+"""The node: what a drone runs beside its autopilot. Bytes in, bytes out, the clock passed in; no sockets, no files.
+
+autopilot(bytes, now) and radio(datagram, now) take what arrives; tick(now) gives what is to be sent. The same inputs
+give the same outputs to the bit, so that a log can be flown again.
+"""
+
+from math import isfinite
+from typing import NamedTuple
+
+from airflock.core.agent import State
+from airflock.errors import AirflockError
+from airflock.mavlink import orders, status
+from airflock.mavlink.autopilots import TAKE_OFF, Speaker
+from airflock.mavlink.orders import Do
+from airflock.mavlink.signing import Receiver, Signer
+from airflock.onboard import guidance
+from airflock.onboard.card import Card
+from airflock.onboard.limiter import STILL, Velocity, limit
+from airflock.onboard.mission import FLY, Facts, Phase, look
+from airflock.onboard.operator import Operator
+from airflock.onboard.peers import Peers
+from airflock.onboard.situation import Timers, facts
+from airflock.onboard.wire import Wire
+
+EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
+RETRY = 1.0  # s between two tries of a command
+TELL = frozenset({Phase.READY, Phase.CLEARED})
+
+
+class Memory(NamedTuple):
+    """What outlives a restart: own last stamp, last stamp of each member, when the last order was given (µs)."""
+
+    sent: int = 0
+    heard: dict[int, int] = {}  # noqa: RUF012
+    order: int = 0
+
+
+class Out(NamedTuple):
+    """What one tick gives: bytes for the autopilot, datagrams for each radio, lines for a person to read."""
+
+    autopilot: list[bytes]
+    radios: tuple[list[bytes], ...]
+    notes: list[str]
+
+
+class Node:
+    """One member of a flock.
+
+    card, member, key : flight card, own system id, secret of the mission
+    now, utc : the own clock (s) and Unix time (µs) at the start; both run alike from then on
+    memory   : what outlived a restart
+    radios   : periods (s) at which each radio sends the same packet
+    since    : µs of Unix time; nothing that was sent before is accepted. By default the start, so that no replay is
+    """
+
+    def __init__(
+        self, card: Card, member: int, key: bytes, *, now: float, utc: int, memory: Memory | None = None,
+        radios: tuple[float, ...] | None = None, since: int | None = None,
+    ):  # fmt: skip
+        kept = memory or Memory()
+        self.card, self.member, self.phase = card, member, Phase.BOOT
+        self._zero, self.since = utc - round(now * 1e6), utc if since is None else since
+        self._radios = radios or (card.safety.status_period,)
+        self._say = Speaker(card.autopilot, member)
+        self._sign = Signer(key, member, last=kept.sent)
+        others = [who for who in card.members if who != member]
+        self._receive = Receiver(
+            key, member, {status.MESSAGE: others, orders.MESSAGE: (orders.OPERATOR,)}, 
+            started=self.since, heard=kept.heard,
+            spread=card.safety.clock_spread + card.delay,
+        )  # fmt: skip
+        self.wire = Wire(card.autopilot, member, card.site)
+        self.peers = Peers(card, member)
+        self.operator = Operator(card, member, max(kept.order, utc))
+        self.pilot = card.pilot(member)
+        self._timers, self._since, self._before = Timers(), now, Phase.FLOCK
+        self.home: tuple[float, float, float] | None = None
+        self._twin = False  # somebody else signs as this member
+        self._goal: tuple[float, float, float] | None = None
+        self.command: Velocity = STILL
+        self._wish: Velocity = STILL
+        self._last_tick, self._next_law, self._next_status = now, now, [now] * len(self._radios)
+        self._flew_at: float | None = None
+        self._stream_since: float | None = None
+        self._tried_at, self._beat_at, self._asked_at = -1e9, -1e9, -1e9
+        self._overloads, self._failed, self._lost_near, self._fenced = 0, False, False, False
+        self._told: tuple[str, ...] = ()
+        self._notes: list[str] = []
+
+    # ------------------------------------------------------------------------------------------------------ in
+
+    def utc(self, now: float) -> int:
+        """Unix time (µs) at a time of the own clock (s)."""
+        return self._zero + round(now * 1e6)
+
+    def autopilot(self, data: bytes, now: float) -> None:
+        """Take bytes that came from the autopilot."""
+        self.wire(data, now, self.utc(now), self.card.safety.jump)
+
+    def radio(self, datagram: bytes, now: float) -> None:
+        """Take a datagram that came by any radio; one that came by two counts once."""
+        utc = self.utc(now)
+        got = self._receive(datagram, utc)
+        if got is None:
+            stamp = self._receive.own_heard
+            if stamp is not None and stamp not in self._sign.recent and not self._twin:
+                self._twin = True
+                self._notes.append(f"another sender signs as member {self.member}")
+            return
+        if got.message == orders.MESSAGE:
+            self.operator.take(got.values, now, utc)
+            return
+        told = status.status_of(got.values, self.card.site)
+        if told is None:
+            return
+        at = (told.time - self._zero) * 1e-6
+        if self.peers.take(got.system, told, at, now):
+            index = self.card.members.index(got.system)
+            if self.peers.all[got.system].flies():
+                self.pilot.hear(index, self.card.law_state(State(*told.position, *told.velocity)), at, now)
+            else:
+                self.pilot.forget(index)
+
+    @property
+    def memory(self) -> Memory:
+        """What must outlive a restart."""
+        return Memory(self._sign.last, dict(self._receive.heard), self.operator.given)
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Datagrams and orders that were refused, by reason."""
+        return self._receive.refused | self.peers.refused | {f"order: {k}": n for k, n in self.operator.refused.items()}
+
+    # ----------------------------------------------------------------------------------------------------- out
+
+    def tick(self, now: float) -> Out:
+        """Look at the mission and say what is to be sent; to be called every `safety.tick` seconds."""
+        late = now - self._last_tick > self.card.safety.late
+        self._last_tick = now
+        out = Out([], tuple([] for _ in self._radios), [])
+        known = self._facts(now, overload=late or self._failed)
+        self._overloads += known.overload
+        self._failed = False
+        step = look(self.phase, known, self.card.safety)
+        if step.row is not None:
+            self._enter(step.to, step.row.event, now, out)
+        self.peers.joined = False
+        self._tell(known)
+        self._steer(now, known, out)
+        self._speak(now, out)
+        out.notes.extend(self._notes)
+        self._notes = []
+        return out
+
+    def _facts(self, now: float, overload: bool) -> Facts:
+        s, own = self.card.safety, self.wire.state
+        if own is not None:
+            self._lost_near = self.pilot.lost_near(self.card.law_state(own), now)
+        order = self.operator.next()
+        if order == Do.GOTO and self._goal_outside():
+            order = None
+            self._notes.append("the point that was ordered lies outside the fence; not followed")
+        elif order == Do.GOTO:
+            self._goal, self.operator.held = self.operator.goal, False
+        if order == Do.RESUME and self.phase != Phase.MANUAL:
+            self.operator.resume = False
+        return facts(
+            self.card, self.member, self.phase, self.wire, self.peers, self.operator, self._timers, self.utc(now), now,
+            home=self.home, order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced,
+            lost_near=self._lost_near, twin=self._twin,
+            streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
+            time_over=self._flew_at is not None and now - self._flew_at > s.mission_time, before=self._before,
+        )  # fmt: skip
+
+    def _goal_outside(self) -> bool:
+        goal = self.operator.goal
+        return goal is None or self.card.outside(State(*goal, 0.0, 0.0, 0.0)) > 0.0 or goal[2] < self.card.low
+
+    def _enter(self, to: Phase, event: str, now: float, out: Out) -> None:
+        """Change the phase, and do what belongs to it once."""
+        was = self.phase
+        self._notes.append(f"{was.name} → {to.name}: {event}")
+        if to == Phase.HOLD and was in FLY:
+            self._before = Phase.GATHER if was == Phase.TAKEOFF else was
+        elif to == Phase.HOLD:
+            self._before, self.operator.held, self.operator.resume = Phase.FLOCK, True, False
+        if to == Phase.ARMING:
+            assert self.wire.state is not None
+            self.home = (self.wire.state.x, self.wire.state.y, self.card.layer(self.member))
+        if was == Phase.ARMING and to == Phase.READY:
+            self.operator.start_at = None
+            out.autopilot.append(self._say.arm(False))
+        if was == Phase.ARMING and to == Phase.TAKEOFF:
+            self._flew_at, self._overloads = now, 0
+        if to == Phase.DONE and self.operator.killed:
+            out.autopilot.append(self._say.arm(False, force=True))
+        if to in (Phase.FLOCK, Phase.GOTO) and was not in (Phase.FLOCK, Phase.GOTO):
+            self._next_law = now
+        if to == Phase.RETURN and self.home is None and self.wire.state is not None:
+            self.home = (self.wire.state.x, self.wire.state.y, self.card.layer(self.member))
+        self.phase, self._since, self._tried_at = to, now, -1e9
+
+    def _tell(self, known: Facts) -> None:
+        """Tell a person what is missing, when it changes."""
+        told = (known.fault,) if self.phase == Phase.FAULT else known.misses if self.phase in TELL else ()
+        if told != self._told:
+            self._notes += [f"missing: {line}" for line in told if line not in self._told]
+            self._told = told
+
+    # ------------------------------------------------------------------------------------------------- steering
+
+    def _steer(self, now: float, known: Facts, out: Out) -> None:
+        """Say to the autopilot what the phase asks for: a setpoint, a mode, or nothing."""
+        phase, say = self.phase, self._say
+        if phase == Phase.LAND and not known.mode_land and self._try(now):
+            out.autopilot.append(say.set_mode(self.card.autopilot.land))
+        streams = phase in FLY or phase == Phase.ARMING or (phase == Phase.MANUAL and known.resume)
+        streams = streams or (phase == Phase.LAND and known.mode_ours)  # until the autopilot lands by itself
+        if not streams:
+            self._stream_since, self.command = None, STILL
+            return
+        if phase == Phase.ARMING and known.streamed_for >= self.card.safety.stream and self._try(now):
+            out.autopilot.append(say.arm(True) if known.mode_ours else say.set_mode(self.card.autopilot.ours))
+        if phase == Phase.TAKEOFF and not self.card.autopilot.climbs:
+            if self._try(now):  # setpoints would end the climb that the autopilot flies by itself
+                out.autopilot.append(say.command(TAKE_OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self._climb()))
+            return
+        self._stream_since = now if self._stream_since is None else self._stream_since
+        own = self.wire.state
+        self.command = STILL if own is None else self._limited(self._velocity(own, now), own)
+        out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
+
+    def _climb(self) -> float:
+        """How far above the ground the own layer lies, m."""
+        ground = 0.0 if self.wire.state is None else min(self.wire.state.z, self.card.safety.base)
+        return self.card.layer(self.member) - (ground if self.wire.landed else 0.0)
+
+    def _try(self, now: float) -> bool:
+        if now - self._tried_at < RETRY - EPSILON:
+            return False
+        self._tried_at = now
+        return True
+
+    def _limited(self, wish: Velocity, own: State) -> Velocity:
+        s = self.card.safety
+        low = -1.0 if self.phase in (Phase.ARMING, Phase.TAKEOFF) else self.card.low
+        made = limit(wish, own, self.card.sides(own), (low, self.card.high), s)
+        self._fenced = made.fenced
+        return made.velocity
+
+    def _velocity(self, own: State, now: float) -> Velocity:
+        """What the phase wishes to fly, m/s."""
+        s, phase = self.card.safety, self.phase
+        if phase in (Phase.TAKEOFF, Phase.GATHER) and self.home is not None:
+            return guidance.keep(own, self.home, s)
+        if phase == Phase.RETURN and self.home is not None:
+            near = [peer.state for peer in self.peers.flying().values() if peer.state is not None]
+            wish = guidance.homewards(own, self.home, near, s)
+            return (0.0, 0.0, wish[2]) if self._lost_near else wish
+        if phase not in (Phase.FLOCK, Phase.GOTO):
+            return STILL
+        if now >= self._next_law - EPSILON:
+            self._next_law = max(self._next_law + self.card.period, now)
+            self._wish = self._law(own, now)
+        x, y, z = STILL if self._lost_near else self._wish
+        return x, y, guidance.climb(own, self.card.height, s) if self.card.flat else z
+
+    def _law(self, own: State, now: float) -> Velocity:
+        """What the law wishes, m/s; a law that fails or commands what is no velocity counts as an overload."""
+        goal = self._goal if self.phase == Phase.GOTO else None
+        at = self.card.law_state(own)
+        try:
+            told = None if goal is None else self.card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
+            x, y, z = self.pilot.decide(at, now, goal=told).command
+        except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
+            self._failed = True
+            self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")
+            return STILL
+        if not (isfinite(x) and isfinite(y) and isfinite(z)):
+            self._failed = True
+            self._notes.append(f"the law commanded {(x, y, z)}, which is no velocity")
+            return STILL
+        if goal is not None:
+            gx, gy, _ = guidance.make_for(own, goal, self.card.safety)
+            x, y = 0.5 * (x + gx), 0.5 * (y + gy)
+        return x, y, z
+
+    # ------------------------------------------------------------------------------------------------- speaking
+
+    def _speak(self, now: float, out: Out) -> None:
+        """Heartbeat, questions to the autopilot, and the own status on every radio that is due."""
+        if now - self._beat_at >= RETRY - EPSILON:
+            self._beat_at = now
+            out.autopilot.append(self._say.heartbeat())
+        if now - self._asked_at >= RETRY - EPSILON and self.phase in (Phase.BOOT, *TELL):
+            self._asked_at = now
+            out.autopilot.extend(self._questions())
+        due = [k for k, at in enumerate(self._next_status) if now >= at - EPSILON]
+        if not due:
+            return
+        for datagram in self.say_status(now):
+            for k in due:
+                self._next_status[k] = max(self._next_status[k] + self._radios[k], now)
+                out.radios[k].append(datagram)
+
+    def say_status(self, now: float) -> list[bytes]:
+        """The own status as a signed datagram; nothing while no own position is known."""
+        own = self.wire.state
+        if own is None:
+            return []
+        return [self._sign(status.message(self._status(own, now), self.card.site), self.utc(now))]
+
+    def _questions(self) -> list[bytes]:
+        """What is still to be asked of the autopilot."""
+        asked = [self._say.request_parameter(g.name) for g in self.card.autopilot.guards]
+        asked = [
+            q for q, g in zip(asked, self.card.autopilot.guards, strict=True) if g.name not in self.wire.parameters
+        ]
+        if self.wire.origin is None:
+            asked.append(self._say.request_message(49))
+        if self.wire.state is None or self.wire.landed is None or not self.wire.clocks:
+            asked += self._say.request_streams()
+        return asked
+
+    def _status(self, own: State, now: float) -> status.Status:
+        offset = self.wire.clock_offset()
+        return status.Status(
+            time=self.utc(self.wire.state_at), position=own[:3], velocity=own[3:], accuracy=min(self.wire.h_acc, 65.0),
+            phase=int(self.phase), airborne=self.wire.landed is False, mission=self.card.mission,
+            card=bytes.fromhex(self.card.hash)[:4], battery=round(self.wire.battery or 0.0),
+            clock_error=abs(offset) if offset is not None else 2.5, peers=self.peers.heard(now),
+        )  # fmt: skip

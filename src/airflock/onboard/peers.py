@@ -1,0 +1,101 @@
+"""Peers: the newest plausible status of each member. Peers tell states; nothing that they send is a command."""
+
+from collections import deque
+from math import sqrt
+
+from airflock.core.agent import State
+from airflock.mavlink.status import Status
+from airflock.onboard.card import Card
+from airflock.onboard.mission import AIR, FLOCKING, Phase
+
+FRESH = 2.0  # s; a peer whose last status is younger is heard
+AGES = 10  # packets whose ages tell of a clock
+BEYOND = 100.0  # m; a member may be this far beyond the fence and still be believed
+REASONS = ("mission", "card", "phase", "fast", "far", "jump", "time")
+
+
+class Peer:
+    """What is known of one member."""
+
+    def __init__(self) -> None:
+        self.status: Status | None = None
+        self.at = -1e9  # own time at which its last state held, s
+        self.heard_at = -1e9
+        self.ages: deque[float] = deque(maxlen=AGES)
+        self.other_card = False
+
+    @property
+    def phase(self) -> Phase:
+        """Phase of its mission as it told it."""
+        return Phase.BOOT if self.status is None else Phase(self.status.phase)
+
+    @property
+    def state(self) -> State | None:
+        """Its state as told."""
+        return None if self.status is None else State(*self.status.position, *self.status.velocity)
+
+    def flies(self) -> bool:
+        """Whether it is in the air, by its last word."""
+        return self.status is not None and self.phase in AIR and self.status.airborne
+
+
+class Peers:
+    """All other members of the card."""
+
+    def __init__(self, card: Card, member: int):
+        self._card = card
+        self.all = {who: Peer() for who in card.members if who != member}
+        self.refused = dict.fromkeys(REASONS, 0)
+        self.joined = False
+
+    def take(self, who: int, status: Status, at: float, now: float) -> bool:
+        """Take note of a status that held at `at` and arrived now (own time, s); False if it is not believed."""
+        reason = self._fault(who, status, at, now)
+        peer = self.all[who]
+        if reason:
+            self.refused[reason] += 1
+            peer.other_card = peer.other_card or reason == "card"
+            return False
+        was = peer.phase
+        peer.status, peer.at, peer.heard_at, peer.other_card = status, at, now, False
+        peer.ages.append(now - at)
+        self.joined = self.joined or (was not in FLOCKING and peer.phase in FLOCKING)
+        return True
+
+    def _fault(self, who: int, status: Status, at: float, now: float) -> str:
+        """Why a status is not believed; empty if it is."""
+        card, s = self._card, self._card.safety
+        if status.mission != card.mission:
+            return "mission"
+        if status.card != bytes.fromhex(card.hash)[:4]:
+            return "card"
+        if status.phase not in Phase.__members__.values():
+            return "phase"
+        if sqrt(sum(v * v for v in status.velocity)) > 2.0 * s.speed_max + s.climb_max:
+            return "fast"
+        own = State(*status.position, *status.velocity)
+        if card.outside(own) > BEYOND or own.z < -BEYOND:
+            return "far"
+        last = self.all[who]
+        if not -s.clock_spread <= now - at <= card.delay + s.clock_spread:
+            return "time"
+        if last.status is not None and at - last.at < 2.0:
+            step = max(abs(a - b) for a, b in zip(last.status.position, status.position, strict=True))
+            if step > 2.0 * s.speed_max * max(at - last.at, 0.0) + s.jump + 3.0 * status.accuracy:
+                return "jump"
+        return ""
+
+    def heard(self, now: float) -> int:
+        """How many members are heard now."""
+        return sum(now - peer.heard_at <= FRESH for peer in self.all.values())
+
+    def flying(self) -> dict[int, Peer]:
+        """Members that are in the air by their last word."""
+        return {who: peer for who, peer in self.all.items() if peer.flies()}
+
+    def clocks_suspect(self) -> bool:
+        """Whether two or more members, and all that are known, seem to have a wrong clock: then it is the own."""
+        told = [peer for peer in self.all.values() if len(peer.ages) == AGES]
+        limit = self._card.safety.clock_error
+        wrong = [p for p in told if min(p.ages) < -limit or min(p.ages) > self._card.delay + 1.0]
+        return len(told) >= 2 and len(wrong) == len(told)

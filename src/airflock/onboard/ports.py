@@ -1,0 +1,152 @@
+"""Ports of a node: UDP and serial lines, by a short text each; non-blocking, without a library.
+
+udp:HOST:PORT listens there and answers to who spoke last; udp:HOST:PORT>HOST:PORT listens at the first and sends to
+the second (a broadcast address for a radio); serial:/dev/NAME:BAUD opens a serial line.
+"""
+
+import os
+import socket
+import termios
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from airflock.errors import LinkError
+
+LONGEST = 2048  # bytes read at once
+
+
+class Port(Protocol):
+    """One open port."""
+
+    def fileno(self) -> int:
+        """Number of the open file, for the event loop."""
+
+    def read(self) -> list[bytes]:
+        """What has arrived: datagrams, or one piece of a stream."""
+
+    def write(self, data: bytes) -> bool:
+        """Send; False if the port could not take it now."""
+
+    def close(self) -> None:
+        """Close it."""
+
+
+class Place(NamedTuple):
+    """Where a UDP port listens and sends."""
+
+    here: tuple[str, int]
+    there: tuple[str, int] | None
+
+
+def open_port(text: str) -> Port:
+    """Open a port from its text; LinkError in one line if it cannot be."""
+    kind, _, rest = text.partition(":")
+    try:
+        if kind == "udp":
+            return Udp(_place(rest, text))
+        if kind == "serial":
+            return Serial(rest, text)
+    except (OSError, termios.error) as fault:
+        raise LinkError(f"{text}: {fault.strerror if isinstance(fault, OSError) else fault}") from fault
+    raise LinkError(f"{text}: give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")
+
+
+def _place(rest: str, text: str) -> Place:
+    here, _, there = rest.partition(">")
+    return Place(_address(here, text), _address(there, text) if there else None)
+
+
+def _address(told: str, text: str) -> tuple[str, int]:
+    host, _, port = told.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise LinkError(f"{text}: {told!r} is not HOST:PORT with a port from 1 to 65535")
+    return host, int(port)
+
+
+class Udp:
+    """A UDP socket."""
+
+    def __init__(self, place: Place):
+        self._there = place.there
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind(place.here)
+        except OSError:
+            self._socket.close()
+            raise
+        self._answers = place.there is None
+
+    def fileno(self) -> int:
+        """Number of the open file."""
+        return self._socket.fileno()
+
+    def read(self) -> list[bytes]:
+        """All datagrams that have arrived."""
+        found: list[bytes] = []
+        while True:
+            try:
+                data, sender = self._socket.recvfrom(LONGEST)
+            except (BlockingIOError, ConnectionRefusedError):
+                return found
+            if self._answers:
+                self._there = sender
+            found.append(data)
+
+    def write(self, data: bytes) -> bool:
+        """Send a datagram."""
+        if self._there is None:
+            return False
+        try:
+            self._socket.sendto(data, self._there)
+        except OSError:
+            return False
+        return True
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()
+
+
+class Serial:
+    """A serial line, raw, eight bits."""
+
+    def __init__(self, rest: str, text: str):
+        path, _, told = rest.rpartition(":")
+        speed: Callable[..., int] | int | None = getattr(termios, f"B{told}", None) if told.isdigit() else None
+        if not path or not isinstance(speed, int):
+            raise LinkError(f"{text}: give serial:/dev/NAME:BAUD with a usual baud rate such as 57600 or 921600")
+        self._file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            mode = termios.tcgetattr(self._file)
+            mode[0] = mode[1] = mode[3] = 0
+            mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
+            mode[4] = mode[5] = speed
+            termios.tcsetattr(self._file, termios.TCSANOW, mode)
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def fileno(self) -> int:
+        """Number of the open file."""
+        return self._file
+
+    def read(self) -> list[bytes]:
+        """The bytes that have arrived."""
+        try:
+            data = os.read(self._file, LONGEST)
+        except BlockingIOError:
+            return []
+        return [data] if data else []
+
+    def write(self, data: bytes) -> bool:
+        """Send bytes; what the line cannot take at once is dropped as a whole frame."""
+        try:
+            return os.write(self._file, data) == len(data)
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        """Close it."""
+        os.close(self._file)

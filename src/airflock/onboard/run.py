@@ -1,0 +1,179 @@
+"""Run a node: its sockets, its clock, its files. The only part on board that does input and output."""
+
+import argparse
+import asyncio
+import sys
+import time
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TextIO
+
+from airflock import atomic
+from airflock.errors import AirflockError, CardError, LinkError
+from airflock.mavlink.frames import Stream
+from airflock.mavlink.keys import read_key
+from airflock.onboard.card import Card, read_card
+from airflock.onboard.log import Logged, memory_text, read_memory
+from airflock.onboard.node import Node
+from airflock.onboard.ports import Port, Serial, open_port
+
+HELP = "Fly one member of a flock: this computer beside its autopilot. Nothing arms before the operator orders it."
+EXAMPLE = """example:
+  python -m airflock.onboard mission.json --member 3 --autopilot udp:127.0.0.1:14540 \\
+      --radio 'udp:0.0.0.0:14600>192.168.1.255:14600' --radio serial:/dev/ttyUSB0:57600 --i-am-the-pilot
+
+The first radio sends every safety.status_period, the others every safety.slow_period; what arrives by several counts
+once. A person with a transmitter must be able to take over each drone at any time."""
+SAVE = 1.0  # s between two writes of what outlives a restart
+
+
+def parser() -> argparse.ArgumentParser:
+    """Arguments of the command."""
+    found = argparse.ArgumentParser(
+        prog="python -m airflock.onboard", description=HELP, epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    found.add_argument("card", type=Path, help="flight card, written by `airflock fly prepare`")
+    found.add_argument("--member", type=int, required=True, help="system id of this drone")
+    found.add_argument("--autopilot", required=True, metavar="PORT", help="udp:HOST:PORT or serial:/dev/NAME:BAUD")
+    found.add_argument(
+        "--radio", action="append", required=True, metavar="PORT", help="radio to the others; repeatable"
+    )
+    found.add_argument("--key", type=Path, help="key of the mission (default: beside the card, ending .key)")
+    found.add_argument("--log", type=Path, help="log of the flight (default: beside the card, with the time)")
+    found.add_argument("--i-am-the-pilot", action="store_true", help="somebody holds the transmitter and may take over")
+    found.add_argument("--check", action="store_true", help="check card, key and ports, and stop")
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run; exit status 2 and one line per fault for whatever cannot be flown."""
+    given = parser().parse_args(arguments)
+    try:
+        return _run(given)
+    except AirflockError as fault:
+        for line in str(fault).splitlines():
+            sys.stderr.write(f"airflock: {line}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("airflock: stopped; the autopilot acts on lost setpoints by its own parameters\n")
+        return 2
+
+
+def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
+    """Card, key and open ports; all faults at once."""
+    faults: list[str] = []
+    card, key = None, b""
+    try:
+        card = read_card(given.card)
+        if given.member not in card.members:
+            faults.append(f"--member {given.member}: the card's members are {', '.join(map(str, card.members))}")
+        if time.time() >= card.expires:
+            faults.append(f"{given.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}")
+    except AirflockError as fault:
+        faults += str(fault).splitlines()
+    try:
+        key = read_key(given.key or given.card.with_suffix(".key"))
+    except AirflockError as fault:
+        faults += str(fault).splitlines()
+    if not given.i_am_the_pilot and not given.check:
+        faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
+                      "be able to take over each drone at any time")  # fmt: skip
+    if card is not None and find_spec("cryptography") is None:
+        sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
+    ports: list[Port] = []
+    for text in (given.autopilot, *given.radio):
+        try:
+            ports.append(open_port(text))
+        except AirflockError as fault:
+            faults += str(fault).splitlines()
+    if faults or card is None:
+        for port in ports:
+            port.close()
+        raise CardError(faults)
+    return card, key, ports
+
+
+def _run(given: argparse.Namespace) -> int:
+    card, key, ports = checked(given)
+    try:
+        if given.check:
+            sys.stdout.write(f"{given.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n")
+            return 0
+        stem = f"{given.card.stem}-{given.member}"
+        memory_file = given.card.with_name(f"{stem}.memory")
+        log_file = given.log or given.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
+        with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
+            asyncio.run(fly(card, given.member, key, ports, memory_file, log, say=_say))
+    except OSError as fault:
+        raise LinkError(f"{fault.filename or 'a port'}: {fault.strerror}") from fault
+    finally:
+        for port in ports:
+            port.close()
+    return 0
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()
+
+
+async def fly(
+    card: Card, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
+    say: Callable[[str], None], until: Callable[[], bool] = lambda: False,
+) -> None:  # fmt: skip
+    """Tick the node on the real clock, and pass bytes; the first port is the autopilot's."""
+    s, memory = card.safety, read_memory(memory_file)
+    radios = (s.status_period, *(s.slow_period,) * (len(ports) - 2))
+    now, utc = time.monotonic(), time.time_ns() // 1000
+    node = Node(card, member, key, now=now, utc=utc, memory=memory, radios=radios)
+
+    def write(line: str) -> None:
+        log.write(line + "\n")
+
+    logged = Logged(node, write, now=now, memory=memory, radios=radios)
+    loop = asyncio.get_running_loop()
+    loop.add_reader(ports[0].fileno(), _take, ports[0], logged.autopilot)
+    for port in ports[1:]:
+        loop.add_reader(port.fileno(), _take, port, _datagrams(port, logged.radio))
+    due, save_at = now, now
+    try:
+        while not until():
+            now = time.monotonic()
+            out = logged.tick(now)
+            for data in out.autopilot:
+                ports[0].write(data)
+            for port, datagrams in zip(ports[1:], out.radios, strict=True):
+                for datagram in datagrams:
+                    port.write(datagram)
+            for note in out.notes:
+                say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
+            if now >= save_at:
+                save_at = now + SAVE
+                atomic.write(memory_file, memory_text(node.memory))
+                log.flush()
+            due = max(due + s.tick, now)
+            await asyncio.sleep(max(0.0, due - time.monotonic()))
+    finally:
+        for port in ports:
+            loop.remove_reader(port.fileno())
+        atomic.write(memory_file, memory_text(node.memory))
+
+
+def _take(port: Port, hand: Callable[[bytes, float], None]) -> None:
+    for data in port.read():
+        hand(data, time.monotonic())
+
+
+def _datagrams(port: Port, hand: Callable[[bytes, float], None]) -> Callable[[bytes, float], None]:
+    """Hand on whole signed frames: a serial radio gives pieces of a stream, UDP gives datagrams."""
+    if not isinstance(port, Serial):
+        return hand
+    line = Stream()
+
+    def take(data: bytes, now: float) -> None:
+        for raw in line.raw(data):
+            hand(raw, now)
+
+    return take

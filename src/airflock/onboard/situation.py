@@ -1,0 +1,171 @@
+"""The situation: facts for the mission table from what wire, peers and operator know at one tick."""
+
+from typing import Any
+
+from airflock.core.agent import State
+from airflock.core.maths import norm
+from airflock.onboard.card import Card
+from airflock.onboard.mission import FLY, Facts, Phase
+from airflock.onboard.operator import Operator
+from airflock.onboard.peers import FRESH, Peers
+from airflock.onboard.wire import Wire
+
+SLOW = 0.5  # m/s; faster than this a drone does not begin to land
+ALIVE = 3.0  # s; an autopilot that says nothing for longer is not there
+GATHERED = (Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD)
+BY_MODE = frozenset({Phase.RETURN, Phase.LAND, Phase.DONE})
+
+
+class Timers:
+    """For how long each of some conditions has held, s; 0 where it does not hold."""
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}
+
+    def __call__(self, name: str, holds: bool, now: float) -> float:
+        """Time since the condition began to hold; just above 0 at first."""
+        if not holds:
+            self._since.pop(name, None)
+            return 0.0
+        return max(now - self._since.setdefault(name, now), 1e-9)
+
+
+def misses(card: Card, wire: Wire, peers: Peers, utc: int, now: float) -> tuple[str, ...]:
+    """What keeps a drone from arming, one line each."""
+    found = []
+    if utc >= card.expires * 1_000_000:
+        found.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
+    if not card.operator:
+        found.append("operator: the card names no key, so nobody could start or stop the drone")
+    found += _parameter_misses(card, wire) + _own_misses(card, wire, now) + _clock_misses(card, wire, peers)
+    return (*found, *_peer_misses(card, wire, peers, now))
+
+
+def _parameter_misses(card: Card, wire: Wire) -> list[str]:
+    """Parameters of the autopilot that are not told or not safe."""
+    found = []
+    for guard in card.autopilot.guards:
+        value = wire.parameters.get(guard.name)
+        if value is None:
+            found.append(f"{guard.name}: the autopilot has not told it")
+        elif not guard.low <= value <= guard.high:
+            found.append(f"{guard.name} = {value:g} lies outside [{guard.low:g}, {guard.high:g}]: {guard.why}")
+    return found
+
+
+def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
+    """What is wrong with the own position, battery or stand."""
+    s, found, own = card.safety, [], wire.state
+    if own is None or now - wire.state_at > s.stale:
+        found.append("no own position from the autopilot")
+    elif card.outside(own) > 0.0:
+        found.append(f"the drone is {card.outside(own):.0f} m outside the fence: is the card's site right?")
+    elif wire.disagreement(now) > s.jump:
+        found.append(f"local and global position of the autopilot differ by {wire.disagreement(now):.0f} m")
+    if wire.origin is None:
+        found.append("GPS_GLOBAL_ORIGIN: the autopilot has not told it")
+    if wire.fix < 3 or wire.h_acc > s.h_acc:
+        accuracy = f"accuracy {min(wire.h_acc, 999.0):.1f} m"
+        found.append(f"navigation: fix {wire.fix}, {accuracy}; needs a 3-D fix and {s.h_acc:g} m")
+    if wire.battery is None or wire.battery <= s.battery_low:
+        told = "not told" if wire.battery is None else f"{wire.battery:.0f} %"
+        found.append(f"battery: {told}; needs more than {s.battery_low:g} %")
+    if wire.landed is not True:
+        found.append("the autopilot does not say that it stands on the ground")
+    return found
+
+
+def _clock_misses(card: Card, wire: Wire, peers: Peers) -> list[str]:
+    """Whether the own clock is known and right."""
+    offset = wire.clock_offset()
+    if offset is None:
+        return ["SYSTEM_TIME: the autopilot has not told the time"]
+    if abs(offset) > card.safety.clock_error:
+        return [f"clock: {offset:+.2f} s off the autopilot's; at most {card.safety.clock_error:g} s"]
+    return ["clock: it is off the clocks of all others"] if peers.clocks_suspect() else []
+
+
+def _peer_misses(card: Card, wire: Wire, peers: Peers, now: float) -> list[str]:
+    """Who is not heard, flies another card, or stands too near."""
+    found = []
+    for who, peer in peers.all.items():
+        if peer.other_card:
+            found.append(f"drone {who} flies another card")
+        elif now - peer.heard_at > FRESH:
+            found.append(f"drone {who} is not heard")
+        elif wire.state is not None and peer.state is not None:
+            distance = apart(wire.state, peer.state)
+            if distance < card.safety.start_apart:
+                found.append(f"drone {who} stands {distance:.1f} m away; needs {card.safety.start_apart:g} m")
+    return found
+
+
+def apart(a: State, b: State) -> float:
+    """Distance of two states, m."""
+    return float(norm(a.x - b.x, a.y - b.y, a.z - b.z))
+
+
+def boot_fault(card: Card, member: int, wire: Wire, twin: bool) -> str:
+    """What can never fit; empty if nothing is wrong."""
+    if wire.kind is not None and wire.kind != card.autopilot.number:
+        return f"the autopilot is of kind {wire.kind}; the card is for {card.autopilot.name} ({card.autopilot.number})"
+    if wire.kind is None and wire.strangers:
+        told = ", ".join(map(str, sorted(wire.strangers)))
+        return f"the autopilot calls itself system {told}; this drone is member {member}"
+    return f"another sender signs as member {member}: two drones with one number?" if twin else ""
+
+
+def facts(
+    card: Card, member: int, phase: Phase, wire: Wire, peers: Peers, operator: Operator, timers: Timers, utc: int,
+    now: float, **more: Any,
+) -> Facts:  # fmt: skip
+    """Everything that the mission table asks for, at one tick; `more` is what only the node knows."""
+    s, own = card.safety, wire.state
+    home: tuple[float, float, float] | None = more.pop("home")
+    age = now - wire.state_at
+    alive = now - wire.heartbeat_at <= ALIVE
+    gnss_bad = wire.fix < 3 or wire.h_acc > s.h_acc or now - wire.jumped_at < 1.0 or wire.disagreement(now) > s.jump
+    flying = peers.flying()
+    expected = min(s.peers_least, len([p for p in flying.values() if p.phase not in BY_MODE]))
+    fresh = {who: p for who, p in flying.items() if now - p.heard_at <= FRESH}
+    offset = wire.clock_offset()
+    clock_bad = (offset is not None and abs(offset) > s.clock_error) or peers.clocks_suspect()
+    way = 0.0 if own is None or home is None else apart(own, State(*home, 0.0, 0.0, 0.0))
+    battery = 100.0 if wire.battery is None else wire.battery
+    position_bad = timers("position", not age <= s.stale or not alive, now)
+    gnss_for = timers("gnss", gnss_bad, now)
+    few_for = timers("few", peers.heard(now) < expected, now)
+    deaf_for = timers("deaf", bool(flying) and not fresh, now)
+    clock_for = timers("clock", clock_bad, now)
+    out = own is not None and phase in FLY and card.outside(own) > 0.0
+    near = [p.state for p in fresh.values() if p.state is not None]
+    neighbour_near = own is not None and any(apart(own, other) < s.near for other in near)
+    operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
+    calm = not (position_bad or gnss_for or few_for or clock_for or neighbour_near or more["overload"])
+    calm = calm and not (operator_lost and s.operator_lost == "hold")
+    told = misses(card, wire, peers, utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
+    layer = card.layer(member)
+    at_home = False
+    if own is not None and home is not None:
+        over = norm(own.x - home[0], own.y - home[1], 0.0) < s.home_radius and abs(own.z - layer) < 1.0
+        at_home = over and norm(own.vx, own.vy, 0.0) < SLOW
+    return Facts(
+        mode_ours=wire.mode == card.autopilot.ours, mode_land=wire.mode == card.autopilot.land,
+        armed=bool(wire.armed), landed=bool(wire.landed), healthy=not (position_bad or gnss_for),
+        killed=operator.killed, resume=operator.resume, held=operator.held, position_bad_for=position_bad,
+        gnss_bad_for=gnss_for, battery_critical=battery < s.battery_critical,
+        battery_home=battery < s.battery_low + s.battery_way * way * 1e-3,
+        outside_for=timers("outside", out, now), deaf_for=deaf_for, few_for=few_for, clock_bad_for=clock_for,
+        operator_lost=operator_lost, present=alive and wire.kind == card.autopilot.number and wire.armed is not None,
+        fault=boot_fault(card, member, wire, more.pop("twin")), misses=told,
+        due=operator.due(utc, s.start_step * card.members.index(member)),
+        at_layer=own is not None and abs(own.z - layer) < 0.5, climbing=own is not None and own.vz > 0.2,
+        neighbour_near=neighbour_near,
+        gathered=own is not None and all(
+            now - p.heard_at <= FRESH and p.phase in GATHERED and p.state is not None and apart(own, p.state) < s.gather
+            for p in peers.all.values()
+        ),
+        joined=peers.joined, calm_for=timers("calm", calm, now),
+        at_home=at_home,
+        **more,
+    )  # fmt: skip

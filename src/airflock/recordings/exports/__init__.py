@@ -1,0 +1,1 @@
+"""Recordings for other tools: CSV, Parquet, and netCDF in both layouts of `movement`."""

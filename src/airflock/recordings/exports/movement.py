@@ -1,0 +1,36 @@
+"""Recordings as datasets of `movement`, in the layout of today and of until version 0.16."""
+
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from airflock import atomic
+from airflock.recordings.layout import DIMENSIONS, check
+
+PLURAL = {"keypoint": "keypoints", "individual": "individuals"}
+
+
+def to_movement(recording: xr.Dataset, *, old: bool = False) -> xr.Dataset:
+    """Dataset with position and confidence, (time, space, keypoint, individual), and the attributes of poses.
+
+    old : the dimensions keypoints and individuals, as `movement` up to 0.16 asks for
+    """
+    check(recording)
+    found = recording[["position"]].transpose(*DIMENSIONS)
+    if "confidence" in recording:
+        found["confidence"] = recording["confidence"].transpose("time", "keypoint", "individual")
+    else:
+        found["confidence"] = found["position"].isel(space=0, drop=True).notnull().astype("float32")
+    kept = ("fps", "source_file")
+    found.attrs = {
+        "ds_type": "poses", "source_software": "airflock", "time_unit": "seconds",
+        **{name: recording.attrs[name] for name in kept if name in recording.attrs},
+    }  # fmt: skip
+    return found.rename(PLURAL) if old else found
+
+
+def write_movement(recording: xr.Dataset, path: str | os.PathLike[str], *, old: bool = False) -> Path:
+    """Write such a dataset as netCDF."""
+    atomic.write(path, to_movement(recording, old=old).to_netcdf(None, engine="h5netcdf"))
+    return Path(path)

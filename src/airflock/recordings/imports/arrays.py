@@ -1,0 +1,99 @@
+"""Arrays: NumPy (frame, individual, axis), .npy and .npz without pickles, trajectories.h5 of idtracker.ai."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports import headers
+from airflock.recordings.imports.track import POSITION, Findings, Options, Track
+
+PLAIN = "idtrackerai_format SESSION --formats h5 writes plain numbers; or, if you trust the file, python -c "
+COMMAND = "\"import numpy as np; np.save('plain.npy', np.load('FILE', allow_pickle=True).item()['trajectories'])\""
+
+
+def read_array(
+    array: Any, options: Options, where: str = "array", names: list[str] | None = None, fps: float | None = None
+) -> list[Track]:
+    """Tracks of an array (frame, individual, 2 or 3); nan where an individual is not there."""
+    values = np.asarray(array)
+    if values.dtype == object or values.dtype.kind not in "fiu":
+        raise RecordingError(f"{where}: holds Python objects, which could run code when read; {PLAIN}{COMMAND}")
+    if values.ndim == 2 and values.shape[1] in (2, 3):
+        values = values[:, None, :]
+    if values.ndim != 3 or values.shape[2] not in (2, 3):
+        raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
+    rate = options.fps or fps
+    if rate is None:
+        raise RecordingError(f"{where}: counts frames; say how many a second: --fps 25")
+    if not options.unit:
+        raise RecordingError(f"{where}: has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m")
+    scale = headers.factor("x", "", where, options)
+    frames = np.arange(len(values))
+    found = []
+    for number in range(values.shape[1]):
+        own = values[:, number].astype(float) * scale
+        there = np.isfinite(own).all(axis=1)
+        columns = {axis: own[there, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
+        name = names[number] if names else str(number + 1)
+        found.append(Track(name, where, frames[there] / rate, columns, frames[there]))
+    found = [track for track in found if len(track.time)]
+    if not found:
+        raise RecordingError(f"{where}: every position is missing")
+    return found
+
+
+def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
+    """Tracks of a .npy or .npz file of plain numbers."""
+    refuse_pickle(path)
+    with path.open("rb") as file:
+        start = file.read(6)
+    if start != b"\x93NUMPY" and start[:2] != b"PK":
+        raise RecordingError(f"{path}: is no array that NumPy wrote")
+    try:
+        with open(path, "rb") as file:
+            loaded = np.load(file, allow_pickle=False)
+            if isinstance(loaded, np.lib.npyio.NpzFile):
+                names = [n for n in loaded.files if n in ("trajectories", "position", "tracks")] or loaded.files[:1]
+                loaded = loaded[names[0]]
+    except (ValueError, OSError, EOFError) as fault:
+        text = str(fault).splitlines()[0]
+        if "allow_pickle" in text or "pickle" in text.lower():
+            raise RecordingError(_pickled(path)) from fault
+        raise RecordingError(f"{path}: is no array of numbers: {text}") from fault
+    return read_array(loaded, options, str(path))
+
+
+def refuse_pickle(path: Path) -> None:
+    """Raise a RecordingError for a file of pickled objects."""
+    with path.open("rb") as file:
+        start = file.read(2)
+    if path.suffix.lower() in (".pkl", ".pickle") or (start[:1] == b"\x80" and start[1:2] in b"\x02\x03\x04\x05"):
+        raise RecordingError(_pickled(path))
+
+
+def _pickled(path: Path) -> str:
+    return f"{path}: holds pickled Python objects, which could run code when read; {PLAIN}{COMMAND}".replace(
+        "FILE", path.name
+    )
+
+
+def read_idtracker(path: Path, options: Options, findings: Findings) -> list[Track]:
+    """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        if "trajectories" not in file:
+            shown = ", ".join(list(file)[:8]) or "nothing"
+            raise RecordingError(f"{path}: has no dataset trajectories, as idtracker.ai writes; it has {shown}")
+        values = np.asarray(file["trajectories"])
+        told = {**{k: v[()] for k, v in file.items() if v.shape == ()}, **dict(file.attrs)}
+    fps = float(told["frames_per_second"]) if "frames_per_second" in told else None
+    body = told.get("body_length")
+    if body is not None and np.ndim(body) == 0:
+        findings.notes.append(f"{path}: idtracker.ai gives a body length of {float(body):g} px")
+    labels = told.get("identities_labels")
+    given = [] if labels is None else [str(name) for name in np.atleast_1d(labels)]
+    names = given if len(given) == values.shape[1] else None
+    return read_array(values, options, str(path), names, fps)

@@ -1,0 +1,186 @@
+"""Which columns of a table hold what: by --map, or by their headers; and their values in SI units."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports import expressions, headers
+from airflock.recordings.imports.track import COMMAND, POSITION, TARGETS, VELOCITY, Options
+
+MOST_COLUMNS = 2000
+OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
+
+
+@dataclass
+class Layout:
+    """How a table is read: target → tree and factor; the column of names; what to tell the user."""
+
+    where: str
+    trees: dict[str, Any] = field(default_factory=dict)
+    factors: dict[str, float] = field(default_factory=dict)
+    labels: dict[str, str] = field(default_factory=dict)
+    id: str = ""  # a column, or "" where the whole file is one individual
+    datum: str = ""
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def used(self) -> list[str]:
+        """Columns that are needed."""
+        found = [name for tree in self.trees.values() for name in expressions.names(tree)]
+        return list(dict.fromkeys(found + ([self.id] if self.id else [])))
+
+    def values(self, table: Mapping[str, NDArray[np.float64]], count: int) -> dict[str, NDArray[np.float64]]:
+        """Targets in SI units."""
+        return {
+            target: np.broadcast_to(self.factors[target] * expressions.value(tree, table), count).astype(float)
+            for target, tree in self.trees.items()
+        }
+
+
+def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
+    """Layout of a table with these columns; raises RecordingError with every fault."""
+    if len(columns) > MOST_COLUMNS:
+        raise RecordingError(
+            f"{where}: {len(columns)} columns are more than {MOST_COLUMNS}; "
+            "give a long table with the columns id, t, x, y"
+        )
+    twice = [name for i, name in enumerate(columns) if name in columns[:i]]
+    if twice:
+        raise RecordingError(f"{where}: column {twice[0]} appears twice; rename one of them")
+    found, faults = Layout(where), []
+    for step in (_mapped, _recognised):
+        try:
+            step(found, columns, options)
+        except RecordingError as fault:
+            faults += str(fault).splitlines()
+    if not faults:
+        _frames(found, options, faults)
+        _complete(found, columns, faults)
+    if faults:
+        raise RecordingError("\n".join(faults))
+    _ned(found, options)
+    return found
+
+
+def _mapped(found: Layout, columns: Sequence[str], options: Options) -> None:
+    faults = []
+    for target, text in options.map.items():
+        try:
+            if target not in TARGETS:
+                near = get_close_matches(target, TARGETS, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(TARGETS)}"
+                raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
+            if target == "id" and text.strip() == "file":
+                continue
+            tree = expressions.parsed(text, target)
+            expressions.known(tree, columns, found.where, target)
+            if target == "id":
+                found.id = expressions.bare(tree)
+                if not found.id:
+                    raise RecordingError(f"--map id:={text}: give one column, or file")
+                continue
+            one = expressions.bare(tree)
+            told = headers.meaning(one) if one else None
+            unit = told.unit if told is not None and told.target == target else (headers.split(one)[1] if one else "")
+            found.trees[target], found.labels[target] = tree, text.strip()
+            alone = bool(one)
+            found.factors[target] = headers.factor(target, unit, found.where, options) if alone else 1.0
+            if target == "alt" and told is not None:
+                found.datum = told.datum
+        except RecordingError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise RecordingError("\n".join(faults))
+
+
+def _recognised(found: Layout, columns: Sequence[str], options: Options) -> None:
+    faults, unsaid = [], []
+    for column in columns:
+        told = headers.meaning(column)
+        if told is None or told.target in found.trees:
+            continue
+        if told.target == "id":
+            if not found.id and options.map.get("id", "").strip() != "file":
+                found.id = column
+            continue
+        if told.target in options.map:
+            continue
+        try:
+            scale = headers.factor(told.target, told.unit, f"{found.where}: column {column}", options)
+        except RecordingError as fault:
+            faults.append(str(fault))
+            continue
+        found.trees[told.target] = expressions.parsed(repr(column), told.target)
+        found.factors[told.target] = told.sign * scale
+        found.labels[told.target] = column
+        found.datum = told.datum or found.datum
+        if told.target in POSITION and not told.unit and not options.unit:
+            unsaid.append(column)
+    if faults:
+        raise RecordingError("\n".join(faults))
+    if unsaid:
+        tracker = [c for c in columns if headers.split(c)[0] in OF_A_TRACKER]
+        if tracker:
+            raise RecordingError(
+                f"{found.where}: column {unsaid[0]} has no unit, and {tracker[0]} tells of a tracker; "
+                "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
+            )
+        found.notes.append(f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; otherwise --unit mm")
+
+
+def _frames(found: Layout, options: Options, faults: list[str]) -> None:
+    """Time from numbers of frames, where there is no other."""
+    counted = options.time_unit == "frames" and "t" in found.trees
+    if "t" not in found.trees and "frame" in found.trees:
+        _copy(found, "frame", "t")
+        counted = True
+    if counted:
+        if options.fps is None:
+            faults.append(f"{found.where}: column {found.labels['t']} counts frames; say how many a second: --fps 25")
+        else:
+            found.factors["t"] = 1.0 / options.fps
+    _drop(found, "frame")
+
+
+def _complete(found: Layout, columns: Sequence[str], faults: list[str]) -> None:
+    shown = ", ".join(list(columns)[:12]) + (", ..." if len(columns) > 12 else "")
+    if "t" not in found.trees and "utc" not in found.trees:
+        faults.append(f"{found.where}: no column of times among {shown}; write for instance --map t:=COLUMN")
+    local = all(name in found.trees for name in POSITION[:2])
+    geodetic = all(name in found.trees for name in ("lat", "lon"))
+    if not (local or geodetic):
+        faults.append(f"{found.where}: no position among {shown}; write for instance --map x:=COLUMN --map y:=COLUMN")
+    for part in (VELOCITY, COMMAND):
+        if sum(name in found.trees for name in part[:2]) == 1:
+            there = next(name for name in part[:2] if name in found.trees)
+            lacks = next(name for name in part[:2] if name not in found.trees)
+            faults.append(f"{found.where}: has {there} ({found.labels[there]}) but no {lacks}; --map {lacks}:=COLUMN")
+
+
+def _ned(found: Layout, options: Options) -> None:
+    """Swap north and east and turn z over, where the user says that x is north."""
+    if options.axes != "ned":
+        return
+    for first, second, third in (POSITION, VELOCITY, COMMAND):
+        if first in found.trees and second in found.trees:
+            _copy(found, first, "")
+            _copy(found, second, first)
+            _copy(found, "", second)
+        if third in found.factors:
+            found.factors[third] = -found.factors[third]
+    _drop(found, "")
+
+
+def _copy(found: Layout, source: str, target: str) -> None:
+    found.trees[target], found.factors[target] = found.trees[source], found.factors[source]
+    found.labels[target] = found.labels[source]
+
+
+def _drop(found: Layout, target: str) -> None:
+    for table in (found.trees, found.factors, found.labels):
+        table.pop(target, None)  # type: ignore[attr-defined]

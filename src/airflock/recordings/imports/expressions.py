@@ -1,0 +1,71 @@
+"""Expressions of column names: + - * / and parentheses, parsed and never evaluated as Python."""
+
+import ast
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+
+LONGEST = 300  # characters; nothing that a column needs is longer
+OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
+ALLOWED = "column names, numbers, + - * / and parentheses; a name with blanks stands in quotes"
+
+
+def parsed(text: str, target: str) -> ast.expr:
+    """Tree of an expression; raises RecordingError for anything but arithmetic of columns."""
+    if len(text) > LONGEST:
+        raise RecordingError(f"--map {target}:=...: has {len(text)} characters, more than {LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as fault:
+        raise RecordingError(f"--map {target}:={text}: cannot be read; it may hold {ALLOWED}") from fault
+    for node in ast.walk(tree):
+        number = isinstance(node, ast.Constant) and type(node.value) in (int, float, str)
+        sign = isinstance(node, (ast.UnaryOp, ast.USub, ast.UAdd))
+        word = isinstance(node, (ast.Name, ast.Load, ast.BinOp, *OPERATIONS))
+        if not (number or sign or word):
+            raise RecordingError(f"--map {target}:={text}: {type(node).__name__} is not allowed; it may hold {ALLOWED}")
+    return tree
+
+
+def names(tree: ast.expr) -> list[str]:
+    """Columns that an expression asks for."""
+    found = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    return found + [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+
+
+def bare(tree: ast.expr) -> str:
+    """The column, if an expression is nothing but one; else empty."""
+    return names(tree)[0] if isinstance(tree, ast.Name) or _text(tree) else ""
+
+
+def _text(tree: ast.expr) -> bool:
+    return isinstance(tree, ast.Constant) and isinstance(tree.value, str)
+
+
+def known(tree: ast.expr, columns: Any, where: str, target: str) -> None:
+    """Raise a RecordingError if an expression asks for a column that is not there."""
+    for name in names(tree):
+        if name not in columns:
+            near = get_close_matches(name, [str(c) for c in columns], n=1, cutoff=0.4)
+            shown = ", ".join(str(c) for c in list(columns)[:12])
+            hint = f"did you mean {near[0]}?" if near else f"it has {shown}"
+            raise RecordingError(f"{where}: --map {target}: no column {name}; {hint}")
+
+
+def value(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
+    """An expression with arrays in the place of names."""
+    if isinstance(tree, ast.BinOp):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return OPERATIONS[type(tree.op)](value(tree.left, columns), value(tree.right, columns))  # type: ignore[index]
+    if isinstance(tree, ast.UnaryOp):
+        inner = value(tree.operand, columns)
+        return -inner if isinstance(tree.op, ast.USub) else inner
+    if isinstance(tree, ast.Name):
+        return columns[tree.id]
+    assert isinstance(tree, ast.Constant)
+    return columns[tree.value] if isinstance(tree.value, str) else float(tree.value)  # type: ignore[arg-type]

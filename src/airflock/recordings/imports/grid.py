@@ -1,0 +1,132 @@
+"""Tracks on one grid of times: gaps bridged up to a stated length, otherwise absent (nan)."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports.checks import period_of
+from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
+from airflock.recordings.layout import DIMENSIONS, UNITS
+
+MOST = 2_000_000_000  # numbers of one recording
+NORMAL = 1.5  # times the usual step: longer is a gap
+
+
+def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: float | None) -> tuple[Any, float]:
+    """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given."""
+    usual = [period_of(track) for track in tracks if len(track.time) > 1]
+    period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
+    if not rate:
+        period = float(f"{period:.4g}")
+    first = min(track.time[0] for track in tracks) if begin is None else begin
+    last = max(track.time[-1] for track in tracks) if end is None else end
+    if last < first:
+        raise RecordingError(f"no rows between {first:g} and {last:g} s")
+    count = int(np.floor((last - first) / period + 1e-6)) + 1
+    if count * len(tracks) * 6 > MOST:
+        raise RecordingError(
+            f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
+        )
+    return first + np.arange(count) * period, period
+
+
+def recording(
+    tracks: list[Track], times: NDArray[np.float64], period: float, bridge: float, precision: int
+) -> tuple[xr.Dataset, dict[str, float]]:
+    """Dataset of the tracks at the given times, and shares: presence, bridged.
+
+    bridge : longest gap (s) that is bridged, by cubic Hermite with the velocities at its ends
+    """
+    axes = 3 if any("z" in track.columns for track in tracks) else 2
+    kind = np.float32 if precision == 32 else np.float64
+    shape = (len(times), axes, len(tracks))
+    commanded = any(track.has(COMMAND) for track in tracks)
+    place, speed = np.full(shape, np.nan, kind), np.full(shape, np.nan, kind)
+    wish = np.full(shape, np.nan, kind) if commanded else None
+    sure = np.zeros((len(times), len(tracks)), np.float32)
+    for who, track in enumerate(tracks):
+        _fill(track, who, times, period, bridge, place, speed, wish, sure)
+        if len(tracks) > 1:
+            track.columns = {}  # a long log is in memory once
+    variables: dict[str, Any] = {
+        "position": (DIMENSIONS, place[:, :, None, :], {"units": UNITS["position"]}),
+        "velocity": (DIMENSIONS, speed[:, :, None, :], {"units": UNITS["velocity"]}),
+        "confidence": (("time", "keypoint", "individual"), sure[:, None, :]),
+    }
+    if wish is not None:
+        variables["command"] = (DIMENSIONS, wish[:, :, None, :], {"units": "m/s"})
+    coordinates = {
+        "time": ("time", times - times[0], {"units": "s"}),
+        "space": list("xyz"[:axes]),
+        "keypoint": ["centre"],
+        "individual": [track.name for track in tracks],
+    }
+    attributes = {"ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds", "airflock_begin": float(times[0])}
+    shares = {"present": float((sure > 0.0).mean()), "bridged": float((sure == 0.5).mean())}
+    return xr.Dataset(variables, coordinates, attributes), shares
+
+
+def _fill(
+    track: Track, who: int, times: Any, period: float, bridge: float, place: Any, speed: Any, wish: Any, sure: Any
+) -> None:
+    axes = place.shape[1]
+    own, usual = track.time, period_of(track) or period
+    rows = track.stack(POSITION, axes)
+    at = np.searchsorted(own, times + 1e-6 * period, side="right") - 1
+    inside = (at >= 0) & (times <= own[-1] + 1e-6 * period)
+    before = np.clip(at, 0, max(len(own) - 2, 0))
+    after = np.minimum(before + 1, len(own) - 1)
+    step = own[after] - own[before]
+    part = np.where(step > 0.0, (times - own[before]) / np.where(step > 0.0, step, 1.0), 0.0)
+    on_row = (np.abs(times - own[np.clip(at, 0, None)]) < 1e-3 * min(period, usual)) & inside
+    broken = np.isin(after, track.breaks)
+    normal = inside & (step <= NORMAL * usual) & ~broken
+    bridged = inside & (step <= max(bridge, NORMAL * usual)) & ~broken
+    good = on_row | bridged
+    if track.air is not None:
+        good &= track.air[before] & track.air[after]
+    logged = track.has(VELOCITY)
+    slopes = _slopes(own, rows, track.breaks, usual)
+    for c, name in enumerate(VELOCITY[:axes] if logged else ()):
+        slopes[:, c] = track.columns.get(name, slopes[:, c])  # a height without a climb rate is differentiated
+    p, v = _hermite(rows, slopes, before, after, step, part)
+    if logged:  # between two rows the logged velocity itself, not the slope of the curve through the positions
+        v = slopes[before] + part[:, None] * (slopes[after] - slopes[before])
+    same = np.clip(at, 0, None)
+    p, v = np.where(on_row[:, None], rows[same], p), np.where(on_row[:, None], slopes[same], v)
+    place[:, :, who] = np.where(good[:, None], p, np.nan)
+    speed[:, :, who] = np.where(good[:, None], v, np.nan)
+    sure[:, who] = np.where(good, np.where(on_row | normal, 1.0, 0.5), 0.0)
+    if wish is not None and track.has(COMMAND):
+        unsaid = np.full(len(own), np.nan)
+        ask = np.stack([track.columns.get(name, unsaid) for name in COMMAND[:axes]], axis=1)
+        held = ask[same]  # a command holds until the next one
+        wish[:, :, who] = np.where((on_row | normal)[:, None] & good[:, None], held, np.nan)
+
+
+def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
+    """Velocities from positions: central differences within each unbroken stretch."""
+    found = np.zeros_like(rows)
+    gaps = np.flatnonzero(np.diff(times) > 5.0 * usual) + 1
+    edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
+    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        if end - begin > 1:
+            found[begin:end] = np.gradient(rows[begin:end], times[begin:end], axis=0)
+        else:
+            found[begin:end] = np.nan
+    return found
+
+
+def _hermite(rows: Any, slopes: Any, before: Any, after: Any, step: Any, part: Any) -> tuple[Any, Any]:
+    """Cubic through two points with given slopes: position and velocity."""
+    s, h = part[:, None], step[:, None]
+    p0, p1, m0, m1 = rows[before], rows[after], slopes[before] * h, slopes[after] * h
+    place = (
+        (2 * s**3 - 3 * s**2 + 1) * p0 + (s**3 - 2 * s**2 + s) * m0 + (3 * s**2 - 2 * s**3) * p1 + (s**3 - s**2) * m1
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        speed = ((6 * s**2 - 6 * s) * (p0 - p1) + (3 * s**2 - 4 * s + 1) * m0 + (3 * s**2 - 2 * s) * m1) / h
+    return place, speed

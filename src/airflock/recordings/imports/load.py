@@ -1,0 +1,248 @@
+"""The door: files, tables and arrays of others become a recording, or one line for everything that is wrong."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports import (
+    arrays,
+    checks,
+    clocks,
+    geodesy,
+    grid,
+    headers,
+    motion,
+    movement,
+    registry,
+    tables,
+)
+from airflock.recordings.imports.track import (
+    ACCEPTED,
+    GEODETIC,
+    POSITION,
+    VELOCITY,
+    Findings,
+    Options,
+    Track,
+    nothing,
+)
+
+
+def load_tracks(
+    what: Any,
+    *,
+    map: Mapping[str, str] | None = None,
+    unit: str = "",
+    scale: float | None = None,
+    time_unit: str = "",
+    fps: float | None = None,
+    keypoint: str = "",
+    axes: str = "enu",
+    origin: tuple[float, float, float] | None = None,
+    rate: float | None = None,
+    bridge: float = 1.0,
+    begin: float | None = None,
+    end: float | None = None,
+    same_clock: bool = False,
+    accept: Iterable[str] = (),
+    decimal: str = ".",
+    delimiter: str = "",
+    precision: int = 32,
+    say: Callable[[str], None] | None = None,
+    done: Callable[[float], None] = nothing,
+) -> xr.Dataset:
+    """Recording made of tracks of others: flight logs and animals.
+
+    what       : a file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a pandas DataFrame, an xarray
+                 Dataset of `movement`, or an array (frame, individual, 2 or 3)
+    map        : target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are
+                 t, x, y, z (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m),
+                 utc (s since 1970), air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`
+    unit, scale : of lengths that bring none: m, cm, mm, km, ft, or px with `scale` metres per pixel
+    time_unit, fps : s, ms, us, ns, min, or frames with `fps` frames per second
+    keypoint   : which one, where there are several
+    axes       : enu, or ned where x is north and z down
+    origin     : latitude, longitude (degrees), height (m) of the local frame; by default the first fix
+    rate       : frames per second of the recording; by default the tracks' own
+    bridge     : longest gap that is bridged, s (confidence 0.5); where a gap is longer, an individual is absent (nan)
+    begin, end : window of time, s
+    same_clock : the clocks of several files agree
+    accept     : kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time
+    precision  : 32 or 64 bits per number
+    say, done  : called with each note, and with the share that has been read
+    Returns a Dataset (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated
+    where it is not logged), command (m/s) where logged, confidence. Raises RecordingError, one line per fault.
+    """
+    options = Options(
+        map=dict(map or {}), unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint, axes=axes,
+        decimal=decimal, delimiter=delimiter, done=done,
+    )  # fmt: skip
+    numbers = {"rate": rate, "bridge": bridge, "begin": begin, "end": end}
+    findings = Findings(frozenset(accept))
+    _sound(options, findings, numbers, precision)
+    tracks, comparable = read_tracks(what, options, findings, origin=origin, same_clock=same_clock)
+    if begin is not None or end is not None:
+        tracks = cut(tracks, begin, end)
+    checks.check_presence(tracks, findings)
+    findings.refuse()
+    if not all(track.has(VELOCITY) for track in tracks):
+        findings.notes.append("no velocity: differentiated from positions; axes and units could not be checked by it")
+    times, period = grid.grid_of(tracks, rate, begin, end)
+    sources = sorted({track.source for track in tracks})
+    found, shares = grid.recording(tracks, times, period, bridge, precision)
+    absent = 1.0 - shares["present"]
+    findings.notes.append(
+        f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
+        f"{absent:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
+    )
+    if found.sizes["individual"] > 1 and period > 0.05:
+        findings.notes.append(f"nearest distances between frames {period:.3g} s apart are upper bounds")
+    found.attrs |= {
+        "source_software": "airflock import", "source_file": ", ".join(sources), "airflock_comparable": int(comparable),
+        "airflock_import": json.dumps({"notes": findings.notes}),
+    }  # fmt: skip
+    if say is not None:
+        for note in findings.notes:
+            say(note)
+    return found
+
+
+def read_tracks(
+    what: Any,
+    options: Options,
+    findings: Findings,
+    *,
+    origin: tuple[float, float, float] | None = None,
+    same_clock: bool = False,
+) -> tuple[list[Track], bool]:
+    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
+    tracks = _read(what, options, findings)
+    findings.refuse()
+    for track in tracks:
+        checks.check_time(track, findings)
+    checks.check_names(tracks, findings)
+    checks.check_heights(tracks, findings)
+    _to_metres(tracks, origin, findings)
+    findings.refuse()
+    motion.check_axes(tracks, findings)
+    findings.refuse()
+    for track in tracks:
+        motion.check_jumps(track, findings)
+        checks.note_steps(track, findings)
+    comparable = clocks.align(tracks, same_clock, findings)
+    findings.refuse()
+    return tracks, comparable
+
+
+def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Track]:
+    """Tracks between two times, s; those that have none of it are left out."""
+    low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+    for track in tracks:
+        track.keep((track.time >= low) & (track.time <= high))
+    there = [track for track in tracks if len(track.time)]
+    if not there:
+        raise RecordingError(f"no rows between {low:g} and {high:g} s")
+    return there
+
+
+def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
+    if isinstance(what, pd.DataFrame):
+        return tables.read_frame(what, options, findings)
+    if isinstance(what, xr.Dataset):
+        return movement.read_dataset(what, options)
+    if isinstance(what, np.ndarray):
+        return arrays.read_array(what, options)
+    if isinstance(what, (str, os.PathLike)):
+        what = [what]
+    try:
+        files = [Path(name) for name in what]
+    except TypeError as fault:
+        raise RecordingError(
+            f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"
+        ) from fault
+    if not files:
+        raise RecordingError("no files to import")
+    tracks = []
+    for path in files:
+        try:
+            tracks += registry.read(path, options, findings)
+        except RecordingError as fault:
+            findings.faults += str(fault).splitlines()
+        options.done(1.0)
+    return tracks
+
+
+def _sound(options: Options, findings: Findings, numbers: Mapping[str, float | None], precision: int) -> None:
+    """Refuse options that cannot be meant, all at once."""
+    faults = findings.faults
+    known = {"unit": ("", *headers.LENGTHS, *headers.PIXELS), "time_unit": ("", *headers.TIMES, "frames")}
+    for name, allowed in {**known, "axes": ("enu", "ned"), "decimal": (".", ",")}.items():
+        value = getattr(options, name)
+        if value not in allowed:
+            faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
+    for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
+        if number is not None and not 0.0 < number < 1e9:
+            faults.append(f"{name} = {number:g} must be above 0")
+    if not 0.0 <= (numbers["bridge"] or 0.0) < 1e9:
+        faults.append(f"bridge = {numbers['bridge']:g} s must be 0 or more")
+    if precision not in (32, 64):
+        faults.append(f"precision = {precision} is none of 32, 64")
+    faults += [f"accept = {kind} is none of {', '.join(ACCEPTED)}" for kind in findings.accept if kind not in ACCEPTED]
+    findings.refuse()
+
+
+def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, findings: Findings) -> None:
+    """Rule 3: latitude and longitude to local metres, and all frames about one origin."""
+    geodetic = [t for t in tracks if "x" not in t.columns]
+    placed = [t for t in tracks if "x" in t.columns and t.origin is not None]
+    free = [t for t in tracks if "x" in t.columns and t.origin is None]
+    if free and (geodetic or placed):
+        findings.fault(
+            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them apart"
+        )
+        return
+    if origin is None and placed:
+        origin = placed[0].origin
+    for track in geodetic:
+        lat, lon = track.columns["lat"], track.columns["lon"]
+        height = track.columns.get("alt", np.zeros(len(lat)))
+        bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
+        if bad.size:
+            name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
+            findings.fault(
+                f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
+                f"latitude and longitude; if it is in 1e-7 degrees, write lat:={track.label('lat')}*1e-7"
+            )
+            continue
+        if not len(lat):
+            continue
+        if origin is None:
+            origin = (float(lat[0]), float(lon[0]), float(height[0]))
+            findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
+        local = geodesy.enu(lat, lon, height, origin)
+        track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
+        flat = "alt" not in track.labels
+        track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[: 2 if flat else 3])}
+        track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
+        track.origin = origin
+    for track in placed:
+        assert origin is not None and track.origin is not None
+        if track.origin == origin:
+            continue
+        for names, change in (
+            (POSITION, geodesy.moved),
+            (VELOCITY, geodesy.turned),
+            (("cx", "cy", "cz"), geodesy.turned),
+        ):
+            if track.has(names):
+                change = geodesy.moved if names is POSITION else geodesy.turned
+                moved = change(track.stack(names, 3), track.origin, origin)
+                track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
+        track.origin = origin

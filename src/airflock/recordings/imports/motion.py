@@ -1,0 +1,179 @@
+"""Checks of motion: axes, signs and units by velocity (rule 2), resets (5) and outliers (6)."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.recordings.imports.checks import period_of
+from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
+
+Array = NDArray[np.float64]
+LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
+TOLERANCE = 0.1  # of a slope that should be 1
+SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
+REASONS = {
+    1e-6: "the time counts microseconds: write t:={t}*1e-6",
+    1e-3: "the time counts milliseconds (or microseconds are named ms): write t:={t}*1e-3",
+    1e3: "positions are in mm, or the time is 1000 times too small: write x:={x}*1e-3, or t:={t}*1e3",
+    1e6: "the time is 10^6 times too small: write t:={t}*1e6",
+    1e2: "positions are in cm: write x:={x}*0.01",
+    1e-2: "velocities are in cm/s: write vx:={vx}*0.01",
+    1 / 3.6: "velocities are in km/h: write vx:={vx}/3.6",
+    3.2808: "positions are in ft: write x:={x}*0.3048",
+}
+
+
+def check_axes(tracks: Iterable[Track], findings: Findings) -> None:
+    """Rule 2: along each axis positions change as the velocities say; else name what is swapped, turned or scaled."""
+    by_file: dict[str, list[Track]] = {}
+    for track in tracks:
+        if track.has(VELOCITY):
+            by_file.setdefault(track.source, []).append(track)
+    for source, own in by_file.items():
+        axes = 3 if all("z" in t.columns and "vz" in t.columns for t in own) else 2
+        pairs = [_displacements(track, axes) for track in own]
+        moved = np.concatenate([p[0] for p in pairs])
+        summed = np.concatenate([p[1] for p in pairs])
+        if len(moved) < 20:
+            findings.notes.append(f"{source}: too few rows to compare positions with velocities")
+            continue
+        _compare(source, own[0], moved, summed, findings)
+
+
+def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Displacements over about LAG, and the same from the velocities, (pair, axis), m."""
+    step = period_of(track)
+    place, speed = track.stack(POSITION, axes), track.stack(VELOCITY, axes)
+    steps = np.diff(track.time)
+    if not step:
+        return np.empty((0, axes)), np.empty((0, axes))
+    whole = (steps < 3.0 * step) & np.isfinite(speed[1:]).all(axis=1) & np.isfinite(speed[:-1]).all(axis=1)
+    path = np.cumsum(np.where(whole[:, None], 0.5 * (speed[1:] + speed[:-1]) * steps[:, None], 0.0), axis=0)
+    path = np.concatenate([np.zeros((1, axes)), path])
+    broken = np.concatenate([[0], np.cumsum(~whole)])
+    k = max(1, round(LAG / step)) if step < LAG else 1
+    sound = broken[k:] == broken[:-k]
+    thin = max(1, len(sound) // 20_000)
+    return (place[k:] - place[:-k])[sound][::thin], (path[k:] - path[:-k])[sound][::thin]
+
+
+def _compare(
+    source: str, track: Track, moved: NDArray[np.float64], summed: NDArray[np.float64], findings: Findings
+) -> None:
+    axes = moved.shape[1]
+    strength = summed.std(axis=0)
+    lively = strength > 0.05 * strength.max()
+    if strength.max() <= 1e-12:
+        findings.notes.append(f"{source}: nothing moves: axes and units cannot be compared with velocities")
+        return
+    spread = moved.std(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
+        alike = cross / np.outer(spread, strength)
+        slopes = np.diag(cross) / strength**2
+    alike = np.nan_to_num(alike)
+    names = [track.label(v) for v in VELOCITY[:axes]]
+    for i in range(axes):
+        j = int(np.abs(alike[i]).argmax())
+        if lively[i] and i != j and abs(alike[i, i]) < 0.5 and abs(alike[i, j]) > 0.8:
+            findings.fault(
+                f"{source}: column {track.label(POSITION[i])} ({POSITION[i]}), row {track.rows[0]} on: moves like "
+                f"{names[j]} ({VELOCITY[j]}; r = {alike[i, j]:.2f}): swapped, or north-east-down; write "
+                f"{POSITION[i]}:={track.label(POSITION[j])} and {POSITION[j]}:={track.label(POSITION[i])}, "
+                "or --axes ned",
+                "axes",
+            )
+            return
+    turned = [i for i in range(axes) if lively[i] and alike[i, i] < -0.5]
+    for i in turned:
+        findings.fault(
+            f"{source}: column {track.label(POSITION[i])}, row {track.rows[0]} on: {POSITION[i]} grows where "
+            f"{names[i]} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
+            f"write {VELOCITY[i]}:=-{names[i]}",
+            "axes",
+        )
+    wrong = [i for i in range(axes) if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
+    wrong = [i for i in wrong if abs(alike[i, i]) > 0.5]
+    if wrong:
+        slope = float(np.median(slopes[wrong]))
+        near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
+        words = {"t": track.label("t"), "x": track.label("x"), "vx": track.label("vx")}
+        reason = REASONS[near].format(**words) if abs(np.log(near / slope)) < 0.1 else "units differ"
+        told = ", ".join(track.label(POSITION[i]) for i in wrong)
+        findings.fault(
+            f"{source}: column {told}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
+            f"as the velocities say: {reason}",
+            "axes",
+        )
+
+
+def check_jumps(track: Track, findings: Findings) -> None:
+    """Rules 5 and 6: a row off its track is left out; a track that goes on elsewhere was reset, and is split there."""
+    surprise, scale = surprises(track)
+    if not len(surprise):
+        return
+    place = track.stack(POSITION, 2)
+    next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
+    if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
+        findings.fault(
+            f"{track.source}: {track.name} goes to and fro by {next_row:.3g} m, row {track.rows[0]} on: "
+            "two individuals under one id? Map another column: --map id:=COLUMN",
+            "jumps",
+        )
+        return
+    size = np.linalg.norm(surprise, axis=1)
+    limit = (SIGMAS if track.has(VELOCITY) else WILD) * scale
+    known = np.isin(np.arange(1, len(track.time)), track.breaks)
+    jumps = np.flatnonzero((size > limit) & ~known)
+    if len(jumps) > max(20, 0.05 * len(size)):
+        row = int(track.rows[jumps[0] + 1])
+        findings.fault(
+            f"{track.source}: {track.name} jumps {len(jumps)} times, first row {row}: two individuals under one id? "
+            "Map another column: --map id:=COLUMN",
+            "jumps",
+        )
+        return
+    away = [int(k) for k in jumps if k + 1 < len(size) and _returns(surprise[k], surprise[k + 1])]
+    back = {k + 1 for k in away}
+    resets = [int(k) for k in jumps if k not in away and k not in back]
+    if resets:
+        k = resets[0]
+        findings.fault(
+            f"{track.source}: column {track.label('x')}, row {track.rows[k + 1]}: {track.name} jumps {size[k]:.3g} m "
+            f"more than its velocity explains ({len(resets)} times): a reset of the estimator",
+            "jumps",
+        )
+        track.breaks = np.unique(np.concatenate([track.breaks, np.array(resets) + 1])).astype(np.int64)
+    if away:
+        row = int(track.rows[away[0] + 1])
+        findings.notes.append(f"{track.source}: {track.name}: {len(away)} outliers left out, first row {row}")
+        sound = np.ones(len(track.time), bool)
+        sound[np.array(away) + 1] = False
+        track.keep(sound)
+
+
+def _returns(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
+    return bool(np.linalg.norm(first + second) < 0.3 * np.linalg.norm(first))
+
+
+def surprises(track: Track) -> tuple[NDArray[np.float64], float]:
+    """What each step is beyond its prediction (row - 1, 2), m, and a robust scale of it; zero across gaps."""
+    step = period_of(track)
+    place = track.stack(POSITION, 2)
+    moved, steps = np.diff(place, axis=0), np.diff(track.time)
+    if len(moved) < 20:
+        return np.empty((0, 2)), 0.0
+    if track.has(VELOCITY):
+        speed = track.stack(VELOCITY, 2)
+        predicted = 0.5 * (speed[1:] + speed[:-1]) * steps[:, None]
+    else:
+        rate = moved / np.maximum(steps, 1e-12)[:, None]
+        predicted = np.concatenate([moved[:1], rate[:-1] * steps[1:, None]])
+    off = np.nan_to_num(moved - predicted)
+    off[steps > 1.5 * step] = 0.0
+    size = np.abs(off)
+    scale = 1.4826 * float(np.median(size[steps <= 1.5 * step]))
+    steps_of = np.abs(moved[moved != 0.0])
+    quantum = float(steps_of.min()) if steps_of.size else 0.0  # of positions that come in steps
+    return off, max(scale, quantum, 0.1 * float(np.median(np.abs(moved))), 1e-9)

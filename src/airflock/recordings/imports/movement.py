@@ -1,0 +1,105 @@
+"""Datasets of `movement` (and Airflock's own): netCDF files or xarray, dimension names of both generations."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports import headers
+from airflock.recordings.imports.arrays import read_idtracker
+from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
+
+OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
+
+
+def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]:
+    """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
+    if path.suffix.lower() in (".h5", ".hdf5") and not _of_movement(path):
+        return read_idtracker(path, options, findings)
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as opened:
+            dataset = opened.load()
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
+        raise RecordingError(f"{path}: is no netCDF file: {str(fault).splitlines()[0]}") from fault
+    return read_dataset(dataset, options, str(path))
+
+
+def _of_movement(path: Path) -> bool:
+    try:
+        with h5py.File(path, "r") as file:
+            return "position" in file
+    except OSError as fault:
+        raise RecordingError(f"{path}: is no HDF5 file: {str(fault).splitlines()[0]}") from fault
+
+
+def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:
+    """Tracks of a dataset with a variable position (time, space, [keypoint,] individual), either generation's names."""
+    found = dataset.rename({old: new for old, new in OLD.items() if old in dataset.dims})
+    if "position" not in found:
+        raise RecordingError(f"{where}: has no variable position; it has {', '.join(map(str, found.data_vars))}")
+    lacks = [name for name in ("time", "space", "individual") if name not in found["position"].dims]
+    if lacks:
+        raise RecordingError(f"{where}: position lacks the dimension{'s' * (len(lacks) > 1)} {', '.join(lacks)}")
+    if "keypoint" in found.dims:
+        found = found.sel(keypoint=_keypoint(found, options, where))
+    axes = [str(axis) for axis in found["space"].values]
+    if axes not in (["x", "y"], ["x", "y", "z"]):
+        raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
+    seconds = _seconds(found, options, where)
+    scale = _scale(found, options, where)
+    rows = np.arange(len(seconds))
+    tracks = []
+    for name in found["individual"].values:
+        own = found.sel(individual=name)
+        position = own["position"].transpose("time", "space").values.astype(float) * scale
+        there = np.isfinite(position).all(axis=1)
+        columns = {axis: position[there, c] for c, axis in enumerate(axes)}
+        for variable, names in (("velocity", VELOCITY), ("command", COMMAND)):
+            if variable in own and {"time", "space"} == set(own[variable].dims):
+                told = str(own[variable].attrs.get("units", ""))
+                if told not in headers.SPEEDS:
+                    continue  # of unknown unit (frames, pixels) or no velocity: differentiated instead
+                values = own[variable].transpose("time", "space").values.astype(float) * headers.SPEEDS[told]
+                columns |= {names[c]: values[there, c] for c in range(len(axes))}
+        tracks.append(Track(str(name), where, seconds[there], columns, rows[there]))
+    tracks = [track for track in tracks if len(track.time)]
+    if not tracks:
+        raise RecordingError(f"{where}: every position is missing")
+    return tracks
+
+
+def _keypoint(found: xr.Dataset, options: Options, where: str) -> Any:
+    names = [str(name) for name in found["keypoint"].values]
+    if options.keypoint:
+        if options.keypoint not in names:
+            raise RecordingError(f"{where}: no keypoint {options.keypoint}; it has {', '.join(names)}")
+        return found["keypoint"].values[names.index(options.keypoint)]
+    if len(names) > 1:
+        raise RecordingError(f"{where}: has {len(names)} keypoints ({', '.join(names[:8])}); choose one: --keypoint")
+    return found["keypoint"].values[0]
+
+
+def _seconds(found: xr.Dataset, options: Options, where: str) -> Any:
+    times = found["time"].values.astype(float)
+    unit = options.time_unit or str(found.attrs.get("time_unit", found["time"].attrs.get("units", "")))
+    if unit in ("frames", "frame", ""):
+        rate = options.fps or float(found.attrs.get("fps") or 0.0)
+        if not rate > 0.0:
+            raise RecordingError(f"{where}: counts frames; say how many a second: --fps 25")
+        return times / rate
+    factors = {**headers.TIMES, "seconds": 1.0, "second": 1.0, "milliseconds": 1e-3, "microseconds": 1e-6}
+    if unit not in factors:
+        raise RecordingError(f"{where}: {unit} is no unit of time; known: {', '.join(headers.TIMES)}, frames")
+    return times * factors[unit]
+
+
+def _scale(found: xr.Dataset, options: Options, where: str) -> float:
+    told = str(found["position"].attrs.get("units", ""))
+    if options.unit or told in headers.LENGTHS or told in headers.PIXELS:
+        return headers.factor("x", options.unit or told, where, options)
+    raise RecordingError(
+        f"{where}: position has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
+    )

@@ -1,0 +1,41 @@
+"""Formats by the ending of a file: to add one, write a reader and name it here."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from airflock.errors import RecordingError
+from airflock.recordings.imports import arrays, dataflash, movement, tables, ulog
+from airflock.recordings.imports.track import Findings, Options, Track
+
+Reader = Callable[[Path, Options, Findings], list[Track]]
+READERS: dict[str, tuple[str, Reader]] = {
+    ".csv": ("table", tables.read_csv),
+    ".tsv": ("table", tables.read_csv),
+    ".txt": ("table", tables.read_csv),
+    ".parquet": ("table", tables.read_parquet),
+    ".ulg": ("PX4 ULog", ulog.read_ulog),
+    ".bin": ("ArduPilot DataFlash", dataflash.read_dataflash),
+    ".tlog": ("MAVLink telemetry", dataflash.read_tlog),
+    ".nc": ("movement netCDF", movement.read_netcdf),
+    ".h5": ("movement or idtracker.ai HDF5", movement.read_netcdf),
+    ".hdf5": ("movement or idtracker.ai HDF5", movement.read_netcdf),
+    ".npy": ("NumPy array", arrays.read_npy),
+    ".npz": ("NumPy arrays", arrays.read_npy),
+}
+
+
+def read(path: Path, options: Options, findings: Findings) -> list[Track]:
+    """Tracks of a file; raises RecordingError for what is no known format."""
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a folder; name the files in it")
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such file")
+    ending = path.suffix.lower()
+    if ending in (".zip", ".gz", ".7z", ".tar", ".rar", ".xz", ".bz2"):
+        raise RecordingError(f"{path}: is an archive; unpack it first")
+    if ending in (".pkl", ".pickle"):
+        arrays.refuse_pickle(path)
+    if ending not in READERS:
+        known = ", ".join(READERS)
+        raise RecordingError(f"{path}: {ending or 'a name without an ending'} is no format read here; known: {known}")
+    return READERS[ending][1](path, options, findings)

@@ -1,0 +1,130 @@
+"""What a reader hands on: one individual as its file tells it, in SI units, with names for messages."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+
+POSITION, VELOCITY, COMMAND = ("x", "y", "z"), ("vx", "vy", "vz"), ("cx", "cy", "cz")
+GEODETIC = ("lat", "lon", "alt")
+TARGETS = ("t", *POSITION, *VELOCITY, *COMMAND, *GEODETIC, "utc", "air", "id", "frame")
+ACCEPTED = {
+    "absent": "keep individuals that are there for less than a fifth of the time",
+    "axes": "keep axes, signs and units although velocities contradict them",
+    "down": "keep z below 0",
+    "duplicates": "keep the first of rows with one time",
+    "height": "keep heights above different levels",
+    "jumps": "split a track where its position jumps",
+    "time": "keep a time whose unit looks wrong",
+}
+
+
+def nothing(_: float) -> None:
+    """Take no notice of progress."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What the user says about files that do not say it themselves.
+
+    map        : target (t, x, vx, cx, id, lat, ...) → expression of column names
+    unit       : of lengths: m, cm, mm, km, ft, or px with `scale`
+    scale      : metres per pixel
+    time_unit  : s, ms, us, ns, min, or frames with `fps`
+    fps        : frames per second
+    keypoint   : which one, where a file has several
+    axes       : enu (x east, y north, z up) or ned (x north, y east, z down) of files that leave it open
+    decimal, delimiter : of text files; an empty delimiter is found out
+    done       : called with the share of a file that has been read, 0-1
+    """
+
+    map: Mapping[str, str] = field(default_factory=dict)
+    unit: str = ""
+    scale: float | None = None
+    time_unit: str = ""
+    fps: float | None = None
+    keypoint: str = ""
+    axes: str = "enu"
+    decimal: str = "."
+    delimiter: str = ""
+    done: Callable[[float], None] = nothing
+
+
+@dataclass
+class Track:
+    """One individual. Arrays have one entry per row of the file that has a time and a position.
+
+    name, source : the individual and its file, for messages
+    time    : (row,) s, of the clock that `clock` names
+    columns : target → (row,) m, m/s, degrees; position, velocity and command as far as the file has them
+    rows    : (row,) number of the row in the file, for messages
+    labels  : target → the column or topic that it was read from
+    clock   : "utc", "boot" (since this device was switched on), "own" (of this file) or "shared" (by all in the file)
+    utc     : (k, 2) own time and UTC, s, where the file has both
+    datum   : what heights are above: "", "amsl", "ellipsoid" or "home"
+    origin  : latitude, longitude (degrees) and height (m) of x = y = z = 0, if known
+    air     : (row,) whether it was in the air; None if the file does not tell
+    breaks  : rows at which the estimator was reset, so that positions before and after do not belong together
+    """
+
+    name: str
+    source: str
+    time: NDArray[np.float64]
+    columns: dict[str, NDArray[np.float64]]
+    rows: NDArray[np.int64]
+    labels: dict[str, str] = field(default_factory=dict)
+    clock: str = "shared"
+    utc: NDArray[np.float64] | None = None
+    datum: str = ""
+    origin: tuple[float, float, float] | None = None
+    air: NDArray[np.bool_] | None = None
+    breaks: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+    def has(self, names: tuple[str, ...]) -> bool:
+        """Whether the first two of three components are there."""
+        return all(name in self.columns for name in names[:2])
+
+    def stack(self, names: tuple[str, ...], dimensions: int) -> NDArray[np.float64]:
+        """Components side by side, (row, dimensions); 0 for a height that is not there."""
+        empty = np.zeros(len(self.time))
+        return np.stack([self.columns.get(name, empty) for name in names[:dimensions]], axis=1)
+
+    def label(self, target: str) -> str:
+        """The user's own word for a target."""
+        return self.labels.get(target, target)
+
+    def keep(self, chosen: NDArray[Any]) -> None:
+        """Keep only the chosen rows (a mask or an order)."""
+        last = np.arange(len(self.time))[chosen]
+        place = np.searchsorted(last, self.breaks) if last.size and (np.diff(last) > 0).all() else self.breaks
+        self.breaks = np.unique(place[place < len(last)]).astype(np.int64)
+        self.time, self.rows = self.time[chosen], self.rows[chosen]
+        self.columns = {name: values[chosen] for name, values in self.columns.items()}
+        self.air = None if self.air is None else self.air[chosen]
+
+
+@dataclass
+class Findings:
+    """Faults and notes of an import, gathered so that all are told at once."""
+
+    accept: frozenset[str] = frozenset()
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def fault(self, line: str, kind: str = "") -> bool:
+        """Note a fault; one of a kind that the user accepts is a note. Returns whether it was accepted."""
+        if kind in self.accept:
+            self.notes.append(f"accepted ({kind}): {line}")
+            return True
+        way = f"; or keep it so: --accept {kind}" if kind else ""
+        self.faults.append(line + way)
+        return False
+
+    def refuse(self) -> None:
+        """Raise a RecordingError with all faults, if there are any."""
+        if self.faults:
+            raise RecordingError("\n".join(dict.fromkeys(self.faults)))

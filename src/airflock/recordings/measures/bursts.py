@@ -1,0 +1,54 @@
+"""Burst and coast: short accelerations and long glides of fish (Calovi et al. 2018)."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import states
+
+
+def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
+    """One row per burst and its coast: individual, begin (s), burst (s), coast (s), speed before and at its top (m/s).
+
+    least : rise of speed, m/s, below which it is noise of the tracker
+    A burst is a rise of speed from a minimum to the next maximum by `least` or more, with falls of less than that in
+    between; its coast lasts until the next burst begins, or the individual is gone.
+    """
+    if not least > 0.0:
+        raise ParameterError(f"least = {least:g} m/s must be above 0")
+    found = states(recording)
+    speed = np.linalg.norm(found.velocity, axis=1)
+    rows = []
+    for i, name in enumerate(found.names):
+        there = found.present[:, i]
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            for low, top, last in _rises(speed[begin:end, i], least):
+                at = found.time[begin + np.array([low, top, last])]
+                s = speed[begin + np.array([low, top]), i]
+                rows.append((name, at[0], at[1] - at[0], at[2] - at[1], s[0], s[1]))
+    return pd.DataFrame(rows, columns=["individual", "begin", "burst", "coast", "speed_before", "speed_top"])
+
+
+def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int]]:
+    """Frames of minimum, maximum and the end of the coast, of each rise by `least`."""
+    turns: list[tuple[int, int]] = []
+    low = top = 0
+    rising = False
+    for k in range(1, len(speed)):
+        if rising:
+            if speed[k] > speed[top]:
+                top = k
+            elif speed[top] - speed[k] >= least:
+                turns.append((low, top))
+                low, rising = k, False
+        elif speed[k] <= speed[low]:
+            low = k
+        elif speed[k] - speed[low] >= least:
+            top, rising = k, True
+    if rising:
+        turns.append((low, top))
+    ends = [begin for begin, _ in turns[1:]] + [len(speed) - 1]
+    return [(begin, peak, end) for (begin, peak), end in zip(turns, ends, strict=True)]

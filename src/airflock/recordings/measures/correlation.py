@@ -1,0 +1,54 @@
+"""How far fluctuations of velocity are alike: correlation by distance and its first zero (Cavagna et al. 2010)."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import states
+
+
+def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
+    """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
+
+    width    : of a bin of distances, m: about a tenth of the group
+    farthest : m; by default the largest distance that occurs
+    Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
+    """
+    found = states(recording)
+    if not width > 0.0:
+        raise ParameterError(f"width = {width:g} m must be above 0")
+    sums: dict[int, list[float]] = {}
+    alone, count = 0.0, 0
+    for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
+        if there.sum() < 2:
+            continue
+        x, u = place[:, there], speed[:, there]
+        u = u - u.mean(axis=1, keepdims=True)
+        alone, count = alone + float((u * u).sum()), count + u.shape[1]
+        i, j = np.triu_indices(u.shape[1], 1)
+        bins = np.floor(np.linalg.norm(x[:, i] - x[:, j], axis=0) / width).astype(int)
+        alike = (u[:, i] * u[:, j]).sum(axis=0)
+        number, total = np.bincount(bins), np.bincount(bins, alike)
+        for b in np.flatnonzero(number):
+            entry = sums.setdefault(int(b), [0.0, 0.0])
+            entry[0] += total[b]
+            entry[1] += number[b]
+    scale = alone / count if count else np.nan
+    last = max(sums, default=0) if farthest is None else int(farthest / width)
+    kept = [b for b in sorted(sums) if b <= last]
+    index = pd.Index([(b + 0.5) * width for b in kept], name="distance")
+    return pd.Series([sums[b][0] / sums[b][1] / scale for b in kept], index=index, name="correlation")
+
+
+def correlation_length(recording: xr.Dataset, width: float) -> float:
+    """Distance at which the correlation of velocities first falls to zero, m; nan if it does not."""
+    course = velocity_correlation(recording, width)
+    values, at = course.to_numpy(), course.index.to_numpy()
+    down = np.flatnonzero(values <= 0.0)
+    if not len(down):
+        return float("nan")
+    k = int(down[0])
+    if k == 0:
+        return float(at[0])
+    return float(at[k - 1] + (at[k] - at[k - 1]) * values[k - 1] / (values[k - 1] - values[k]))

@@ -1,0 +1,24 @@
+"""Milling of those present: rotation about the group's own centre (Couzin et al. 2002, Eq. 5)."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.recordings.measures.states import headings, states
+
+
+def milling(recording: xr.Dataset) -> pd.Series:
+    """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone."""
+    found = states(recording)
+    course = np.full(len(found.time), np.nan)
+    h = headings(found.velocity)
+    for k, there in enumerate(found.present):
+        moves = there & np.isfinite(h[k]).all(axis=0)
+        if moves.sum() < 2:
+            continue
+        out = found.position[k][:, moves] - found.position[k][:, there].mean(axis=1, keepdims=True)
+        out = out / np.maximum(np.linalg.norm(out, axis=0), 1e-12)
+        flat = np.zeros((2, 3, int(moves.sum())))
+        flat[0, : len(out)], flat[1, : len(out)] = out, h[k][:, moves]
+        course[k] = float(np.linalg.norm(np.cross(flat[0].T, flat[1].T).mean(axis=0)))
+    return pd.Series(course, index=pd.Index(found.time, name="time"), name="milling")

@@ -1,0 +1,41 @@
+"""Distances between individuals: to the nearest, and of all pairs."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import states
+
+
+def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
+    """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone."""
+    found = states(recording)
+    table = np.full(found.present.shape, np.nan)
+    for k, there in enumerate(found.present):
+        if there.sum() > 1:
+            x = found.position[k][:, there]
+            apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)
+            np.fill_diagonal(apart, np.inf)
+            table[k, there] = apart.min(axis=1)
+    coordinates = {"time": found.time, "individual": found.names}
+    return xr.DataArray(table, coordinates, ("time", "individual"), attrs={"units": "m"})
+
+
+def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.Series:
+    """Share of pairs by distance, per m, over all frames: a histogram whose sum times `width` is at most 1.
+
+    width, farthest : of a bin, and of the last one, m
+    """
+    if not 0.0 < width < farthest:
+        raise ParameterError(f"width = {width:g} m must lie between 0 and farthest = {farthest:g} m")
+    found = states(recording)
+    edges = np.arange(0.0, farthest + 0.5 * width, width)
+    counts, pairs = np.zeros(len(edges) - 1), 0
+    for place, there in zip(found.position, found.present, strict=True):
+        x = place[:, there]
+        i, j = np.triu_indices(x.shape[1], 1)
+        counts += np.histogram(np.linalg.norm(x[:, i] - x[:, j], axis=0), edges)[0]
+        pairs += len(i)
+    index = pd.Index(0.5 * (edges[1:] + edges[:-1]), name="distance")
+    return pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")

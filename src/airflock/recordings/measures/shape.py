@@ -1,0 +1,39 @@
+"""Form of the group at every instant: area of its hull, length along and across its motion."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.recordings.measures.states import states
+
+
+def group_shape(recording: xr.Dataset) -> pd.DataFrame:
+    """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
+
+    length, width : root mean square extension along and across the mean horizontal velocity, times sqrt(12), which is
+    the side of an even rectangle. nan where too few are there.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    found = states(recording)
+    axes = found.position.shape[1]
+    rows = []
+    for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
+        x, count = place[:, there], int(there.sum())
+        hull = length = width = np.nan
+        if count > axes:
+            try:
+                hull = float(ConvexHull(x.T).volume)  # in the plane `volume` is the area
+            except QhullError:
+                hull = 0.0  # all on one line, or on one plane in space
+        if count > 1:
+            mean = speed[:2, there].mean(axis=1)
+            size = np.linalg.norm(mean)
+            if size > 1e-12:
+                ahead = mean / size
+                offset = x[:2] - x[:2].mean(axis=1, keepdims=True)
+                length = float(np.sqrt(12.0 * ((ahead @ offset) ** 2).mean()))
+                width = float(np.sqrt(12.0 * ((ahead[0] * offset[1] - ahead[1] * offset[0]) ** 2).mean()))
+        rows.append((count, hull, length, width, length / width if width > 1e-9 else np.nan))
+    names = ["present", "hull", "length", "width", "elongation"]
+    return pd.DataFrame(rows, index=pd.Index(found.time, name="time"), columns=names)

@@ -1,0 +1,60 @@
+"""Where neighbours are as seen by each one: density front-back and left-right, and how uneven it is."""
+
+import numpy as np
+import xarray as xr
+
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import headings, states
+
+
+def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
+    """Neighbours per m² around an individual that moves along `front`, (left, front); mean over all and all frames.
+
+    reach : half the side of the map, m; cells: along each side; slowest: speed (m/s) at or below which one has no front
+    In space the map is horizontal: distances in height are left out.
+    """
+    if not reach > 0.0 or cells < 1:
+        raise ParameterError(f"reach = {reach:g} m and cells = {cells} must be above 0")
+    found = states(recording)
+    h = headings(found.velocity[:, :2], slowest)
+    edges = np.linspace(-reach, reach, cells + 1)
+    total, focal = np.zeros((cells, cells)), 0
+    for place, ahead, there in zip(found.position[:, :2], h, found.present, strict=True):
+        x = place[:, there]
+        for i in np.flatnonzero(there & np.isfinite(ahead).all(axis=0)):
+            offset = x - place[:, i : i + 1]
+            others = np.ones(offset.shape[1], bool)
+            others[np.searchsorted(np.flatnonzero(there), i)] = False
+            cx, cy = ahead[:, i]
+            front, left = (
+                cx * offset[0, others] + cy * offset[1, others],
+                cx * offset[1, others] - cy * offset[0, others],
+            )
+            total += np.histogram2d(left, front, (edges, edges))[0]
+            focal += 1
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    area = (edges[1] - edges[0]) ** 2
+    attributes = {"units": "1/m^2", "focal": focal}
+    return xr.DataArray(
+        total / (max(focal, 1) * area), {"left": middle, "front": middle}, ("left", "front"), attrs=attributes
+    )
+
+
+def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
+    """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere."""
+    found = states(recording)
+    h = headings(found.velocity[:, :2], slowest)
+    total, count = 0.0, 0
+    for place, ahead, there in zip(found.position[:, :2], h, found.present, strict=True):
+        rows = np.flatnonzero(there)
+        x = place[:, rows]
+        apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)
+        np.fill_diagonal(apart, np.inf)
+        for k, i in enumerate(rows):
+            if len(rows) < 2 or not np.isfinite(ahead[:, i]).all():
+                continue
+            j = int(apart[k].argmin())
+            if apart[k, j] <= reach and apart[k, j] > 0.0:
+                along = float(ahead[:, i] @ (x[:, j] - x[:, k])) / apart[k, j]
+                total, count = total + 2.0 * along * along - 1.0, count + 1
+    return total / count if count else float("nan")

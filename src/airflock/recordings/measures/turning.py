@@ -1,0 +1,21 @@
+"""Turning speed: how fast headings turn, counter-clockwise positive."""
+
+import numpy as np
+import xarray as xr
+
+from airflock.recordings.measures.states import headings, states
+
+
+def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
+    """Rate of turn of the horizontal heading, (time, individual), rad/s; nan across absences.
+
+    slowest : speed (m/s) at or below which one has no heading
+    A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
+    """
+    found = states(recording)
+    h = headings(found.velocity[:, :2], slowest)
+    sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
+    rate = np.arctan2(sine, (h[:-1] * h[1:]).sum(axis=1)) / np.diff(found.time)[:, None]
+    before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
+    coordinates = {"time": found.time, "individual": found.names}
+    return xr.DataArray(0.5 * (before + after), coordinates, ("time", "individual"), attrs={"units": "rad/s"})

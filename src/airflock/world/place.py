@@ -1,0 +1,176 @@
+"""Place: walls, obstacles and what stands in the world, asked from one position; plain Python, as a drone carries it.
+
+Made from the record of an arena and, where a scene stands in it, from rows of shapes behind their tree.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from airflock.core.maths import FAR
+from airflock.world import arena, bvh, excursion, rays
+from airflock.world.arena import Surface
+
+Corners = Sequence[Sequence[float]]
+FAR_HEIGHT = 1e9  # m; half height of an arena that is flown in a plane
+AWAY = 1e8  # m; nothing is looked for beyond
+
+
+def area(corners: Corners) -> float:
+    """Signed area of a polygon, m²: positive if its corners run counter-clockwise."""
+    pairs = zip(corners, [*corners[1:], corners[0]], strict=True)
+    return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in pairs)
+
+
+def counter_clockwise(corners: Corners) -> list[Sequence[float]]:
+    """The corners in counter-clockwise order."""
+    return list(corners) if area(corners) > 0.0 else list(corners)[::-1]
+
+
+def polygon_fault(corners: Corners) -> str:
+    """Why a list of corners is no convex polygon; empty if it is one."""
+    if len(corners) < 3:
+        return f"has {len(corners)} corners; a polygon needs at least 3"
+    ring = counter_clockwise(corners)
+    if area(ring) <= 0.0:
+        return "has no area"
+    n, round_ = len(ring), 0.0
+    for k in range(n):
+        a, b, c = ring[k], ring[(k + 1) % n], ring[(k + 2) % n]
+        ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+        turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+        if not -1e-9 <= turn < math.pi:
+            return "is not convex; split it into convex parts"
+        round_ += turn
+    return "crosses itself" if round_ > 2.0 * math.pi + 1e-6 else ""
+
+
+def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
+    """Half sizes of an arena, m: of a box, or radius and half height; a plane is taken as very high."""
+    z = 0.5 * world.height if world.dimensions == "3" else FAR_HEIGHT
+    if world.arena == "circle":
+        return world.radius, world.radius, z
+    return 0.5 * world.side, 0.5 * world.side, z
+
+
+def walls(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[float, ...]]]:
+    """Surface function of each wall with its four numbers, in the order in which a driver asks them."""
+    h, z = 0.5 * world.side, 0.5 * world.height
+    three = world.dimensions == "3"
+    caps = [(arena.plane, (0.0, 0.0, 1.0, z)), (arena.plane, (0.0, 0.0, -1.0, z))] if three else []
+    if world.arena == "none" or world.edges == "periodic":
+        return []
+    if world.arena == "circle":
+        return [(arena.cylinder, (0.0, 0.0, 0.0, world.radius)), *caps]
+    if world.arena == "square" and world.walls == "nearest_per_axis":
+        axes = [(1.0, 0.0, 0.0, h), (0.0, 1.0, 0.0, h)] + ([(0.0, 0.0, 1.0, z)] if three else [])
+        return [(arena.slab, axis) for axis in axes]
+    square = ((-h, -h), (h, -h), (h, h), (-h, h))
+    corners = square if world.arena == "square" else counter_clockwise(world.corners)
+    return [(arena.plane, inward(a, b)) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)] + caps
+
+
+def inward(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float, float]:
+    """Normal and distance of the wall from a to b of a counter-clockwise ring, as `arena.plane` takes them."""
+    tx, ty = b[0] - a[0], b[1] - a[1]
+    length = (tx * tx + ty * ty) ** 0.5
+    nx, ny = -ty / length, tx / length
+    return nx, ny, 0.0, -(nx * a[0] + ny * a[1])
+
+
+BEYOND = {
+    "square": excursion.beyond_box,
+    "circle": excursion.beyond_cylinder,
+    "polygon": excursion.beyond_polygon,
+    "none": excursion.beyond_nothing,
+}
+CLEAR = {"square": rays.to_box, "circle": rays.to_cylinder, "polygon": rays.to_polygon, "none": rays.to_nothing}
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """What stands in the world: rows of `world.shapes` and the tree over them, as `world.bvh` reads it."""
+
+    shapes: Any = ()
+    nodes: Any = ()
+    links: Any = ()
+
+
+class Place:
+    """The world as one agent asks it.
+
+    world  : record of the arena
+    shapes : what stands in it
+    look   : distance (m) beyond which shapes say nothing; a model's wall_reach
+    casts  : whether the law casts at the scene: then polygons are shapes of it and no surfaces
+    """
+
+    def __init__(
+        self, world: arena.Parameters, shapes: Shapes | None = None, *, look: float = FAR, casts: bool = False
+    ):
+        found = shapes or Shapes()
+        self._dims, self._look, self._casts = int(world.dimensions), look, casts
+        self._walls, self._half = walls(world), half_sizes(world)
+        self._scene = found.shapes, found.nodes, found.links
+        kind = "none" if world.edges == "periodic" else world.arena
+        self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
+        self._edges: list[list[float]] = []
+        if world.arena == "polygon":
+            self._add(world.corners)
+        self._corners = len(self._edges)
+        self._obstacles = [self._add(corners) for corners in world.obstacles]
+
+    def _add(self, corners: Corners) -> tuple[int, int]:
+        first, ring = len(self._edges), counter_clockwise(corners)
+        self._edges += [[*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
+        return first, len(self._edges)
+
+    def surfaces(self, x: float, y: float, z: float) -> Iterator[Surface]:
+        """Distance (m) and unit normal of every wall, every obstacle, and the nearest of the ground and the scene."""
+        for function, row in self._walls:
+            yield function(x, y, z, *row)
+        if not self._casts:
+            yield from self.obstacles(x, y, z)
+        for ground in (0.0, 1.0)[: self._dims - 1]:
+            found = bvh.nearest_of(x, y, z, self._look, ground, *self._scene)
+            if found.distance < self._look:
+                yield found
+
+    def obstacles(self, x: float, y: float, z: float) -> Iterator[Surface]:
+        """Distance (m) and unit normal of every obstacle."""
+        for first, last in self._obstacles:
+            yield arena.convex_obstacle(x, y, z, self._edges, first, last)
+
+    def solids(self, x: float, y: float, z: float) -> Iterator[Surface]:
+        """Distance (m) and unit normal of every obstacle and of the nearest of what stands in the scene."""
+        yield from self.obstacles(x, y, z)
+        found = bvh.nearest_of(x, y, z, AWAY, 0.0, *self._scene)
+        if found.distance < AWAY:
+            yield found
+
+    def excursion(self, x: float, y: float, z: float) -> float:
+        """Distance outside the arena or inside an obstacle or a shape, m; negative where flying is allowed."""
+        out = self._beyond(x, y, z, *self._half, self._edges, self._corners)
+        for surface in self.obstacles(x, y, z):
+            out = max(out, -surface.distance)
+        return float(max(out, -bvh.nearest(x, y, z, AWAY, *self._scene).distance))
+
+    def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float) -> float:
+        """Free distance (m, at most length) of a thin ray along a unit vector."""
+        free = min(length, self._clear(x, y, z, ux, uy, uz, *self._half, self._edges, self._corners))
+        for first, last in self._obstacles:
+            free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
+        return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
+
+    def cast(
+        self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float
+    ) -> float:  # fmt: skip
+        """Free distance (m, at most length) of a sphere of this radius (m) along a unit vector to walls and scene."""
+        free = length
+        if self._clear is not rays.to_nothing:
+            sides = (AWAY, AWAY) if self._flat else (self._half[0] - radius, self._half[1] - radius)
+            up = self._half[2] - radius if self._dims == 3 else AWAY
+            rule = rays.to_box if self._flat else self._clear
+            free = min(free, rule(x, y, z, ux, uy, uz, *sides, up, self._edges, 0))
+        return float(bvh.cast(x, y, z, ux, uy, uz, free, radius, *self._scene)) if self._casts else float(free)

@@ -1,0 +1,315 @@
+"""An open flight has the bits of the closed one, whatever its cuts, and goes back, branches and changes truthfully."""
+
+import signal
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.engine.simulate import finish, fly
+from airflock.errors import FlightError, ScenarioError
+from airflock.scenarios.files import load, presets
+
+SMALL = {"agents": 8, "duration": 8.0}
+FLIGHTS = {
+    "vasarhelyi_2018/4ms": SMALL,
+    "vasarhelyi_2018/real_gnss": SMALL,
+    "zapotecatl_2016/best": SMALL,
+    "kidger/city": SMALL,
+    "dimock_2003/published": {"agents": 4, "duration": 4.0},
+}
+
+
+@pytest.fixture
+def scenario():
+    return load("vasarhelyi_2018/4ms", {"agents": 30, "duration": 40.0})
+
+
+def whole(flight):
+    """Everything that a flight carries and has told, as bytes."""
+    return flight._state.buffer.tobytes(), repr(flight.scores()), flight.step
+
+
+# ------------------------------------------------------------------------------------------------------------ cuts
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize("steps", [1, 7, 100])
+def test_any_cuts_give_the_bits_of_the_whole(name, steps):
+    scenario = load(name, FLIGHTS[name])
+    closed = fly(scenario, 3, record=True)
+    flight = airflock.open(scenario, 3, record=True)
+    while not flight.over:
+        flight.advance(steps=steps)
+    scores = flight.finish()
+    assert flight.frames.tobytes() == closed.frames.tobytes()
+    assert flight.state.tobytes() == closed.state.tobytes()
+    assert repr(scores) == repr(finish(scenario, closed.values))
+
+
+@pytest.mark.parametrize("name", sorted(presets()))
+def test_every_preset_flies_the_same_in_parts(name):
+    """Interpreted: the same stages as compiled, without a compiler."""
+    scenario = load(name)
+    few = {"agents": min(scenario.agents, 4), "duration": 40.0 * scenario.flight.dt}
+    scenario = load(name, few if scenario.goals.kind != "own" else {"duration": 0.1})
+    flown = []
+    for steps in (40, 7, 1):
+        flight = airflock.open(scenario, 3, device="python")
+        while not flight.over:
+            flight.advance(steps=steps)
+        flown.append((flight.state.tobytes(), repr(flight.finish())))
+    assert flown[0] == flown[1] == flown[2]
+
+
+def test_a_flight_that_ends_at_a_collision_ends_there_in_parts_too():
+    crowded = {"agents": 40, "duration": 60.0, "metrics.stop": "collision", "metrics.r_coll": 12.0}
+    scenario = load("vasarhelyi_2018/4ms", crowded)
+    closed = fly(scenario, 1, record=True)
+    flight = airflock.open(scenario, 1, record=True)
+    while not flight.over:
+        flight.advance(steps=37)
+    assert flight.scores()["n_coll"] > 0.0 and flight.time < 60.0
+    assert flight.frames.tobytes() == closed.frames.tobytes()
+    assert repr(flight.finish()) == repr(finish(scenario, closed.values))
+    with pytest.raises(FlightError, match=r"the flight is over at t = "):
+        flight.advance(1.0)
+
+
+def test_what_is_not_kept_in_the_state_carries_nothing_from_step_to_step():
+    for name, settings in FLIGHTS.items():
+        scenario = load(name, settings)
+        quiet, poisoned = airflock.open(scenario, 5), airflock.open(scenario, 5)
+        for _ in range(5):
+            quiet.advance(steps=7)
+            poisoned.advance(steps=7)
+            state = poisoned._state
+            for name, rubbish in {"words": 12345, "near": -7, "labels": 3}.items():
+                state.arrays[name][:] = rubbish
+            for array in (array for part in state.solvers for array in part):
+                if not np.shares_memory(array, state.buffer):
+                    array[...] = 1e3
+        for name in ("words", "near", "labels"):
+            quiet._state.arrays[name][:] = poisoned._state.arrays[name][:] = 0
+        assert whole(quiet) == whole(poisoned), scenario.name
+
+
+def test_sensing_first_gives_the_same_flight(scenario):
+    straight, cut = airflock.open(scenario, 2), airflock.open(scenario, 2)
+    straight.advance(4.0)
+    while cut.time < 4.0:
+        cut.sense()
+        for agent in (0, 7):  # what the law itself decided
+            cut.command(agent, cut.commands[:, agent])
+        cut.advance(steps=20)
+    assert np.array_equal(cut.state, straight.state) and repr(cut.scores()) == repr(straight.scores())
+
+
+def test_an_agent_that_is_commanded_flies_there(scenario):
+    flight = airflock.open(scenario, 2).advance(2.0)
+    before = flight.state
+    for _ in range(100):
+        flight.sense().command(5, [4.0, 0.0]).advance(steps=20)
+    way = flight.state[:2, 5] - before[:2, 5]
+    assert way == pytest.approx([4.0 * 20.0, 0.0], abs=8.0)  # its lag of 1 s, and its noise
+
+
+# --------------------------------------------------------------------------------------------- going back, branching
+
+
+def test_going_back_flies_the_same_again(scenario):
+    flight = airflock.open(scenario, 4).advance(3.0)
+    moment = flight.snapshot()
+    flight.advance(5.0)
+    first = whole(flight)
+    assert whole(flight.restore(moment).advance(5.0)) == first
+    flight.change({"radio.delay": 0.4, "wind.east": 2.0}).advance(1.0)  # another driver
+    assert whole(flight.restore(moment).advance(2.0).advance(3.0)) == first
+    assert flight.events == []
+
+
+def test_a_branch_of_the_same_world_is_the_same_flight(scenario):
+    flight = airflock.open(scenario, 4).advance(2.0)
+    twin = flight.branch()
+    assert whole(twin.advance(5.0)) == whole(flight.advance(5.0))
+
+
+def test_branches_of_other_worlds_have_independent_noise():
+    still = {"agents": 30, "sensors.noise": 0.0, "radio.delay": 0.0, "model.v_flock": 4.0}
+    flight = airflock.open(load("vasarhelyi_2018/4ms", still), 9).advance(0.1)
+    gains = []
+    for world in range(400):
+        twin = flight.branch(world)
+        before = twin.state[2:]
+        gains.append((twin.advance(steps=2).state[2:] - before).ravel())
+    gains = np.array(gains[1:]) - np.mean(gains[1:], axis=0)
+    scenario = flight.scenario
+    expected = np.sqrt(2.0 * 2.0 * scenario.body.noise * scenario.flight.dt)  # two steps
+    assert gains.std() == pytest.approx(expected, rel=0.05)
+    following = np.mean(gains[1:] * gains[:-1]) / gains.var()
+    assert abs(following) < 4.0 / np.sqrt(gains.size)
+
+
+def test_moments_of_other_flights_are_refused(scenario):
+    moment = airflock.open(scenario, 4).snapshot()
+    with pytest.raises(FlightError, match="not of this flight"):
+        airflock.open(scenario, 4).restore(moment)
+
+
+# ---------------------------------------------------------------------------------------------------------- changes
+
+
+def test_scenario_seed_and_events_are_the_same_bits(scenario):
+    flight = airflock.open(scenario, 6, record=True)
+    flight.advance(2.0).change({"model.p_rep": 0.3}).advance(1.5).push(3, [2.0, -1.0])
+    flight.advance(1.0).change({"radio.delay": 0.4}).advance(0.2).place(0, [0.0, 5.0]).advance(0.7)
+    flight.sense().command(2, [1.0, 1.0]).advance(2.0)
+    again = airflock.open(scenario, 6, record=True, events=[event.plain() for event in flight.events])
+    while again.step < flight.step:
+        again.advance(steps=min(13, flight.step - again.step))
+    assert whole(again) == whole(flight) and again.events == flight.events
+    assert again.frames.tobytes() == flight.frames.tobytes()
+    assert [repr(window.scores) for window in again.windows] == [repr(window.scores) for window in flight.windows]
+
+
+def test_a_flight_of_another_world_starts_elsewhere_and_flies_again(scenario):
+    flight = airflock.open(scenario, 6, world=7).advance(1.0)
+    assert not np.array_equal(flight.state, airflock.open(scenario, 6).advance(1.0).state)
+    again = airflock.open(scenario, 6, events=flight.events)
+    assert whole(again.advance(1.0)) == whole(flight)
+
+
+def test_a_change_to_the_same_numbers_changes_no_bit(scenario):
+    straight, changed = airflock.open(scenario, 6).advance(6.0), airflock.open(scenario, 6)
+    changed.advance(2.0).change({"model.p_rep": scenario.parameters.p_rep}).advance(4.0)
+    assert np.array_equal(straight.state, changed.state)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.0, 1.7])
+def test_after_a_change_of_the_delay_states_of_so_long_ago_are_heard(scenario, delay):
+    quiet = load("vasarhelyi_2018/4ms", {"agents": 10, "sensors.noise": 0.0, "radio.range": 1e4})
+    flight, past = airflock.open(quiet, 1), {}
+    for step in range(0, 1000, 20):
+        past[step] = flight.state
+        if step == 500:
+            flight.change({"radio.delay": delay})
+        late = round(delay / 0.01) if step >= 500 else 100
+        if step >= 100 and not 500 <= step < 500 + late:
+            view = flight.look(0)
+            assert [other.age for other in view.heard] == pytest.approx([late * 0.01] * 9)
+            for other in view.heard:
+                source = past[step - late] if (step - late) % 20 == 0 else None
+                if source is not None:
+                    assert other.state[:2] == pytest.approx(source[:2, other.who], abs=1e-5)
+        flight.advance(steps=20)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_wider_collision_distance_misses_no_contact(seed):
+    """The bound on how near pairs can have come was found for the old distance."""
+    scenario = load("vasarhelyi_2018/4ms", {"agents": 60, "duration": 90.0})
+    flight = airflock.open(scenario, seed).advance(60.0).change({"metrics.r_coll": 14.0})
+    contacts = []
+    for _ in range(150):
+        x, y = flight.state[:2].astype(float)
+        contacts.append((np.hypot(x[:, None] - x, y[:, None] - y) < 14.0).sum() - 60)
+        flight.advance(steps=1)
+    assert sum(contacts) > 0
+    assert flight.scores()["phi_coll"] == pytest.approx(np.mean(contacts) / (60.0 * 59.0), rel=1e-6)
+
+
+def test_a_change_is_refused_in_one_line_each_and_leaves_the_flight_as_it_was(scenario):
+    flight, twin = airflock.open(scenario, 6).advance(2.0), airflock.open(scenario, 6).advance(2.0)
+    for settings, said in {
+        ("model.p_rep", -1.0): r"model\.p_rep = -1 1/s lies outside",
+        ("agents", 31): "agents = 31: the number of agents cannot change in flight",
+        ("dt", 0.02): "the motion step cannot change in flight",
+        ("world.dimensions", "3"): "cannot change in flight",
+        ("start.speed", 3.0): "the flight has started",
+        ("model.prep", 0.1): "did you mean model.p_rep",
+        ("duration", 1.0): "the flight is at t = 2 s already",
+    }.items():
+        with pytest.raises((ScenarioError, FlightError), match=said):
+            flight.change(dict([settings]))
+    assert whole(flight.advance(1.0)) == whole(twin.advance(1.0)) and flight.events == []
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda f: f.command(30, [0, 0]), "agent = 30: this flight has the agents 0 to 29"),
+        (lambda f: f.command(0, [0.0]), r"is not \[east, north\] in m/s"),
+        (lambda f: f.push(0, [float("nan"), 0.0]), "each finite"),
+        (lambda f: f.advance(-1.0), "is not at least one motion step"),
+        (lambda f: f.advance(), "give seconds or steps"),
+        (lambda f: f.advance(steps=3).sense(), "the next decision is at step 220, this is 203"),
+        (lambda f: f.branch(-1), "not a whole number from 0"),
+        (lambda f: f.event("explode"), "known kinds: change, command, push, place, branch"),
+        (lambda f: f.frames, "record=True"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(scenario, call, said):
+    flight = airflock.open(scenario, 6).advance(2.0)
+    with pytest.raises(FlightError, match=said) as fault:
+        call(flight)
+    assert "\n" not in str(fault.value)
+
+
+# ---------------------------------------------------------------------------------------------------------- looking
+
+
+@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss"])
+def test_what_an_agent_perceives_makes_up_its_command(name):
+    from airflock.core.agent import answer
+
+    scenario = load(name, {"agents": 12, "duration": 20.0, "radio.range": 200.0})
+    flight = airflock.open(scenario, 3, precision=64).advance(5.0)
+    before = whole(flight)
+    views = [flight.look(agent) for agent in range(12)]
+    assert whole(flight) == before
+    flight.sense()
+    for view in views:
+        assert np.allclose(np.sum(view.terms, axis=0), view.sums, atol=1e-9)
+        v = view.own
+        norm = np.hypot(v.vx, v.vy)
+        from airflock.core.vocabulary import Own
+
+        own = Own(v.vx, v.vy, 0.0, v.vx / norm, v.vy / norm, 0.0)
+        given = {"own": own, "sums": view.sums, "walls": view.walls, "p": scenario.parameters}
+        wished = answer(scenario.model.decide, "decide", given, "law")
+        assert wished[:2] == pytest.approx(view.command, abs=1e-9)
+        assert flight.commands[:, view.agent] == pytest.approx(view.command)
+
+
+# ------------------------------------------------------------------------------------------------------ given starts
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (np.zeros((4, 7)), r"its shape is \(4, 7\); give \(4, 30\), the rows x, y, vx, vy of 30 agents in m and m/s"),
+        (np.zeros((6, 30)), r"its shape is \(6, 30\)"),
+        (np.full((4, 30), np.nan), "x of agent 0 is nan, not a finite number"),
+        ("here", "not an array of numbers"),
+    ],
+)
+def test_a_start_of_a_wrong_shape_is_refused(scenario, start, said):
+    for flown in (airflock.simulate, airflock.open):
+        with pytest.raises(FlightError, match=said):
+            flown(scenario, 1, start=start)
+
+
+def test_an_interruption_ends_one_long_flight():
+    scenario = load("vasarhelyi_2018/4ms", {"agents": 100, "duration": 1e6})
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            fly(scenario, 1)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

@@ -1,0 +1,214 @@
+"""N pilots, each with its own packets, fly what the simulator flies; a place asked on board is the engine's world."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import airflock
+from airflock.core.agent import State, answer
+from airflock.core.contract import model
+from airflock.core.parameters import choices
+from airflock.core.pilot import Hearing, Pilot
+from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import could_be_near
+from airflock.errors import RuleError
+from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
+from airflock.world import arena
+from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
+from flocks import ISLANDS, PENTAGON
+
+QUIET = {"sensors.noise": 0.0, "body.noise": 0.0, "duration": 10.0, "metrics.period": 0.2}
+FLIGHTS = {
+    "square": ("vasarhelyi_2018/real_4ms", {"agents": 8, "world.side": 90.0}),
+    "islands": ("vasarhelyi_2018/obstacles", {"agents": 7, "world.side": 130.0, "world.obstacles": ISLANDS}),
+    "silo": ("viragh_2014/4ms", {
+        "world.walls": "every_edge",
+        "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.radius": 48.0, "world.height": 50.0,
+    }),
+    "pentagon": ("vasarhelyi_2018/4ms", {
+        "agents": 6, "world.arena": "polygon", "world.corners": PENTAGON, "world.walls": "every_edge",
+        "radio.kind": "links", "radio.delay": 0.3, "radio.near": 500.0, "radio.far": 600.0,
+        "radio.received_near": 1.0, "radio.fast_rate": 50.0,
+    }),
+    "forest": ("kidger/forest", {"agents": 3, "body.noise": None, "duration": 0.7, "goals.kind": "none"}),
+    "boids": ("zapotecatl_2016/best", {"agents": 8, "body.noise": None, "duration": 0.5, "update": "synchronous"}),
+    "swarm": ("couzin_2002/torus", {"agents": 10, "body.noise": None, "duration": 3.0}),
+}  # fmt: skip
+
+
+def place_of(scenario):
+    """The world of a scenario as a drone carries it."""
+    stands, rule = scenario.stands(), scenario.model.wall_reach
+    shapes = Shapes(stands.shapes.tolist(), stands.nodes.tolist(), stands.links.tolist())
+    look = 1e30 if rule is None else rule(scenario.parameters)
+    return Place(scenario.world, shapes, look=look, casts=scenario.model.sight is not None)
+
+
+@cache
+def build(name):
+    preset, changed = FLIGHTS[name]
+    return airflock.load(preset, {k: v for k, v in (QUIET | changed).items() if v is not None})
+
+
+def fly(scenario, start, seed):
+    """Positions (time, agent, axis) of N pilots and their bodies; packets arrive after the delay, all of them."""
+    n, dims, dt, k = scenario.agents, scenario.dimensions, scenario.flight.dt, scenario.radio
+    every, late = max(1, round(scenario.sensors.period / dt)), round(k.delay / dt)
+    period, sampled = every * dt, max(1, round(scenario.measured_by().period / dt))
+    hearing = Hearing(extrapolate=k.kind == "links", forget=late * dt + 0.5 * period)
+    pilots = [
+        Pilot(
+            scenario.model, scenario.parameters, place_of(scenario), index=i, period=period, hearing=hearing,
+            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed,
+        )
+        for i in range(n)
+    ]  # fmt: skip
+    pad = (0.0,) * (3 - dims)
+    now = [State(*map(float, start[:dims, i]), *pad, *map(float, start[dims:, i]), *pad) for i in range(n)]
+    past, frames, commands = [now], [], [(0.0, 0.0, 0.0)] * n
+    for step in range(round(scenario.flight.duration / dt) + 1):
+        if step % every == 0:
+            said = past[max(step - late, 0)]
+            for i, pilot in enumerate(pilots):
+                for j in range(n):
+                    if math.dist(now[i][:3], now[j][:3]) <= k.range:
+                        pilot.hear(j, said[j], (step - late) * dt, step * dt)
+                    else:
+                        pilot.forget(j)
+                commands[i] = law_command(pilot, now[i], step * dt)
+        if step % sampled == 0:
+            frames.append([s[:dims] for s in now])
+        now = [moved(scenario, s, c, dt) for s, c in zip(now, commands, strict=True)]
+        past.append(now)
+    return np.array(frames)
+
+
+def law_command(pilot, own, time):
+    """What the law commands, before the pilot turns it into a setpoint: the bodies here take it as it is."""
+    kept, made = pilot.setpoint, []
+    pilot.setpoint = lambda own, command: made.append(command) or kept(own, command)
+    velocity = pilot.decide(own, time).command
+    pilot.setpoint = kept
+    x, y, z = made[0]
+    if pilot.model.command == "velocity":
+        assert velocity[:2] == (x, y)
+    return x, y, 0.0 if pilot.flat else z
+
+
+def moved(scenario, s, c, dt):
+    body = scenario.vehicle
+    known = {"v": s[3:], "m": s[3:], "c": c, "g": (0.0,) * 3, "w": (0.0,) * 3}
+    given = {a + axis: v[k] for a, v in known.items() for k, axis in enumerate("xyz")}
+    velocity = answer(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
+    old = choices(scenario.body).get("integration", body.integration) == "old"
+    vx, vy, vz = s[3:] if old else velocity
+    x, y, z = s.x + vx * dt, s.y + vy * dt, s.z + vz * dt
+    if scenario.world.edges == "bounce":
+        half = 0.5 * scenario.world.side
+        flip = [-1.0 if abs(a) > half else 1.0 for a in (x, y)]
+        x, y = (min(max(a, -half), half) for a in (x, y))
+        velocity = (flip[0] * velocity[0], flip[1] * velocity[1], velocity[2])
+    return State(x, y, z, *velocity)
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_pilots_fly_what_the_simulator_flies(name):
+    scenario, seed = build(name), 3
+    begun = airflock.simulate(scenario, seed, precision=64, device="python")
+    dims = scenario.dimensions
+    first = begun.isel(time=0)
+    axes = [first.position.values, first.velocity.values]
+    start = np.concatenate([a.reshape(dims, -1)[:, : scenario.agents] for a in axes])
+    theirs = begun.position.transpose("time", "individual", "space", ...).values.reshape(-1, scenario.agents, dims)
+    ours = fly(scenario, start, seed)
+    assert ours.shape == theirs.shape
+    assert np.abs(ours - theirs).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["square", "islands", "silo", "pentagon", "forest"])
+@given(at=st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-60, 60)), turn=st.floats(0, 6.28))
+@settings(max_examples=60, deadline=None)
+def test_a_place_on_board_is_the_engines_world(name, at, turn):
+    from airflock.engine.place import Place as Engine
+
+    scenario = build(name)
+    ours, theirs = place_of(scenario), Engine(scenario)
+    x, y, z = at if scenario.dimensions == 3 else (*at[:2], 0.0)
+    u = (math.cos(turn), math.sin(turn), 0.0)
+    assert list(ours.surfaces(x, y, z)) == list(theirs.surfaces(x, y, z))
+    assert ours.excursion(x, y, z) == theirs.excursion(x, y, z)
+    assert ours.ray(x, y, z, *u, 70.0) == min(70.0, theirs.ray(x, y, z, *u))
+    assert ours.cast(x, y, z, *u, 70.0, 0.5) == theirs.cast(State(x, y, z, 0.0, 0.0, 0.0), u, 70.0, 0.5)
+
+
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=3, max_size=7))
+@settings(max_examples=200)
+def test_polygons_are_judged_as_shapely_judges_them(corners):
+    from shapely.geometry import Polygon
+
+    from airflock.scenarios.geometry import polygon_fault as theirs
+
+    whole = [(round(x, 1), round(y, 1)) for x, y in corners]
+    shape = Polygon(whole)
+    if len(set(whole)) < len(whole) or (shape.is_valid and shape.area < 1.0):
+        return  # repeated corners and slivers: a matter of rounding
+    assert bool(polygon_fault(whole)) == bool(theirs(whole)), whole
+    if not theirs(whole):
+        assert Polygon(counter_clockwise(whole)).exterior.is_ccw
+
+
+# ------------------------------------------------------------------------------------------------ what a pilot is
+
+
+def pilot(**more):
+    law = model(vasarhelyi_2018)
+    return Pilot(law, law.Parameters(), Place(arena.Parameters()), **({"index": 0, "period": 0.2, "flat": True} | more))
+
+
+def test_a_law_that_no_single_drone_can_fly_is_refused_when_the_pilot_is_made():
+    flock = model(dimock_2003)
+    with pytest.raises(RuleError, match="whole flock"):
+        Pilot(flock, flock.Parameters(), Place(arena.Parameters()), index=0, period=0.2)
+    heading = model(vicsek_1995)
+    with pytest.raises(RuleError, match="give a body"):
+        Pilot(heading, heading.Parameters(), Place(arena.Parameters()), index=0, period=0.2)
+    with pytest.raises(RuleError, match="not positive"):
+        pilot(period=0.0)
+
+
+def test_only_the_newest_sound_packet_counts():
+    one = pilot()
+    assert one.hear(3, State(1.0, 2.0, 0.0, 1.0, 0.0, 0.0), 5.0, 5.1)
+    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 4.9, 5.2)
+    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.0, 5.2)
+    assert not one.hear(3, State(9.0, 9.0, 0.0, 0.0, 0.0, 0.0), 5.9, 5.2)
+    assert not one.hear(3, State(math.nan, 9.0, 0.0, 0.0, 0.0, 0.0), 5.15, 5.2)
+    assert not one.hear(4, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), math.nan, 5.2)
+    assert not one.hear(0, State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 5.1, 5.2)
+    (heard,) = one.heard(7.0)
+    assert heard.state == State(3.0, 2.0, 0.0, 1.0, 0.0, 0.0) and heard.age == 2.0
+    assert not one.heard(10.1)
+
+
+@given(st.floats(0, 200), st.floats(0, 60), st.floats(0, 60))
+def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, age, longer):
+    s = Silence()
+    if could_be_near(distance, age, s) and age + longer < s.forget:
+        assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
+    assert not could_be_near(distance, s.forget, s)
+    assert not could_be_near(distance, min(age, s.patience), s), "data younger than the patience stop nobody"
+
+
+def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
+    one, own = pilot(silence=Silence()), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    assert math.hypot(*one.decide(own, 2.0).command[:2]) > 1.0
+    assert one.decide(own, 4.0).command == (0.0, 0.0, 0.0)
+    one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
+    assert math.hypot(*one.decide(own, 4.2).command[:2]) > 1.0
+    one.forget(1)
+    assert not one.lost_near(own, 9.0)

@@ -1,0 +1,129 @@
+"""The stages of a driver are the trees on record: whoever changes what a driver computes sees it here first.
+
+Recorded from the drivers whose passes were written as text (`tests/trees.py` says what is normalised). After a change
+that is meant: python tests/agreement/test_trees.py
+"""
+
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from airflock.engine.cuda import cells, kernel
+from airflock.engine.cuda.build import CudaBuilder
+from airflock.engine.cuda.shape import shape_of
+from airflock.engine.passes import build as building
+from airflock.engine.passes import driver
+from airflock.engine.simulate import plan_of
+from airflock.engine.specialise import values
+from airflock.engine.stages import move, neighbours, noise, perceive, receive, surfaces
+from airflock.scenarios.files import load, presets
+from flocks import ISLANDS, PENTAGON, SILENT, scenario
+from trees import digests
+
+RECORD = Path(__file__).with_suffix(".json")
+OTHERS = {
+    "3-D": ("vasarhelyi_2018", {"world__dimensions": "3"}),
+    "links": ("vasarhelyi_2018", {"radio__kind": "links", "radio__near": 5.0, "radio__far": 20.0}),
+    "links, loss, late, 3-D": ("vasarhelyi_2018", {
+        "radio__kind": "links", "radio__loss": 0.5, "radio__delay": 0.2, "world__dimensions": "3",
+    }),
+    "loss, gusts": ("viragh_2014", {"radio__loss": 0.7, "wind__gust": 2.0}),
+    "quiet": ("vasarhelyi_2018", SILENT),
+    "quiet, at once": ("vasarhelyi_2018", SILENT | {"radio__delay": 0.0}),
+    "periodic, loss": ("vasarhelyi_2018", {"world__edges": "periodic", "radio__loss": 0.3}),
+    "bounce": ("vasarhelyi_2018", {"world__edges": "bounce"}),
+    "silo, islands": ("viragh_2014", {
+        "world__dimensions": "3", "world__arena": "circle", "world__obstacles": ISLANDS,
+    }),
+    "polygon": ("vasarhelyi_2018", {"world__arena": "polygon", "world__corners": PENTAGON}),
+}  # fmt: skip
+
+
+def scenarios():
+    """One preset of each plan, and other plans, by name."""
+    found, seen = {}, set()
+    for name in presets():
+        one = load(name)
+        if (plan := plan_of(one, precision=32)) not in seen:
+            seen.add(plan)
+            found[name] = one
+    common = {"agents": 6, "world__side": 60.0, "world__height": 40.0, "start__separation": 5.0}
+    kinds = {name: {key.replace(".", "__"): value for key, value in keys.items()} for name, (_, keys) in OTHERS.items()}
+    return found | {name: scenario(OTHERS[name][0], **common, **keys) for name, keys in kinds.items()}
+
+
+SCENARIOS = scenarios()
+
+
+def trees_of(make, *given, builder=building.Builder):
+    """Digests of the stages in a driver's text."""
+    made = []
+    first = builder.__init__
+
+    def remembered(self, *arguments, **named):
+        first(self, *arguments, **named)
+        made.append(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(builder, "__init__", remembered)
+        text = make(*given)
+    return digests(text, made[0].rows)
+
+
+def found_of(name):
+    """Digests of the drivers of a scenario: in single precision, in double with a recording, of a GPU, by cells."""
+    one = SCENARIOS[name]
+    plan = plan_of(one, precision=32).built(grid=False)
+    shape = shape_of(one.agents, 1, sequential=plan.sequential, whole=bool(plan.model.flock))
+    found = {"32": trees_of(driver.flight, plan), "64": trees_of(driver.flight, plan.built(bits=64, record=True))}
+    if found["64"] == found["32"]:
+        del found["64"]
+    found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
+    alone = not (plan.noisy or plan.delayed or plan.lossy or plan.links or plan.sequential)
+    if alone and plan.model.neighbour is not None and plan.model.reach is not None:
+        found["grid"] = trees_of(driver.flight, plan.built(grid=True))
+        if plan.start in ("arena", "ball") and not plan.model.flock:
+            found["cells"] = trees_of(cells.crowd, plan.built(grid=True), builder=CudaBuilder)
+    return found
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_stages_are_the_trees_on_record(name):
+    assert found_of(name) == json.loads(RECORD.read_text())[name]
+
+
+CHANGES = (
+    (receive, "real(decision), k.fast_rate", "real(decision), k.slow_rate", "links"),
+    (neighbours, "integer(j) != ii)", "integer(j) == ii)", "quiet"),
+    (neighbours, "if plan.periodic:", "if plan.delayed:", "quiet"),
+    (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
+    (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
+    (perceive, "flock.position[a][i] + flock.own_error", "flock.position[a][i] + flock.sent_error", "3-D"),
+    (noise, "step % 2 == 0", "step % 2 == 1", "links"),
+)
+
+
+@pytest.mark.parametrize(("module", "old", "new", "name"), CHANGES, ids=[f"{c[0].__name__}-{c[1]}" for c in CHANGES])
+def test_one_changed_word_of_a_stage_is_seen(module, old, new, name, monkeypatch):
+    text = Path(module.__file__).read_text()
+    assert old in text
+    changed = {module.__file__: text.replace(old, new)}
+    lines = SimpleNamespace(getlines=lambda path: [changed.get(path) or Path(path).read_text()])
+    monkeypatch.setattr(values, "linecache", lines)
+    values._module.cache_clear()
+    values.text_of.cache_clear()
+    try:
+        plan = plan_of(SCENARIOS[name], precision=32).built(grid=False)
+        assert trees_of(driver.flight, plan) != json.loads(RECORD.read_text())[name]["32"]
+    finally:
+        values._module.cache_clear()
+        values.text_of.cache_clear()
+
+
+if __name__ == "__main__":
+    RECORD.write_text(json.dumps({name: found_of(name) for name in SCENARIOS}, indent=0) + "\n")

@@ -1,0 +1,301 @@
+"""Fleets in lock-step fly what the simulator flies, the same bits each time, and get home whatever fails."""
+
+import asyncio
+import io
+import math
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airflock.core.agent import State
+from airflock.errors import ScenarioError
+from airflock.fleet import compare
+from airflock.fleet.ether import Ether
+from airflock.fleet.faults import KINDS, Fault, read_faults
+from airflock.fleet.lockstep import KEY
+from airflock.fleet.vehicle import Vehicle
+from airflock.mavlink import dialect
+from airflock.mavlink.autopilots import AUTOPILOTS, Speaker
+from airflock.mavlink.coordinates import Site
+from airflock.mavlink.frames import frames_in
+from airflock.mavlink.orders import Do
+from airflock.onboard.log import replay
+from airflock.onboard.mission import Phase
+from airflock.onboard.ports import open_port
+from airflock.onboard.run import fly as fly_node
+from airflock.recordings.scores import measure
+from fleets import card, fleet, scenario
+
+
+def in_the_air(agents, duration, seed=0, faults=(), noisy=False, silent=False, **more):
+    """A fleet that starts where the simulated agents start."""
+    found = compare.sampled(scenario(agents, duration, noisy, **more), 0.2)
+    made = compare.software_card(found, silent=silent)
+    return compare.fly(found, made, seed, faults=faults)
+
+
+# ------------------------------------------------------------------------------------------- beside the simulator
+
+
+def test_three_drones_fly_the_simulated_flight_for_a_minute():
+    """No noise, signed packets of 1.1 cm, MAVLink setpoints: 0.2 m after 60 s."""
+    flown = in_the_air(3, 60.0)
+    apart = compare.departure(flown, [60.0])
+    assert apart.fleet[0] < 0.2
+    assert set(flown.phases()) == {Phase.FLOCK} and not flown.log
+    assert all(not any(node.refused.values()) for node in flown.nodes)
+
+
+ODD = [{"radio.loss": 0.5, "radio.loss_at": 40.0}, {"radio.kind": "links"}, {"world.dimensions": "3"}]
+
+
+@pytest.mark.parametrize("settings", ODD, ids=str)
+def test_with_lossy_radios_and_in_space_too(settings):
+    """The ether throws the simulator's dice, so both lose the same packets: 1 cm after 3 s."""
+    apart = compare.departure(in_the_air(3, 3.2, **settings), [3.0], device="python")
+    assert apart.fleet[0] < 0.01
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ten_drones_leave_it_no_faster_than_the_simulation_leaves_itself(seed):
+    """After 5 s at most 5 cm; or, where an agent turns round, no more than the simulation after nudges of 3 cm."""
+    apart = compare.departure(in_the_air(10, 5.2, seed), [5.0])
+    assert apart.fleet[0] < max(0.05, 3.0 * apart.nudged[0]), apart
+
+
+def test_the_recording_of_a_fleet_is_measured_like_any_other(tmp_path):
+    from airflock.recordings.files import load_recording, save
+
+    flown = in_the_air(4, 4.0, noisy=True)
+    made = compare.recording(flown)
+    kept = load_recording(save(made, tmp_path / "fleet.nc"))
+    assert measure(kept)[0]["phi_vel"] == pytest.approx(measure(made)[0]["phi_vel"])
+    assert set(kept.position.dims) == {"time", "space", "keypoint", "individual"} and "own_position" in kept
+    assert np.abs(kept.own_position.values - kept.position.values).max() < 3.0
+
+
+SAME = "from test_fleet import same_again; import sys; sys.stdout.write(same_again())"
+
+
+def same_again():
+    """Digest of a short flight with every kind of dice."""
+    return in_the_air(3, 3.0, 5, noisy=True, **{"radio.loss": 0.5}).digest()
+
+
+def test_the_same_seed_gives_the_same_bits_in_two_processes():
+    here = str(Path(__file__).parent)
+    code = f"import sys; sys.path[:0] = [{here!r}, {str(Path(here).parent)!r}]; {SAME}"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    assert told.stdout == same_again() and len(told.stdout) == 64
+
+
+@pytest.mark.parametrize("kind", ["constant", "links"])
+def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
+    """Counted by arrivals: the share that a radio of the simulator lets through at this distance."""
+    from airflock.body import radio
+
+    k = radio.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
+    ether = Ether(k, [1, 2], 3, 0.2)
+    at, count = [(0.0, 0.0, 0.0), (70.0, 0.0, 0.0)], 4000
+    heard = 0
+    for step in range(count):
+        ether.send(0.2 * step, 0, b"x")
+        heard += len(list(ether.deliver(0.2 * step + 0.2, at)))
+    if kind == "constant":
+        share = 1.0 - radio.lost(70.0, k)
+    else:
+        fast, slow = (radio.received(70.0, float(link), k) for link in (0, 1))
+        share = 1.0 - (1.0 - fast) ** 2 * (0.8 + 0.2 * (1.0 - slow))  # the slow link sends in each fifth period
+    assert heard / count == pytest.approx(share, abs=0.03)
+
+
+# ------------------------------------------------------------------------------------------------ whole missions
+
+
+@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+def test_a_whole_mission_from_the_ground_and_back(kind):
+    f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), autopilot=kind)
+    f.advance(10.0)
+    assert set(f.phases()) == {Phase.CLEARED} and not any(v.armed for v in f.vehicles)
+    f.order(Do.START, at=10.0)
+    f.advance(45.0)
+    assert set(f.phases()) == {Phase.FLOCK} and min(v.state.z for v in f.vehicles) > 15.0
+    f.order(Do.HOLD, target=2)
+    f.advance(6.0)
+    assert f.nodes[1].phase == Phase.HOLD and math.hypot(*f.vehicles[1].state[3:]) < 0.3
+    f.order(Do.RESUME, target=2)
+    f.advance(8.0)
+    assert f.nodes[1].phase == Phase.FLOCK
+    f.order(Do.RETURN)
+    f.advance(110.0)
+    assert set(f.phases()) == {Phase.DONE} and not any(v.armed for v in f.vehicles)
+    rows = f.array()
+    gaps = np.linalg.norm(rows[:, :, None, :3] - rows[:, None, :, :3], axis=-1) + 1e9 * np.eye(3)
+    assert gaps.min() > 1.5
+    for v in f.vehicles:
+        assert math.dist(v.state[:3], v.home) < 3.0
+
+
+def grounded(faults, seconds=60.0, **more):
+    """A mission of three with faults, which begin after 55 s in the air; phases that each drone went through."""
+    f = fleet(scenario(3, 600.0, **{"radio.delay": 0.2}), faults=faults, **more)
+    f.advance(10.0)
+    f.order(Do.START, at=10.0)
+    f.advance(45.0 + seconds)
+    return f
+
+
+FAULTS = [
+    (Fault("pilot", (2,), 56.0), {2: Phase.MANUAL}, "mode is not ours"),
+    (Fault("gnss", (2,), 56.0), {2: Phase.DONE}, "no position for too long"),
+    (Fault("battery", (2,), 56.0, amount=20.0), {2: Phase.DONE}, "just enough for the way home"),
+    (Fault("battery", (2,), 56.0, amount=5.0), {2: Phase.DONE}, "battery is critical"),
+    (Fault("outage", (), 56.0), {1: Phase.DONE, 2: Phase.DONE, 3: Phase.DONE}, "nobody is heard for too long"),
+]
+
+
+@pytest.mark.parametrize(("fault", "ends", "line"), FAULTS, ids=lambda v: getattr(v, "kind", ""))
+def test_what_fails_ends_as_the_table_says(fault, ends, line):
+    f = grounded([fault], 110.0)
+    assert any(line in note for _, who, note in f.log if who in ends), f.log[-9:]
+    for who, phase in ends.items():
+        assert f.nodes[who - 1].phase == phase, f.log[-9:]
+    others = {node.phase for node in f.nodes if node.member not in ends}
+    assert others <= {Phase.FLOCK, Phase.HOLD, Phase.RETURN, Phase.LAND, Phase.DONE}
+
+
+def test_silence_does_not_end_in_a_collision():
+    """15 s in which nobody hears anybody: with the rule of silence no two drones meet, without it they do."""
+    mute, lows = (Fault("outage", (), 5.0, 20.0),), {}
+    for silent in (True, False):
+        rows = in_the_air(10, 20.0, 3, mute, noisy=True, silent=silent).array()[25:, :, :3]
+        gaps = np.linalg.norm(rows[:, :, None] - rows[:, None], axis=-1) + 1e9 * np.eye(10)
+        lows[silent] = float(gaps.min())
+    assert lows[True] > 3.0 > lows[False]
+
+
+def test_a_clock_that_is_half_a_second_off_never_starts():
+    f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), faults=[Fault("clock", (2,), amount=0.5)])
+    f.advance(10.0)
+    f.order(Do.START, at=10.0)
+    f.advance(20.0)
+    assert f.nodes[1].phase == Phase.READY and not f.vehicles[1].armed
+    assert any("missing: clock: -0.50 s" in note for _, who, note in f.log if who == 2), f.log
+
+
+def test_faults_are_checked_at_once(tmp_path):
+    path = tmp_path / "faults.toml"
+    path.write_text('[[fault]]\nkind = "outage"\nwho = [1, 3]\nbegin = 5\nend = 9.5\n')
+    assert read_faults(path, (1, 2, 3)) == (Fault("outage", (1, 3), 5, 9.5),)
+    path.write_text('x = 1\n[[fault]]\nkind = "storm"\n[[fault]]\nkind = "loss"\nwho = [9]\nwhom = 1\namount = 2.0\n')
+    with pytest.raises(ScenarioError) as fault:
+        read_faults(path, (1, 2, 3))
+    for part in ("x is not known", f"none of {', '.join(KINDS)}", "who = [9]", "whom is not known"):
+        assert any(part in line for line in fault.value.faults), part
+    path.write_text("[[fault")
+    with pytest.raises(ScenarioError):
+        read_faults(path, (1,))
+
+
+# ------------------------------------------------------------------------------------------------------- vehicles
+
+
+def vehicle(kind="px4"):
+    found = scenario(1)
+    return Vehicle(kind, 1, Site(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body)
+
+
+@pytest.mark.parametrize(("kind", "travels"), [("px4", (6.0, 9.0)), ("ardupilot", (6.0, 9.0))])
+def test_after_the_last_setpoint_a_vehicle_stops_within_its_time_out(kind, travels):
+    """At 4 m/s: 1 s of time-out and 1 s of relaxation."""
+    v = vehicle(kind)
+    v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS"
+    v.target, v.target_at = (4.0, 0.0, 0.0), 0.0
+    for k in range(1500):
+        v.step(0.01 * k, 0.01)
+    assert travels[0] < v.state.x < travels[1]
+    assert v.mode == ("HOLD" if kind == "px4" else "OURS")
+
+
+def test_px4_takes_our_mode_only_after_a_second_of_setpoints():
+    v, say = vehicle(), Speaker(AUTOPILOTS["px4"], 1)
+
+    def result(data, now):
+        return [f.values()["result"] for f in frames_in(v.receive(data, now)) if f.message == 77]
+
+    assert result(say.set_mode(AUTOPILOTS["px4"].ours), 0.0) == [2]
+    for k in range(25):
+        v.receive(say.velocity((0.0, 0.0, 0.0), 0), 0.05 * k)
+    assert result(say.set_mode(AUTOPILOTS["px4"].ours), 1.2) == [0] and v.mode == "OURS"
+    assert result(say.set_mode(12345), 1.2) == [2]
+
+
+def test_a_vehicle_takes_any_bytes_and_only_finite_setpoints():
+    import random
+
+    v, rng, say = vehicle(), random.Random(4), Speaker(AUTOPILOTS["px4"], 1)
+    for _ in range(300):
+        v.receive(rng.randbytes(rng.randrange(300)), 0.0)
+    pack = dialect.common()
+    bad = pack.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DC7, 0, 0, 0, math.nan, 0, 0, 0, 0, 0, 0, 0)
+    v.receive(bytes(600) + say._pack(bad), 0.0)
+    assert v.target == (0.0, 0.0, 0.0) and v.target_at < 0.0
+
+
+# ---------------------------------------------------------------------------------------------- on the real clock
+
+
+def free_ports(count):
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    for one in sockets:
+        one.bind(("127.0.0.1", 0))
+    ports = [one.getsockname()[1] for one in sockets]
+    for one in sockets:
+        one.close()
+    return ports
+
+
+def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
+    """One node and one vehicle on UDP until the node is ready, or for 20 s; then its log gives the same outputs."""
+    found = scenario(1, 60.0)
+    made = card(found, members=[1])
+    node_port, vehicle_port, radio_port, far_port = free_ports(4)
+    craft = vehicle()
+    craft.started = time.time_ns() // 1000
+    begun, log, said = time.monotonic(), io.StringIO(), []
+    line = open_port(f"udp:127.0.0.1:{vehicle_port}>127.0.0.1:{node_port}")
+    ports = [
+        open_port(f"udp:127.0.0.1:{node_port}>127.0.0.1:{vehicle_port}"),
+        open_port(f"udp:127.0.0.1:{radio_port}>127.0.0.1:{far_port}"),
+    ]
+
+    async def live():
+        while True:
+            now = time.monotonic() - begun
+            for data in line.read():
+                line.write(craft.receive(data, now))
+            line.write(craft.telemetry(now))
+            await asyncio.sleep(0.02)
+
+    async def both():
+        task = asyncio.create_task(live())
+        await fly_node(
+            made, 1, KEY, ports, tmp_path / "memory", log, said.append,
+            until=lambda: any("CLEARED" in s for s in said) or time.monotonic() - begun > 20.0,
+        )  # fmt: skip
+        task.cancel()
+
+    asyncio.run(both())
+    for port in (*ports, line):
+        port.close()
+    assert any("READY → CLEARED" in text for text in said), said
+    assert not craft.armed
+    ticks = list(replay(log.getvalue().splitlines(), made, KEY))
+    assert ticks and all(tick.same for tick in ticks)
+    assert (tmp_path / "memory").exists()

@@ -1,0 +1,403 @@
+"""A node takes any bytes, obeys only its operator, can be flown again from its log, and needs no array library."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from airflock.errors import CardError, LinkError
+from airflock.fleet.lockstep import KEY, STARTED
+from airflock.fleet.vehicle import Vehicle
+from airflock.mavlink import dialect, orders, status
+from airflock.mavlink.coordinates import Geodetic
+from airflock.mavlink.frames import Packer, frames_in
+from airflock.mavlink.orders import Do, Order, new_keys
+from airflock.mavlink.signing import Signer
+from airflock.mavlink.status import Status
+from airflock.onboard.card import card_of, hash_of, read_card, write_card
+from airflock.onboard.log import Logged, read_memory, replay
+from airflock.onboard.mission import Phase
+from airflock.onboard.node import Memory, Node
+from fleets import PRIVATE, document, fleet, scenario
+
+common = dialect.common()
+SCENARIO = scenario(3)
+CARD = card_of({**(d := document(SCENARIO)), "hash": hash_of(d)})
+
+
+def node_with_vehicle(**more):
+    node = Node(CARD, 1, KEY, now=0.0, utc=STARTED)
+    vehicle = Vehicle("px4", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED, **more)
+    return node, vehicle
+
+
+def live(node, vehicle, begin, end):
+    """Let both live from begin to end, s, without neighbours."""
+    notes, t = [], begin
+    while t < end:
+        node.autopilot(vehicle.telemetry(t), t)
+        out = node.tick(t)
+        for data in out.autopilot:
+            node.autopilot(vehicle.receive(data, t), t)
+        notes += out.notes
+        for k in range(20):
+            vehicle.step(t + 0.01 * k, 0.01)
+        t = round(t + 0.2, 6)
+    return notes
+
+
+def told(who=2, at=(10.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), utc=STARTED, phase=Phase.READY, flies=False, **more):
+    made = Status(utc, at, velocity, 1.0, int(phase), flies, CARD.mission, bytes.fromhex(CARD.hash)[:4], 90)
+    return Signer(KEY, who)(status.message(made._replace(**more), CARD.site), utc)
+
+
+def state(node):
+    """Everything that bytes could change."""
+    wire = {k: v for k, v in vars(node.wire).items() if k not in ("refused", "_stream", "_site", "_kind", "_jump")}
+    peers = {w: (p.status, p.at, p.heard_at) for w, p in node.peers.all.items()}
+    return repr((node.phase, wire, peers, node.memory, {w: p.state for w, p in node.pilot.packets.items()}))
+
+
+# --------------------------------------------------------------------------------------------- whatever comes in
+
+
+@given(st.lists(st.one_of(st.binary(max_size=400), st.binary(max_size=40).map(lambda b: b"\xfd" + b)), max_size=12))
+@settings(max_examples=200)
+def test_any_bytes_change_nothing_and_raise_nothing(pieces):
+    node, _ = node_with_vehicle()
+    before = state(node)
+    for k, data in enumerate(pieces):
+        node.autopilot(data, 0.01 * k)
+        node.radio(data, 0.01 * k)
+    if not any(frames_in(data) for data in [*pieces, b"".join(pieces)]):
+        assert state(node) == before
+    node.tick(0.2)
+
+
+odd = st.one_of(st.floats(width=32), st.sampled_from([math.nan, math.inf, -math.inf, 1e9, -1e9, 3e38]))
+
+
+@given(st.tuples(*[odd] * 6))
+def test_an_absurd_own_position_is_not_believed(numbers):
+    node, vehicle = node_with_vehicle()
+    live(node, vehicle, 0.0, 1.0)
+    before = node.wire.state
+    node.autopilot(Packer(1, 1)(common.MAVLink_local_position_ned_message(0, *numbers)), 1.0)
+    sound = all(math.isfinite(v) and abs(v) < 1e5 for v in numbers)
+    assert sound or node.wire.state == before
+    assert all(map(math.isfinite, node.wire.state))
+    node.tick(1.0)
+
+
+@pytest.mark.parametrize("told_", [
+    {"at": (1e6, 0.0, 0.0)}, {"velocity": (300.0, 0.0, 0.0)}, {"phase": 200}, {"mission": 8}, {"card": b"othe"},
+    {"who": 1}, {"who": 9}, {"utc": STARTED + 2_400_000_000_000_000}, {"at": (0.0, 0.0, -5000.0)},
+])  # fmt: skip
+def test_a_signed_but_absurd_status_is_not_believed(told_):
+    node, _ = node_with_vehicle()
+    before = state(node)
+    node.radio(told(**({"utc": STARTED + 100_000} | told_)), 0.1)
+    assert [p.status for p in node.peers.all.values()] == [None, None] and not node.pilot.packets
+    assert node.phase == Phase.BOOT and state(node).split("Memory")[0] == before.split("Memory")[0]
+
+
+def test_a_neighbour_that_jumps_is_not_believed():
+    node, _ = node_with_vehicle()
+    sign = Signer(KEY, 2)
+    for k, x in enumerate((10.0, 10.5, 90.0, 11.5)):
+        utc = STARTED + 100_000 * (k + 1)
+        made = Status(utc, (x, 0.0, 20.0), (4.0, 0.0, 0.0), 1.0, 6, True, 7, bytes.fromhex(CARD.hash)[:4])
+        node.radio(sign(status.message(made, CARD.site), utc), 0.1 * (k + 1))
+    assert node.peers.refused["jump"] == 1 and node.peers.all[2].status.position[0] == pytest.approx(11.5, abs=0.02)
+
+
+# -------------------------------------------------------------------------------------------------- who is obeyed
+
+
+def order(do, private=PRIVATE, given=STARTED + 100_000, mission=7, sender=orders.OPERATOR, **more):
+    made = orders.message(Order(do, more.get("target", 0), mission, given, more.get("at", 0)), private)
+    return Signer(KEY, sender)(made, given)
+
+
+def test_only_a_fresh_order_of_the_operator_counts_and_only_once():
+    node, _ = node_with_vehicle()
+    other, _ = new_keys()
+    node.radio(order(Do.HOLD, private=other), 0.1)
+    node.radio(order(Do.HOLD, sender=2, given=STARTED + 110_000), 0.2)
+    node.radio(order(Do.HOLD, mission=8, given=STARTED + 120_000), 0.2)
+    assert not node.operator.held and node.operator.refused["seal"] == node.operator.refused["mission"] == 1
+    genuine = order(Do.HOLD, given=STARTED + 130_000)
+    node.radio(genuine, 0.2)
+    assert node.operator.held
+    again = Node(CARD, 1, KEY, now=0.0, utc=STARTED, memory=node.memory)
+    again.radio(genuine, 0.2)
+    assert not again.operator.held, "the same order after a restart"
+
+
+def test_a_kill_takes_two_steps():
+    node, _ = node_with_vehicle()
+    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 100_000), 0.1)
+    assert not node.operator.killed
+    node.radio(order(Do.KILL, given=STARTED + 200_000), 0.2)
+    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 300_000, target=2), 0.3)
+    assert not node.operator.killed
+    node.radio(order(Do.CONFIRM_KILL, given=STARTED + 400_000, target=1), 0.4)
+    assert node.operator.killed
+
+
+def test_nothing_arms_without_a_start_and_nothing_starts_with_something_missing():
+    node, vehicle = node_with_vehicle()
+    notes = live(node, vehicle, 0.0, 3.0)
+    assert node.phase == Phase.READY and not vehicle.armed
+    assert {n for n in notes if n.startswith("missing")} == {
+        "missing: drone 2 is not heard", "missing: drone 3 is not heard",
+    } | {n for n in notes if "autopilot has not told" in n}  # fmt: skip
+    node.radio(order(Do.START, given=STARTED + 3_000_000, at=STARTED + 3_000_000), 3.0)
+    live(node, vehicle, 3.2, 10.0)
+    assert node.phase == Phase.READY and not vehicle.armed
+
+
+@pytest.mark.parametrize(("change", "line"), [
+    (lambda v: v.parameters.update(COM_OF_LOSS_T=3.0), "COM_OF_LOSS_T = 3 lies outside"),
+    (lambda v: v.parameters.update(GF_ACTION=0), "GF_ACTION = 0 lies outside"),
+    (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),
+    (lambda v: setattr(v, "accuracy", 9.0), "accuracy 9.0 m"),
+    (lambda v: setattr(v, "started", STARTED + 700_000), r"clock: \+0.70 s"),
+    (lambda v: setattr(v, "state", v.state._replace(x=500.0)), "outside the fence: is the card's site right"),
+])  # fmt: skip
+def test_each_miss_is_told_in_a_line(change, line):
+    import re
+
+    node, vehicle = node_with_vehicle()
+    change(vehicle)
+    vehicle.origin = CARD.site.geodetic(*vehicle.state[:2], 0.0)
+    notes = live(node, vehicle, 0.0, 2.0)
+    assert [n for n in notes if re.search(line, n)], notes
+
+
+def test_another_autopilot_is_a_fault():
+    node, _ = node_with_vehicle()
+    other = Vehicle("ardupilot", 1, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED)
+    assert any("the card is for px4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == Phase.FAULT
+    node, _ = node_with_vehicle()
+    other = Vehicle("px4", 4, CARD.site, (0.0, 0.0, 0.0), SCENARIO.vehicle, SCENARIO.body, started=STARTED)
+    assert any("calls itself system 4" in n for n in live(node, other, 0.0, 1.0)) and node.phase == Phase.FAULT
+
+
+def test_two_drones_with_one_number_do_not_start():
+    node, vehicle = node_with_vehicle()
+    live(node, vehicle, 0.0, 1.0)
+    for datagram in node.tick(1.0).radios[0] + node.tick(1.2).radios[0]:
+        node.radio(datagram, 1.2)  # a radio that hears itself
+    node.radio(
+        Signer(bytes(32), 1)(status.message(node._status(node.wire.state, 1.2), CARD.site), STARTED + 10**6), 1.2
+    )
+    live(node, vehicle, 1.4, 2.0)
+    assert node.phase == Phase.READY, "neither an echo nor a forgery is a twin"
+    node.radio(told(who=1, utc=STARTED + 2_050_123), 2.1)
+    assert any("two drones with one number" in n for n in live(node, vehicle, 2.2, 3.0)) and node.phase == Phase.FAULT
+
+
+def test_a_node_that_starts_in_the_air_leaves_it_to_the_pilot():
+    node, vehicle = node_with_vehicle()
+    vehicle.state, vehicle.armed, vehicle.mode = vehicle.state._replace(z=20.0), True, "HOLD"
+    live(node, vehicle, 0.0, 2.0)
+    assert node.phase == Phase.MANUAL and node.command == (0.0, 0.0, 0.0) and vehicle.target_at < 0.0
+
+
+def test_a_law_that_fails_in_flight_holds_and_then_returns(monkeypatch):
+    f = fleet(SCENARIO)
+    f.advance(1.0)
+    node, vehicle = f.nodes[0], f.vehicles[0]
+    node.phase, node.home, vehicle.armed, vehicle.mode = Phase.FLOCK, (0.0, 0.0, 10.0), True, "OURS"
+    vehicle.state, vehicle.target_at = vehicle.state._replace(z=20.0), 1.0
+    monkeypatch.setattr(node.pilot, "decide", lambda *a, **k: 1 / 0)
+    f.advance(20.0)
+    notes = [note for _, who, note in f.log if who == 1]
+    assert any("ZeroDivisionError" in n for n in notes)
+    assert sum("HOLD: overloaded" in n for n in notes) == 3 and any("RETURN: overloaded too often" in n for n in notes)
+
+
+# ------------------------------------------------------------------------------------------------ cards and logs
+
+
+def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
+    path = tmp_path / "mission.json"
+    written = write_card(path, document(SCENARIO))
+    assert read_card(path).hash == written.hash == CARD.hash
+    changed = json.loads(path.read_text()) | {"height": 25.0}
+    path.write_text(json.dumps(changed))
+    with pytest.raises(CardError, match="changed after it was written"):
+        read_card(path)
+    for text, line in (("{", "is not JSON"), ("[]", "not a flight card"), ("[" * 10_000, "not JSON")):
+        path.write_text(text)
+        with pytest.raises(CardError, match=line):
+            read_card(path)
+    with pytest.raises(CardError, match="No such file"):
+        read_card(tmp_path / "absent")
+
+
+@pytest.mark.parametrize(("change", "line"), [
+    ({"members": [1, 1]}, "occurs twice"),
+    ({"members": [0, 300]}, "system ids from 1 to 250"),
+    ({"members": [True]}, "system ids"),
+    ({"height": 90.0}, "height = 90 m"),
+    ({"height": math.nan}, "height = nan is not a number"),
+    ({"autopilot": "betaflight"}, "none of px4, ardupilot"),
+    ({"period": 0.0}, "period = 0 lies outside"),
+    ({"heigth": 1.0}, "heigth is not known; did you mean height"),
+    ({"operator": "abc"}, "operator: is not a public key"),
+    ({"law": {"kind": "os"}}, "not a law of this version"),
+    ({"law": {"kind": "dimock_2003"}}, "no single drone can fly it"),
+    ({"safety": {"speed_max": 900.0, "breake": 2.0}}, "safety.speed_max = 900 m/s lies outside"),
+    ({"safety": {"breake": 2.0}}, "safety.breake is not known; did you mean safety.brake"),
+    ({"fence": {"corners": [[0, 0], [1, 0], [0, 1]], "low": 2.0, "high": 60.0}}, "does not hold the law's walls"),
+    ({"fence": {"corners": [[0, 0], [9, 0], [1, 1], [0, 9]], "low": 2.0, "high": 60.0}}, "not convex"),
+    ({"site": {"latitude": 95.0, "longitude": 0.0, "altitude": 0.0}}, "site.latitude = 95 lies outside"),
+    ({"world": {"arena": "square", "side": 120.0, "edges": "periodic"}}, "real space is open"),
+])  # fmt: skip
+def test_what_is_wrong_with_a_card_is_one_line(change, line):
+    made = {**document(SCENARIO), **change}
+    with pytest.raises(CardError, match=line) as fault:
+        card_of({**made, "hash": hash_of(made)})
+    assert all(text.startswith("card: ") for text in fault.value.faults)
+
+
+@given(st.data())
+@settings(max_examples=80, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+def test_a_card_of_anything_is_refused_or_sound(data):
+    made = document(SCENARIO)
+    key = data.draw(st.sampled_from(sorted(made)))
+    leaf = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+    row = leaf | st.lists(leaf, max_size=3)
+    anything = row | st.lists(row, max_size=3) | st.dictionaries(st.text(max_size=5), row, max_size=3)
+    made[key] = data.draw(anything)
+    try:
+        card_of({**made, "hash": hash_of(made)})
+    except CardError as fault:
+        assert fault.faults
+
+
+class Watched(Logged):
+    """A logged node that a fleet can ask for its state."""
+
+    def __getattr__(self, name):
+        return getattr(self.node, name)
+
+
+def test_a_log_is_flown_again_to_the_bit():
+    f = fleet(replace(SCENARIO), autopilot="px4")
+    lines = []
+    f.nodes[0] = Watched(f.nodes[0], lines.append, now=0.0, memory=Memory(), radios=(0.2,))
+    f.advance(12.0)
+    f.order(Do.START, at=12.2)
+    f.advance(25.0)
+    assert f.nodes[0].phase == Phase.FLOCK
+    ticks = list(replay(lines, f.card, KEY))
+    assert len(ticks) == 185 and all(tick.same for tick in ticks)
+    bent = [line.replace('"a":"fd', '"a":"fe') if k == 900 else line for k, line in enumerate(lines)]
+    assert not all(tick.same for tick in replay([bent[0], *bent[40:]], f.card, KEY)), "inputs that are missing are seen"
+    with pytest.raises(LinkError, match="another card"):
+        next(replay(lines, replace(f.card, hash="0" * 64), KEY))
+    with pytest.raises(LinkError, match="not a log"):
+        next(replay(["{}"], f.card, KEY))
+
+
+def test_the_memory_of_a_node_is_read_or_refused(tmp_path):
+    path = tmp_path / "memory"
+    assert read_memory(path) == Memory()
+    for text in ("", "[]", '{"sent": "x"}'):
+        path.write_text(text)
+        with pytest.raises(LinkError, match="cannot be read"):
+            read_memory(path)
+
+
+# ---------------------------------------------------------------------------------------------------- packaging
+
+REFUSED = (
+    "numpy", "numba", "scipy", "pydantic", "typer", "rich", "xarray", "pandas", "shapely", "matplotlib", "lxml",
+    "fastcrc",
+)  # fmt: skip
+ALONE = f"""
+import sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {REFUSED}:
+            raise ImportError(name + " is not installed on board")
+sys.meta_path.insert(0, Refuse())
+import airflock.onboard, airflock.onboard.run
+from airflock.onboard.run import main
+assert "cryptography" not in sys.modules, "seals are checked rarely"
+for kind in ("couzin_2002", "kidger", "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995"):
+    __import__("airflock.models." + kind)
+import resource
+peak = [int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmRSS")]
+sys.stdout.write(str(peak[0]) + "\\n")
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_node_needs_neither_numpy_nor_numba_nor_pydantic_nor_typer(tmp_path):
+    from airflock.mavlink.keys import write_key
+
+    write_card(tmp_path / "m.json", document(SCENARIO, expires=2**39))
+    write_key(tmp_path / "m.key", KEY)
+    given = [
+        "m.json",
+        "--member",
+        "2",
+        "--autopilot",
+        "udp:127.0.0.1:39411",
+        "--radio",
+        "udp:127.0.0.1:39412",
+        "--check",
+    ]
+    done = subprocess.run([sys.executable, "-c", ALONE, *given], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    memory, told = done.stdout.splitlines()
+    assert int(memory) < 40_000 and "3 members" in told  # kB; with pymavlink's dialect
+
+
+def test_the_command_tells_all_that_is_wrong_at_once(tmp_path, capsys):
+    from airflock.onboard.run import main
+
+    write_card(tmp_path / "m.json", document(SCENARIO))
+    code = main([str(tmp_path / "m.json"), "--member", "9", "--autopilot", "tcp:1", "--radio", "udp:127.0.0.1:99999"])
+    lines = capsys.readouterr().err.splitlines()
+    assert code == 2 and all(line.startswith("airflock: ") for line in lines)
+    for part in (
+        "members are 1, 2, 3",
+        "no key can be read",
+        "--i-am-the-pilot is missing",
+        "tcp:1: give",
+        "1 to 65535",
+    ):
+        assert any(part in line for line in lines), part
+
+
+def test_a_goal_outside_the_fence_is_not_followed():
+    f = fleet(scenario(3, duration=300.0))
+    f.advance(12.0)
+    f.order(Do.START, at=12.0)
+    f.advance(25.0)
+    far = CARD.site.geodetic(900.0, 0.0, 20.0)
+    f.order(Do.GOTO, point=Geodetic(*far))
+    f.advance(1.0)
+    assert set(f.phases()) == {Phase.FLOCK} and any("outside the fence; not followed" in n for _, _, n in f.log)
+    f.order(Do.GOTO, point=CARD.site.geodetic(25.0, 25.0, 20.0))
+    f.advance(40.0)
+    centre = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
+    assert set(f.phases()) == {Phase.GOTO} and math.dist(centre, (25.0, 25.0)) < 12.0
+    f.order(Do.GOTO, point=Geodetic(*far))
+    f.order(Do.HOLD)
+    f.advance(6.0)
+    assert set(f.phases()) == {Phase.HOLD}, "ordered to hold, they hold"
+    f.order(Do.GOTO, point=CARD.site.geodetic(-25.0, 0.0, 20.0))
+    f.advance(20.0)
+    moved = [sum(v.state[c] for v in f.vehicles) / 3 for c in (0, 1)]
+    assert set(f.phases()) == {Phase.GOTO} and moved[0] < centre[0] - 10.0

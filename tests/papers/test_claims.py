@@ -1,0 +1,133 @@
+"""Claims and statements: verdicts follow from bounds, and a bound looks where the quote says."""
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airflock.errors import AirflockError
+from airflock.papers import PAPERS, bounds, statistics
+from airflock.papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
+from airflock.papers.statements import LONGEST, load, read
+
+ROOT = Path(__file__).parents[2] / "papers"
+COMMITTED = [path for name in PAPERS for path in sorted((ROOT / name).glob("*.toml"))]
+GENERATION = """
+[[statement]]
+id = "timid"
+kind = "paper"
+quote = "avoidance gain took hold within 10 generations, causing over 75% of all controllers to have K_a < 2"
+where = "Results"
+quantity = "share of K_a below 2"
+at = "generation 10"
+bound = "ours > published"
+published = 0.75
+fails_if = "generation 10 itself"
+"""
+
+
+def test_a_statement_about_generation_10_is_read() -> None:
+    assert read(GENERATION, "a file")["timid"].published == 0.75
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('at = "generation 10"', 'at = "generation 149"', "another generation than the quote's 10"),
+        ('"share of K_a below 2"', '"phi_corr"', "not what the quote speaks of"),
+        ("published = 0.75", "published = 0.5", "does not stand in the quote"),
+        ('"ours > published"', '"ours > published or ours <= published"', "holds whatever is measured"),
+        ('"ours > published"', '"__import__(1)"', "neither a field, a number nor a comparison"),
+        ('fails_if = "generation 10 itself"', "", "needs fails_if"),
+        ("took hold within", "took hold " + "very " * LONGEST + "within", f"more than {LONGEST} words"),
+        ('kind = "paper"', 'kind = "identity"', "none of paper, program, ours"),
+        ('kind = "paper"', 'kind = "ours"', "no quote"),
+        ('bound = "ours > published"', 'verdict = "reproduced"', "others are computed"),
+        ('bound = "ours > published"', 'verdict = "not flown yet"\nreason = "long"', "without the command"),
+    ],
+)
+def test_a_statement_that_looks_elsewhere_is_refused(old: str, new: str, said: str) -> None:
+    with pytest.raises(AirflockError, match=re.escape(said)):
+        read(GENERATION.replace(old, new), "a file")
+
+
+def test_all_faults_of_a_file_are_told_at_once() -> None:
+    wrong = GENERATION.replace("published = 0.75", "published = 0.5").replace('"generation 10"', '"generation 9"')
+    with pytest.raises(AirflockError, match="another generation.*does not stand in the quote"):
+        read(wrong, "a file")
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"), [(0.38, "not reproduced"), (0.75, "not reproduced"), (0.8, "reproduced")]
+)
+def test_the_verdict_is_that_of_the_bound(share: float, verdict: str) -> None:
+    statements = read(GENERATION, "a file")
+    found = Measured("timid", "share of K_a below 2", "generation 10", statistics.one(share, 3))
+    (claim,) = judge(statements, [found])
+    assert claim.verdict == verdict
+    with pytest.raises(AirflockError, match="but its bound says"):
+        Claim(**asdict(claim) | {"verdict": "reproduced" if verdict != "reproduced" else "not reproduced"})
+
+
+def test_what_was_measured_elsewhere_is_refused() -> None:
+    late = Measured("timid", "share of K_a below 2", "generation 149", statistics.one(0.96, 3))
+    with pytest.raises(AirflockError, match="is about at 'generation 10', but 'generation 149' was measured"):
+        judge(read(GENERATION, "a file"), [late])
+    with pytest.raises(AirflockError, match="measured without a statement: other"):
+        judge(read(GENERATION, "a file"), [Measured("other", "", "", statistics.one(1.0))])
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(0, 1e6))
+def test_bounds_are_the_comparisons_that_they_look_like(ours: float, published: float, slack: float) -> None:
+    fields = {"ours": ours, "published": published, "sd": slack}
+    assert bounds.holds("abs(ours - published) <= 2 * sd", fields) == (abs(ours - published) <= 2 * slack)
+    assert bounds.holds("0 < ours and ours <= published", fields) == (0 < ours <= published)
+
+
+def test_a_bound_on_what_was_not_measured_is_told() -> None:
+    with pytest.raises(AirflockError, match="p was not measured"):
+        bounds.holds("p >= 0.05", {"ours": 1.0})
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_shipped_statements_are_sound(name: str) -> None:
+    statements = load(f"airflock.papers.{name}")
+    assert all(s.fails_if for s in statements.values() if s.kind == "paper" and s.bound)
+    assert all(s.published is None or s.quote for s in statements.values())
+
+
+@pytest.mark.parametrize("path", COMMITTED, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_committed_claims_are_those_of_the_statements(path: Path) -> None:
+    """Every field that a statement has stands in the committed claim, and the verdict follows from the bound."""
+    statements = load(f"airflock.papers.{path.parent.name}")
+    for claim in read_claims(path)[1]:
+        told = statements[claim.id]
+        for key, value in asdict(told).items():
+            if key not in ("published", "published_sd", "verdict", "command"):
+                assert getattr(claim, key) == value, f"{claim.id}: {key}"
+        assert claim.verdict == verdict_of(claim)
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_every_statement_stands_on_a_committed_page(name: str) -> None:
+    flown = {claim.id for path in sorted((ROOT / name).glob("*.toml")) for claim in read_claims(path)[1]}
+    missing = [key for key in load(f"airflock.papers.{name}") if key not in flown]
+    assert not missing
+
+
+def test_claims_survive_a_file(tmp_path: Path) -> None:
+    found = Measured("timid", "share of K_a below 2", "generation 10", statistics.mean([0.2, 0.3, 0.4]), "by seed")
+    claims = judge(read(GENERATION, "a file"), [found])
+    write_claims(tmp_path / "claims.toml", claims, {"command": "c", "version": "0"})
+    header, again = read_claims(tmp_path / "claims.toml")
+    assert header == {"command": "c", "version": "0"}
+    assert [(c.id, c.verdict, c.quote, c.note, c.runs) for c in again] == [
+        ("timid", "not reproduced", claims[0].quote, "by seed", 3)
+    ]
+    text = (tmp_path / "claims.toml").read_text(encoding="utf-8").replace("not reproduced", "reproduced")
+    (tmp_path / "claims.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(AirflockError, match="its bound says 'not reproduced'"):
+        read_claims(tmp_path / "claims.toml")

@@ -1,0 +1,237 @@
+"""The flight: lists and floats, one agent after the other, who perceives, decides and moves.
+
+It runs the same rules on the same random numbers in the same order as a driver.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.body import radio, sensors, wind
+from airflock.checking.flock import of_model
+from airflock.core import random
+from airflock.core.agent import Heard, State, answer, decide
+from airflock.core.contract import Metric
+from airflock.core.maths import norm
+from airflock.core.parameters import choices
+from airflock.engine.cpu import Flown
+from airflock.engine.place import Course, Place, Senses
+from airflock.engine.tables import clock
+from airflock.scenarios.scenario import Scenario
+from reference.begin import ZERO, Vector, begin, given, normals
+from reference.scores import Scores
+
+LIMIT = 1e8  # m; no radio reaches farther
+
+
+@dataclass
+class Agent:
+    """One agent in the air.
+
+    state      : true position (m) and velocity (m/s)
+    command    : what its model decided last
+    own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
+    memory     : the model's Memory; rays: how many it cast at its last decision
+    packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
+    """
+
+    state: State
+    command: Vector = ZERO
+    own: State = State(*ZERO, *ZERO)
+    sent: State = State(*ZERO, *ZERO)
+    memory: Any = None
+    rays: float = 0.0
+    packets: dict[int, tuple[State, float]] = field(default_factory=dict)
+
+
+def fly_plainly(
+    scenario: Scenario,
+    seed: int = 0,
+    start: NDArray[Any] | None = None,
+    metrics: tuple[Metric, ...] | None = None,
+) -> Flown:
+    """Fly one world and keep every sample.
+
+    start : positions (m) and velocities (m/s) to start from, (component, agent), instead of random ones
+
+    Returns what a compiled driver returns: order parameters over time, frames (time, component, agent), the state at
+    the end, and minus the number of the agent that found no room to start in.
+    """
+    scenario = scenario.in_flight(seed)
+    place, times = Place(scenario), clock(scenario)
+    dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
+    begun = begin(scenario, seed, place) if start is None else given(start, dims)
+    flock = [Agent(state) for state in begun]
+    count = times["steps"] // times["sample_every"] + 1
+    frames = np.zeros((count, 3 * dims, scenario.agents))
+    chosen = scenario.order_parameters if metrics is None else metrics
+    scores, course = Scores(chosen, scenario.measured_by(), place, dims, scenario.wing), Course(scenario)
+    solve = of_model(scenario)
+    if len(flock) < scenario.agents:
+        return Flown(scores.totals(), frames, np.zeros((2 * dims, scenario.agents)), -(len(flock) + 1))
+    at_start, gust = states(flock), ZERO
+    past: dict[int, list[State]] = {}  # by the number of the decision that hears them
+    for step in range(times["steps"] + 1):
+        course.advance(step * dt, dt, states(flock))
+        place.appear(step * dt, states(flock))
+        if (step + delay) % every == 0:
+            past[(step + delay) // every] = states(flock)
+        if step % every == 0 and scenario.flight.update == "synchronous":
+            number = step // every
+            shared = solve(states(flock)) if solve else None
+            past_now = past.pop(number, at_start)
+            decisions(scenario, seed, (place, course), flock, number, past_now, step * dt, shared=shared)
+        if step % times["collide_every"] == 0:
+            events = scores.look("collision", states(flock), step * dt).get("n_coll", 0.0)
+            if events > 0.5 and scenario.metrics.stop == "collision":
+                frames = frames[: -(-step // times["sample_every"])]
+                break
+        if step % times["sample_every"] == 0:
+            scores.look("sample", states(flock), step * dt, [agent.rays for agent in flock])
+            frames[step // times["sample_every"]] = components(flock, dims)
+        if step < times["steps"]:
+            gust = blow(scenario, seed, step, gust)
+            for i, agent in enumerate(flock):
+                if scenario.flight.update == "sequential":
+                    decisions(scenario, seed, (place, course), flock, step, states(flock), step * dt, [i])
+                advance(scenario, seed, step, i, agent, gust, place)
+    return Flown(scores.totals() | course.values(), frames, components(flock, dims)[: 2 * dims], 0)
+
+
+def states(flock: Sequence[Agent]) -> list[State]:
+    """True states of all agents."""
+    return [agent.state for agent in flock]
+
+
+def components(flock: Sequence[Agent], dims: int) -> NDArray[np.float64]:
+    """Position, velocity and command, (component, agent), only the axes that are flown."""
+    rows = [(*a.state[:dims], *a.state[3 : 3 + dims], *a.command[:dims]) for a in flock]
+    return np.array(rows).T
+
+
+def plus(state: State, error: State) -> State:
+    """A state with an error."""
+    return State(*(a + b for a, b in zip(state, error, strict=True)))
+
+
+# ------------------------------------------------------------------------------------------------------- decision
+
+
+def decisions(
+    scenario: Scenario, seed: int, world: tuple[Place, Course], flock: list[Agent], number: int, past: list[State],
+    time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
+) -> None:  # fmt: skip
+    """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
+    if scenario.sensors.noise > 0.0:
+        for i, agent in enumerate(flock):
+            drift(scenario, seed, number, i, agent)
+    period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
+    said = [plus(state, agent.sent) for state, agent in zip(past, flock, strict=True)]
+    for i in range(len(flock)) if turn is None else turn:
+        agent = flock[i]
+        own = plus(agent.state, agent.own)
+        heard = [
+            Heard(h.who, place.beside(own, h.state), h.age)
+            for h in hear(scenario, seed, number, i, flock, said, time, place)
+        ]
+        senses = Senses.of(place, course, own, time, seed, number, i)
+        made = decide(
+            scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
+            time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
+            aero=scenario.aero,
+        )  # fmt: skip
+        agent.rays = float(senses.rays)
+        x, y, z = made.command
+        agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
+        agent.memory = made.memory
+
+
+def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent) -> None:
+    """Advance both errors of one agent by one sensor period."""
+    s, period = scenario.sensors, clock(scenario)["decide_every"] * scenario.flight.dt
+    own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
+    own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
+    agent.own = swing(agent.own, (own_x, own_y, own_z), period, s)
+    agent.sent = swing(agent.sent, (sent_x, sent_y, sent_z), period, s)
+
+
+def swing(error: State, g: Vector, period: float, s: sensors.Parameters) -> State:
+    """One step of an error on all axes."""
+    steps = [sensors.langevin(error[c], error[3 + c], g[c], period, s) for c in range(3)]
+    return State(*(q for q, _ in steps), *(u for _, u in steps))
+
+
+def hear(
+    scenario: Scenario, seed: int, number: int, i: int, flock: list[Agent], said: list[State], time: float, place: Place
+) -> list[Heard]:
+    """Whom agent i hears at decision `number`: in range by true distance, not lost; on links, the newest packet."""
+    k, late = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt
+    found = []
+    for j, other in enumerate(flock):
+        if j == i:
+            continue
+        own, true = flock[i].state, place.beside(flock[i].state, other.state)
+        distance = norm(true.x - own.x, true.y - own.y, true.z - own.z)
+        in_range = distance <= norm(min(k.range, LIMIT), 0.0, 0.0)  # at exactly the range it is heard
+        pair = i * len(flock) + j
+        arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
+            distance, k
+        )
+        if k.kind == "constant":
+            if arrives and in_range:
+                found.append(Heard(j, said[j], late))
+            continue
+        if arrives and in_range and linked(scenario, seed, number, pair, distance):
+            flock[i].packets[j] = (said[j], time - late)
+        if in_range and j in flock[i].packets:
+            found.append(extrapolated(j, *flock[i].packets[j], time))
+    return found
+
+
+def linked(scenario: Scenario, seed: int, number: int, pair: int, distance: float) -> bool:
+    """Whether at least one packet arrives on the fast or the slow link of a pair in this period."""
+    k, period = scenario.radio, clock(scenario)["decide_every"] * scenario.flight.dt
+    missed = 1.0
+    for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
+        missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, period)
+    return bool(random.uniform(random.words(seed, random.LINK, 0, number, pair)[0]) >= missed)
+
+
+def extrapolated(j: int, state: State, stamp: float, time: float) -> Heard:
+    """An old packet carried forward with its own velocity."""
+    age = time - stamp
+    x, y, z, vx, vy, vz = state
+    return Heard(j, State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz), age)
+
+
+# --------------------------------------------------------------------------------------------------------- motion
+
+
+def blow(scenario: Scenario, seed: int, step: int, gust: Vector) -> Vector:
+    """Gust after one motion step, m/s."""
+    a, dt = scenario.wind, scenario.flight.dt
+    if a.gust == 0.0:
+        return ZERO
+    x, y, z = (wind.gusting(w, g, dt, a) for w, g in zip(gust, normals(seed, random.GUST, step, 0), strict=False))
+    return x, y, z
+
+
+def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust: Vector, place: Place) -> None:
+    """One motion step: position by the old or the new velocity, velocity by the body; then the edges of the arena."""
+    s, dt, three, body = agent.state, scenario.flight.dt, scenario.dimensions == 3, scenario.vehicle
+    if three:
+        g: Vector = normals(seed, random.OUTER, step, i)[:3]
+    else:  # one draw serves two steps: four numbers are two steps of two axes
+        four = normals(seed, random.OUTER, step // 2, i)
+        g = (*(four[:2] if step % 2 == 0 else four[2:]), 0.0)
+    a = scenario.wind
+    w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
+    known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
+    given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
+    velocity = answer(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
+    integration = choices(scenario.body).get("integration", body.integration)
+    vx, vy, vz = s[3:] if integration == "old" else velocity
+    agent.state = place.settled(State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity))

@@ -1,0 +1,320 @@
+"""Any valid scenario: draws of all sections, models, bodies, arenas, scenes, radios, noises, winds, goals, metrics.
+
+A draw is small, 2 to 6 agents for about a second, and often sits on an edge on purpose: agents on a lattice whose step
+is the range of the radio or of the law, at equal distances and equal speeds, beside boxes on the same lattice, so that
+spheres and rays touch what they pass. `drawn` takes any `random.Random`: that of Hypothesis, which can then shrink it,
+or a seeded one.
+"""
+
+from itertools import combinations, product
+from pathlib import Path
+from random import Random
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.body.registry import BODIES as KNOWN_BODIES
+from airflock.core.parameters import Choice, Quantity, choices, declarations
+from airflock.errors import ScenarioError
+from airflock.scenarios.files import MODELS, find_model, make
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import SECTIONS, Flight
+
+# A length (m) at which agents of a law act on each other, the number that carries it, and a speed, m/s
+SCALES = {
+    "vasarhelyi_2018": (20.0, "r0_rep", 4.0), "viragh_2014": (20.0, "r0_rep", 4.0), "reynolds_1987": (0.5, "r_c", 0.2),
+    "vicsek_1995": (1.0, "r", 0.3), "couzin_2002": (8.0, "dr_a", 3.0), "kidger": (20.0, "r_align", 10.0),
+    "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
+}  # fmt: skip
+BODIES = {
+    "velocity": ("multirotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
+}  # fmt: skip
+CUBE = str(Path(__file__).parent / "cube.obj")
+SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python
+
+
+class Draw(NamedTuple):
+    """A scenario, a seed, and where its agents start (component, agent) if not at random; and its keys, to read."""
+
+    scenario: Scenario
+    seed: int
+    start: NDArray[np.float64] | None
+    keys: dict[str, Any]
+
+
+def drawn(rng: Random) -> Draw:
+    """One valid scenario."""
+    for _ in range(200):
+        keys, start = settings(rng)
+        try:
+            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys)
+        except ScenarioError:
+            continue  # a crowd without room, or a goal inside a building: the border says so, and it draws again
+        return Draw(found, rng.randrange(2**32), start, keys)
+    raise AssertionError("200 draws without a valid scenario")
+
+
+def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
+    """Keys of a scenario that is mostly valid, and a start or None."""
+    kind = rng.choice(MODELS)
+    length, reach, speed = SCALES[kind]
+    dt = rng.choice((0.02, 0.05))
+    keys: dict[str, Any] = {
+        "model.kind": kind, "agents": rng.randint(2, 6), "duration": 1.0, "dt": dt, "start.speed": speed,
+        "metrics.period": rng.choice((0.0, 0.1, 0.25)), "world.dimensions": rng.choice("23"),
+    }  # fmt: skip
+    three = keys["world.dimensions"] == "3"
+    model(keys, rng, kind)
+    world(keys, rng, length)
+    scene(keys, rng, length)
+    goals(keys, rng, length, three)
+    begin(keys, rng, length, speed)
+    perception(keys, rng, length, dt)
+    metrics(keys, rng, length, speed, dt)
+    if kind == "dimock_2003" or "aero.k_d" in keys or keys["metrics.kind"] == "dimock":
+        keys |= {"agents": min(keys["agents"], 3), "duration": 6 * dt}  # a lifting line for each agent and step
+        if keys.get("goals.kind") == "own":
+            keys["goals.points"] = keys["goals.points"][: keys["agents"]]
+    start = lattice(keys, rng, length, speed, reach) if rng.random() < 0.35 else None
+    return keys, start
+
+
+def sometimes(keys: dict[str, Any], rng: Random, record: type, section: str, share: float, but: tuple[str, ...] = ()):
+    """Draw some numbers and choices of a record anew: about their defaults, or on the edge of what is allowed."""
+    for name, declared, default in declarations(record):
+        if name in but or rng.random() > share:
+            continue
+        if isinstance(declared, Choice):
+            keys[f"{section}.{name}"] = rng.choice(declared.options)
+        elif isinstance(declared, Quantity) and default is not None:
+            edge = declared.low if rng.random() < 0.15 and declared.low == 0.0 else default * rng.uniform(0.5, 2.0)
+            keys[f"{section}.{name}"] = min(max(edge, declared.low), declared.high)
+
+
+def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
+    """The law, its body, and drag descent beside another law."""
+    law = find_model(kind)
+    sometimes(keys, rng, law.Parameters, "model", 0.3, ("rays", "most"))
+    if kind == "kidger":
+        keys |= {"model.rays": rng.choice((8, 40)), "model.most": rng.randint(1, 3)}
+    body = rng.choice(BODIES[law.command])
+    keys["body.kind"] = body
+    if body in ("multirotor", "jostled") and rng.random() < 0.5:
+        keys["body.noise"] = 0.0
+    elif rng.random() < 0.5:
+        sometimes(keys, rng, KNOWN_BODIES[body].Parameters, "body", 0.4)
+    if kind != "dimock_2003" and law.command == "velocity" and rng.random() < 0.12:
+        keys |= {"aero.k_d": rng.choice((0.05, 0.3)), "aero.gradient": rng.choice(OPTIONS["aero"]["gradient"])}
+    keys["wing.segments"] = rng.choice(SEGMENTS)
+    for name in ("layout", "positions", "frame", "stall"):
+        keys[f"wing.{name}"] = rng.choice(OPTIONS["wing"][name])
+
+
+def world(keys: dict[str, Any], rng: Random, length: float) -> None:
+    """Arena, edges and obstacles."""
+    arena = rng.choice(("square", "circle", "polygon", "none"))
+    keys["world.arena"] = arena
+    edges = rng.choice(("open", "open", "bounce", "periodic")) if arena == "square" else "open"
+    keys["world.edges"] = edges
+    side = length * rng.choice((1.5, 3.0, 6.0))
+    keys |= {"world.side": side, "world.radius": side, "world.height": side * rng.choice((0.5, 1.0))}
+    if arena == "polygon":
+        keys["world.corners"] = [[-side, -side], [side, -0.8 * side], [1.2 * side, 0.3 * side], [0.0, side]]
+    if arena == "square":
+        keys["world.walls"] = rng.choice(("every_edge", "nearest_per_axis"))
+    if rng.random() < 0.3 and edges != "periodic":
+        a, b = 0.1 * side, 0.25 * side
+        islands = [[[a, a], [b, a], [b, b], [a, b]], [[-b, -b], [-a, -b], [-a, -a]]]
+        keys["world.obstacles"] = islands[: rng.randint(1, 2)]
+
+
+def scene(keys: dict[str, Any], rng: Random, length: float) -> None:
+    """What stands in the world."""
+    kind = rng.choice(("none", "none", "none", "boxes", "boxes", "city", "forest", "mesh"))
+    if kind == "none":
+        return
+    if kind == "mesh":
+        keys |= {"scene.kind": kind, "scene.file": CUBE, "scene.unit": 0.5 * length, "scene.up": rng.choice("zy")}
+        return
+    keys |= {"scene.kind": kind, "scene.seed": rng.randrange(1000), "scene.ground": rng.choice(("yes", "no"))}
+    if kind == "boxes":
+        boxes = []
+        for _ in range(rng.randint(1, 4)):
+            x, y, z = (length * 0.25 * rng.randint(-6, 6) for _ in range(3))
+            later = rng.choice((0.0, 0.0, 0.3))
+            boxes.append([x, y, z, x + 0.25 * length, y + 0.5 * length, z + length, later])
+        keys["scene.boxes"] = boxes
+        return
+    length = max(length, 20.0)  # trees have a size of their own
+    keys |= {"scene.block": 2.0 * length, "scene.street": length, "scene.low": length, "scene.high": 2.0 * length}
+    keys |= {
+        "scene.blocks": 2,
+        "scene.trees": 8,
+        "scene.side": 4.0 * length,
+        "scene.draw": rng.choice(("once", "flight")),
+    }
+    if rng.random() < 0.4:
+        keys |= {"scene.later": 0.5, "scene.later_until": 0.6}
+
+
+def goals(keys: dict[str, Any], rng: Random, length: float, three: bool) -> None:
+    """Goals of the flock, or one for each agent."""
+    scenes = ("scene",) if keys.get("scene.kind") in ("city", "forest") else ()
+    kind = rng.choice(("none", "none", "points", "own", *scenes))
+    if kind == "none":
+        return
+    count = keys["agents"] if kind == "own" else rng.randint(1, 3)
+    keys["goals.kind"] = kind
+    if kind == "scene":
+        keys |= {"goals.count": 2, "goals.clearance": 0.1 * length, "goals.apart": 0.2 * length, "goals.low": length}
+        keys |= {"goals.high": 3.0 * length}
+    else:
+        keys["goals.points"] = [[length * rng.uniform(-1.5, 1.5) for _ in range(3)] for _ in range(count)]
+    keys |= {"goals.radius": length * rng.choice((0.1, 2.0)), "goals.speed": rng.choice((0.0, 0.5 * length))}
+    if rng.random() < 0.4:
+        keys |= {"goals.role": "herd", "goals.spread": length, "goals.behind": 0.5 * length}
+
+
+def begin(keys: dict[str, Any], rng: Random, length: float, speed: float) -> None:
+    """Where agents start."""
+    kind = rng.choice((*(("arena", "arena") if keys["world.arena"] != "none" else ()), "ball", "box", "vee", "echelon"))
+    keys |= {"start.kind": kind, "start.separation": rng.choice((0.0, 0.05 * length, 0.2 * length))}
+    keys |= {
+        "start.radius": 0.7 * length,
+        "start.side": 1.4 * length,
+        "start.clearance": rng.choice((0.0, 0.02 * length)),
+    }
+    keys |= {
+        "start.spacing_x": 0.15 * length,
+        "start.spacing_y": max(0.2 * length, 1.6),
+        "start.spacing_z": 0.1 * length,
+    }
+    keys["start.jitter"] = rng.choice((0.0, 0.05 * length))
+    keys["start.speed"] = rng.choice((0.0, speed, speed))
+
+
+def perception(keys: dict[str, Any], rng: Random, length: float, dt: float) -> None:
+    """Sensors, radio and wind, or the order in which agents act on perfect perception."""
+    keys["radio.range"] = length * rng.choice((0.5, 1.0, 4.0, 1e6))
+    if rng.random() < 0.3:
+        keys |= {"wind.east": rng.choice((0.0, 1.5)), "wind.north": -0.5, "wind.gust": rng.choice((0.0, 2.0))}
+        keys["wind.up"] = rng.choice((0.0, 0.3))
+    if rng.random() < 0.25 and keys["model.kind"] != "dimock_2003" and "aero.k_d" not in keys:
+        keys |= {
+            "update": "sequential",
+            "sensors.noise": 0.0,
+            "sensors.period": rng.choice((0.0, dt)),
+            "radio.delay": 0.0,
+        }
+        return
+    keys["update"] = "synchronous"
+    keys["sensors.noise"] = rng.choice((0.0, 0.05 * length))
+    keys["sensors.scale"] = rng.choice((3.0, 0.3 * length))
+    keys["sensors.period"] = dt * rng.choice((0, 1, 2, 3, 5))
+    keys["radio.delay"] = dt * rng.choice((0, 0, 1, 4, 7))
+    keys["radio.kind"] = rng.choice(("constant", "links"))
+    if keys["radio.kind"] == "links":
+        keys |= {"radio.near": 0.2 * length, "radio.far": length, "radio.slow_rate": rng.choice((0.7, 4.0))}
+    if rng.random() < 0.4:
+        keys |= {"radio.loss": rng.choice((0.3, 1.0)), "radio.loss_at": length}
+
+
+def metrics(keys: dict[str, Any], rng: Random, length: float, speed: float, dt: float) -> None:
+    """What is measured."""
+    kind = rng.choice(("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"))
+    keys |= {"metrics.kind": kind, "metrics.r_coll": length * rng.choice((0.1, 0.5)), "metrics.v_flock": speed}
+    keys |= {"metrics.r_cluster": length * rng.choice((0.3, 1.0)), "metrics.r_body": 0.05 * length}
+    keys |= {"metrics.r_b": 0.05 * length, "metrics.max_e": 4.0 * length, "metrics.k": rng.choice((0.0, length))}
+    keys["metrics.t_settle"] = rng.choice((0.0, 0.4))
+    if kind in ("vasarhelyi", "kidger", "dimock"):
+        keys["metrics.stop"] = rng.choice(("never", "never", "collision"))
+    keys["metrics.count"] = rng.choice(("each", "program")) if keys["world.edges"] != "periodic" else "each"
+    keys["metrics.fitness"] = rng.choice(("paper", "sound"))
+    if rng.random() < 0.4:
+        keys["metrics.collision_period"] = dt * rng.choice((1, 3))
+
+
+def lattice(keys: dict[str, Any], rng: Random, length: float, speed: float, reach: str) -> NDArray[np.float64]:
+    """A start on the edge: agents on a lattice whose step is a range, all of one velocity or of opposite ones."""
+    step = length * rng.choice((0.25, 0.5))
+    many = rng.choice((1.0, 2.0))
+    keys["radio.range"] = step * many
+    keys[f"model.{reach}"] = step * rng.choice((1.0, many))
+    three = keys["world.dimensions"] == "3"
+    places = [(x, y, z) for x in range(-2, 3) for y in range(-2, 3) for z in (range(3) if three else (0,))]
+    if keys["world.edges"] == "bounce":  # from given places agents start inside
+        keys |= {"world.side": 8.0 * step, "world.height": 8.0 * step}
+    chosen = np.array(rng.sample(places, keys["agents"]), float).T * step
+    along = np.array([[speed], [0.0], [0.0]]) * np.ones(keys["agents"])
+    if rng.random() < 0.5:
+        along[:, ::2] *= -1.0
+    return np.concatenate([chosen, along] if three else [chosen[:2], along[:2]])
+
+
+def options(record: type) -> dict[str, tuple[str, ...]]:
+    """Of each choice of a record what it may be."""
+    return {name: declared.options for name, declared, _ in declarations(record) if isinstance(declared, Choice)}
+
+
+OPTIONS = {section: options(record) for section, record in {**SECTIONS, "flight": Flight}.items()}
+OPTIONS |= {kind: options(find_model(kind).Parameters) for kind in MODELS}
+OPTIONS |= {
+    "model": {"kind": MODELS},
+    "body": {"kind": tuple(KNOWN_BODIES), **options(KNOWN_BODIES["heading"].Parameters)},
+}
+OPTIONS["wing"] = OPTIONS["wing"] | {"segments": tuple(dict.fromkeys(SEGMENTS))}
+CHOICES = [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
+SWITCHES = (
+    "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
+    "stop", "descends", "given", "sees", "walls",
+)  # fmt: skip
+
+
+def notions(draw: Draw) -> set[str]:
+    """What is on or off, and which of each choice was drawn."""
+    found, keys = draw.scenario, draw.keys
+    switches: dict[str, bool] = {
+        "three": found.dimensions == 3, "noisy": found.sensors.noise > 0.0, "late": found.radio.delay > 0.0,
+        "lossy": found.radio.loss > 0.0, "links": found.radio.kind == "links", "gusts": found.wind.gust > 0.0,
+        "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
+        "scene": found.scene.kind != "none", "goals": found.goals.kind not in ("none", "own"),
+        "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
+        "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
+        "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
+    }  # fmt: skip
+    assert tuple(switches) == SWITCHES
+    names = {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
+    records = {
+        "model": found.parameters, "body": found.body, "radio": found.radio, "world": found.world, "scene": found.scene,
+        "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
+        "flight": found.flight,
+    } | ({"aero": found.aero} if found.descends else {})  # fmt: skip
+    kind = keys["model.kind"]
+    for section, record in records.items():
+        owner = kind if section == "model" else section
+        names |= {f"{owner}.{name} = {value}" for name, value in choices(record).items()}
+    return names | {f"model.kind = {kind}", f"body.kind = {keys['body.kind']}"}
+
+
+IMPOSSIBLE = (
+    {"goals on", "own on"},  # goals of the flock, or one for each agent
+    {"periodic on", "islands on"},
+    {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},
+    {"sequential on", "links on"}, {"descends on", "sequential on"},
+    {"sees on", "walls on"}, {"descends on", "sees on"},
+)  # fmt: skip
+
+
+def missing(held_by_draw: list[list[str]]) -> list[str]:
+    """What no draw holds, of the notions of each: a choice, or a pair of notions on or off."""
+    held = set().union(*held_by_draw)
+    switched = [[name for name in names if name.endswith((" on", " off"))] for names in held_by_draw]
+    pairs = {pair for names in switched for pair in combinations(sorted(names), 2)}
+    lacking = [name for name in CHOICES if name not in held]
+    for one, other in combinations(sorted(SWITCHES), 2):
+        for a, b in product(("on", "off"), repeat=2):
+            pair = tuple(sorted((f"{one} {a}", f"{other} {b}")))
+            if pair not in pairs and set(pair) not in IMPOSSIBLE:
+                lacking.append(" with ".join(pair))
+    return lacking

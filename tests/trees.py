@@ -1,0 +1,167 @@
+"""Syntax trees of drivers, normalised, so that two ways to write the same driver are the same tree.
+
+Normalised are the names of locals (by first use), the numbers of rows (by their names), the place of pure bindings
+(`x = work[3]`, records, integers of a world: sorted, on top), what is computed and never read (dropped, on all sides),
+and arguments of functions of one agent (`*_of`) that their bodies do not read. The stages `noise` and `gusts` stand
+where they are called.
+"""
+
+import ast
+import copy
+import hashlib
+
+STAGES = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move")
+STAGES = (*STAGES, "turns", *(f"{name}_of" for name in STAGES))
+
+
+def functions(text, rows):
+    """Function definitions of a driver's text by name, normalised; of other statements, those that bind a name."""
+    found = {}
+    tree = _Rows(rows).visit(ast.parse(text))
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef):
+            found[node.name] = node
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            found[node.targets[0].id] = node
+    parts = {name: found.pop(name) for name in ("noise", "gusts") if isinstance(found.get(name), ast.FunctionDef)}
+    read_by = {}
+    for name, node in found.items():
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        node.body = _alive(_with_parts(node.body, parts))
+        if name.endswith("_of"):
+            arguments = [a.arg for a in node.args.args]
+            kept = sorted(a for a in arguments if a in _read(node.body))
+            read_by[name] = [arguments.index(a) for a in kept]
+            node.args.args = [ast.arg(a) for a in kept]
+        for call in ast.walk(node):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") in read_by:
+                call.args = [call.args[k] for k in read_by[call.func.id]]
+        node.body = _alive(node.body)
+        lift = _Lift()
+        node = lift.visit(node)
+        node.body = [lift.found[key] for key in sorted(lift.found)] + node.body
+        own = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        found[name] = _Locals(own - {a.arg for a in node.args.args}).visit(node)
+    return found
+
+
+def reached(found, first="fly"):
+    """Those that a function needs, in any number of steps."""
+    done, new = set(), {first}
+    while new:
+        done |= new
+        new = {n.id for x in new for n in ast.walk(found[x]) if isinstance(n, ast.Name)} & found.keys() - done
+    return {name: found[name] for name in done}
+
+
+def digests(text, rows):
+    """Digest of the normalised tree of each stage in a driver's text."""
+    found = functions(text, rows)
+    return {name: hashlib.sha256(ast.dump(found[name]).encode()).hexdigest()[:12] for name in STAGES if name in found}
+
+
+class _Rows(ast.NodeTransformer):
+    """Rows by name."""
+
+    def __init__(self, rows):
+        self.rows = {number: name for name, number in reversed(rows.items())}
+
+    def visit_Subscript(self, node):
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and node.value.id == "work":
+            if isinstance(node.slice, ast.Constant):
+                node.slice = ast.Constant(self.rows[node.slice.value])
+            elif isinstance(node.slice, ast.Tuple) and isinstance(node.slice.elts[0], ast.Constant):
+                node.slice.elts[0] = ast.Constant(self.rows[node.slice.elts[0].value])
+        return node
+
+
+def _with_parts(statements, parts):
+    """Statements with those of other stages in place of their calls."""
+    done = []
+    for statement in statements:
+        value = getattr(statement, "value", None)
+        part = parts.get(getattr(getattr(value, "func", None), "id", "")) if isinstance(value, ast.Call) else None
+        if part is None:
+            done.append(statement)
+            continue
+        *body, last = copy.deepcopy(part.body)
+        assert isinstance(last, ast.Return)
+        done += [s for s in body if ast.unparse(s) != "wide_vectors()"]
+        if isinstance(statement, ast.Assign):
+            assert ast.unparse(statement.targets[0]) == ast.unparse(last.value)
+    return done
+
+
+def _read(statements):
+    return {n.id for s in statements for n in ast.walk(s) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+
+
+def _alive(statements):
+    """Statements without what is computed and never read."""
+    while True:
+        found = _Dead(_read(statements))
+        statements = [s for s in (found.visit(s) for s in statements) if s is not None]
+        if not found.dropped:
+            return statements
+
+
+class _Dead(ast.NodeTransformer):
+    def __init__(self, read):
+        self.read, self.dropped = read, False
+
+    def visit_Assign(self, node):
+        if len(node.targets) == 1 and isinstance(node.targets[0], ast.Name) and node.targets[0].id not in self.read:
+            self.dropped = True
+            return None
+        return node
+
+    def visit_For(self, node):
+        self.generic_visit(node)
+        return node if node.body else None
+
+    visit_If = visit_For
+
+
+class _Lift(ast.NodeTransformer):
+    """Takes pure bindings out, wherever they stand."""
+
+    def __init__(self):
+        self.found = {}
+
+    def visit_Assign(self, node):
+        if _binds(node):
+            self.found[ast.dump(node.value) + ast.unparse(node)] = node
+            return None
+        return node
+
+
+def _binds(node):
+    if not isinstance(node.targets[0], ast.Name):
+        return False
+    value = node.value
+    if isinstance(value, ast.Subscript) and isinstance(value.value, ast.Name) and isinstance(value.slice, ast.Constant):
+        return value.value.id in ("work", "whole", "words", "scene")
+    return (
+        isinstance(value, ast.Call)
+        and len(value.args) > 0
+        and all(ast.unparse(argument).startswith("row[") for argument in value.args)
+    )
+
+
+class _Locals(ast.NodeTransformer):
+    """Locals by the order in which they are first used."""
+
+    def __init__(self, own):
+        self.own, self.seen = own, {}
+
+    def visit_Assign(self, node):
+        node.value = self.visit(node.value)
+        node.targets = [self.visit(t) for t in node.targets]
+        return node
+
+    def visit_Name(self, node):
+        if node.id in self.own:
+            node.id = self.seen.setdefault(node.id, f"local{len(self.seen)}")
+        return node

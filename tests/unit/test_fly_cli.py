@@ -1,0 +1,88 @@
+"""The verbs fly and fleet: cards and keys are written whole or not at all, and mistakes are told all at once."""
+
+import json
+import sys
+
+import pytest
+
+from airflock.cli.main import main
+
+HERE = ["--site", "47.5,19.04,120", "--members", "1-3", "--set", "world.side=120"]
+REAL = "vasarhelyi_2018/real_4ms"
+
+
+@pytest.fixture
+def airflock(monkeypatch, capsys, tmp_path):
+    """The command, run in an empty folder: status, output, lines of errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["airflock", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        told = capsys.readouterr()
+        return end.value.code or 0, told.out, told.err.splitlines()
+
+    return run
+
+
+def test_a_mission_is_prepared_checked_and_never_overwritten(airflock, tmp_path):
+    code, out, _ = airflock("fly", "prepare", REAL, *HERE, "--json")
+    made = json.loads(out)
+    assert code == 0 and made["members"] == [1, 2, 3] and 0.0 < made["airtime"]["slow"] < 0.1
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mission.json", "mission.key", "mission.operator"]
+    assert {p.stat().st_mode & 0o777 for p in tmp_path.glob("mission.[ko]*")} == {0o600}
+    port = ["--autopilot", "udp:127.0.0.1:39431", "--radio", "udp:127.0.0.1:39432"]
+    code, out, _ = airflock("fly", "mission.json", "--member", 2, *port, "--check")
+    assert code == 0 and "3 members" in out
+    code, _, lines = airflock("fly", "prepare", REAL, *HERE)
+    assert code == 2 and len(lines) == 3 and all("never overwritten" in line for line in lines)
+
+
+def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airflock, tmp_path):
+    code, _, lines = airflock(
+        "fly", "prepare", REAL, "--site", "47.5;19", "--members", "a-3", "--out", "absent/m.txt", "--set", "agents"
+    )
+    assert code == 2 and all(line.startswith("airflock: ") for line in lines)
+    for part in ("is not LAT,LON,ALT", "write 1-10", "absent", "KEY=VALUE"):
+        assert any(part in line for line in lines), part
+    for more, part in (
+        (["--limit", "breake=2"], "breake"), (["--limit", "brake=900"], "outside [0.1, 20] m/s^2"),
+        (["--limit", "status_period=0.02", "--fast-bits", "30000"], "fast radio: 3 drones would take"),
+        (["--autopilot", "naza"], "none of px4, ardupilot"), (["--limit", "base=1"], "Safety.base = 1 m"),
+    ):  # fmt: skip
+        code, _, lines = airflock("fly", "prepare", REAL, *HERE, *more)
+        assert code == 2 and any(part in line for line in lines), (more, lines)
+    code, _, lines = airflock("fly", "prepare", "dimock_2003/published", "--site", "47,19,0", "--members", "1-3")
+    assert code == 2 and lines
+    assert not list(tmp_path.iterdir())
+
+
+def test_orders_are_checked_before_they_are_sent(airflock):
+    airflock("fly", "prepare", REAL, *HERE)
+    code, _, lines = airflock("fly", "order", "mission.json", "strat", "--radio", "udp:127.0.0.1:1", "--target", 9)
+    assert code == 2 and len(lines) == 2 and "strat: is not an order" in lines[0] and "members are 1, 2, 3" in lines[1]
+    code, _, lines = airflock("fly", "order", "mission.json", "goto", "--radio", "udp:127.0.0.1:39433")
+    assert code == 2 and "goto needs it" in lines[0]
+    code, _, lines = airflock("fly", "order", "mission.json", "hold", "--radio", "udp:127.0.0.1:39433")
+    assert code == 2 and "cannot send" in lines[0]
+    code, _, _ = airflock("fly", "order", "mission.json", "hold", "--radio", "udp:127.0.0.1:39433>127.0.0.1:39434")
+    assert code == 0
+
+
+def test_a_file_that_is_no_log_is_one_line(airflock, tmp_path):
+    airflock("fly", "prepare", REAL, *HERE)
+    for content in (b"{}\n", b"\xff\xfe", b""):
+        (tmp_path / "x.log").write_bytes(content)
+        code, _, lines = airflock("fly", "replay", "mission.json", "x.log")
+        assert code == 2 and len(lines) == 1
+
+
+def test_a_fleet_is_flown_and_told(airflock):
+    code, out, _ = airflock("fleet", REAL, "--agents", 3, "--duration", 2, "--json")
+    (run,) = json.loads(out)["runs"]
+    assert code == 0 and run["phases"] == ["FLOCK"] * 3 and run["phi_vel"] > 0.5 and len(run["sha256"]) == 64
+    code, _, lines = airflock(
+        "fleet", REAL, "--vehicle", "naza", "--against", "nature", "--save", "x.txt", "--set", "worl.side=1"
+    )
+    assert code == 2 and len(lines) >= 4

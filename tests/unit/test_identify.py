@@ -1,0 +1,250 @@
+"""Identify: truths that come back, and what logs cannot say is refused with the reason."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import airflock
+from airflock.body import radio, sensors
+from airflock.core import random
+from airflock.errors import RecordingError, ScenarioError
+from airflock.identify import body, packets, periods, synthetic
+from airflock.identify import sensors as standing
+from airflock.identify.logs import Logs, logs_of_recording
+from airflock.identify.plan import flight_card
+from airflock.identify.run import HARDER, UNITS, Number, identify
+
+STEP = 0.05
+
+
+def fly(tau, a_max, noise, white, *, drones=4, seconds=150.0, size=6.0, hold=2.0, seed=1):
+    """Logs of bodies that follow random steps, stepped finely by their equation of motion; no engine, no filter."""
+    g = np.random.default_rng(seed)
+    count, fine = round(seconds / STEP), 10
+    dt = STEP / fine
+    every = round(hold / STEP)
+    wishes = g.uniform(-size, size, (count // every + 1, 2, drones)).repeat(every, axis=0)[:count]
+    v, seen = np.zeros((2, drones)), np.zeros((count, 2, drones))
+    for k in range(count):
+        seen[k] = v + g.normal(0.0, white, v.shape)
+        for _ in range(fine):
+            pull = (wishes[k] - v) / tau
+            pull *= np.minimum(1.0, a_max / np.maximum(np.linalg.norm(pull, axis=0), 1e-12))
+            v = v + pull * dt + g.normal(0.0, np.sqrt(2.0 * noise * dt), v.shape)
+    time = np.tile(np.arange(count) * STEP, drones)
+    who = np.repeat(np.arange(drones), count)
+    flat = [x.transpose(2, 0, 1).reshape(-1, 2) for x in (seen, wishes)]
+    new = np.concatenate([[True], np.diff(who) != 0])
+    return Logs(time, 0.0 * flat[0], *flat, who, new, [f"d{i}" for i in range(drones)], np.zeros(len(time), bool)), dt
+
+
+@pytest.mark.parametrize("tau, a_max, noise, white", [(0.4, 3.0, 0.05, 0.1), (1.2, 2.5, 0.3, 0.02)])
+def test_the_body_comes_back_through_the_noise_of_the_log(tau, a_max, noise, white):
+    logs, dt = fly(tau, a_max, noise, white)
+    found = body.fit_body(logs, dt)
+    for name, truth in {"tau": tau, "a_max": a_max, "noise": noise, "white": white}.items():
+        low, high = found.interval[name]
+        assert low - (high - low) < truth < high + (high - low), name  # three standard errors and a bit
+        assert high / low < 1.25 or name == "white", name
+    assert not found.refused
+    assert found.second_tau == pytest.approx(tau, rel=0.15)
+
+
+def test_an_acceleration_that_was_never_reached_is_a_bound_only():
+    logs, dt = fly(0.8, 30.0, 0.05, 0.1, size=1.0)
+    found = body.fit_body(logs, dt)
+    assert "at least" in found.refused["a_max"] and "fly larger steps" in found.refused["a_max"]
+    assert "tau" not in found.refused
+
+
+def test_commands_that_the_vehicle_runs_ahead_of_are_no_lag():
+    """Feed-forward: the vehicle is where the set-point is, whatever its own lag."""
+    g = np.random.default_rng(3)
+    time = np.arange(4000) * STEP
+    path = sum(g.normal(0, 1.0, 2) * np.sin(w * time[:, None] + g.uniform(0, 6, 2)) for w in (0.3, 0.7, 1.3, 2.1))
+    seen = path + g.normal(0.0, 0.05, path.shape)
+    new = np.arange(4000) == 0
+    logs = Logs(time, 0 * path, seen, path, np.zeros(4000, int), new, ["d"], np.zeros(4000, bool))
+    found = body.fit_body(logs)
+    assert set(found.refused) >= {"tau", "a_max", "noise"}
+
+
+def test_late_commands_are_told():
+    logs, dt = fly(0.5, 4.0, 0.05, 0.05)
+    late = 6
+    command = logs.command.copy()
+    for who in range(logs.drones):
+        rows = logs.of(who)
+        command[rows[:-late]] = logs.command[rows[late:]]
+    from dataclasses import replace
+
+    found = body.fit_body(replace(logs, command=command), dt)
+    assert found.dead_time == pytest.approx(late * STEP, abs=STEP + 1e-9)
+    assert any("late" in note for note in found.notes)
+
+
+def test_words_of_arrays_are_the_words_of_the_engine():
+    agents = np.arange(7)
+    many = synthetic.words(2**40 + 5, random.SENSOR, 9, agents)
+    for agent in range(7):
+        one = random.words(2**40 + 5, random.SENSOR, 0, 9, agent)
+        assert [int(w[agent]) for w in many] == list(one)
+        first = synthetic.normal_pair(many[0], many[1])
+        np.testing.assert_allclose([x[agent] for x in first], random.normal_pair(one[0], one[1]), rtol=1e-12)
+
+
+def test_the_error_of_navigation_comes_back_from_drones_that_stand():
+    truth = sensors.Parameters(noise=0.02, damping=0.15, scale=4.0)
+    g = np.random.default_rng(5)
+    logs = synthetic.stand(11, 10, 300.0, truth, synthetic.Disturbed(white=0.05), g)
+    found = standing.fit_sensors(logs, truth.period)
+    assert not found.refused
+    for name in ("noise", "damping", "scale"):
+        low, high = found.interval[name]
+        assert low - (high - low) < getattr(truth, name) < high + (high - low)
+    assert found.value["white"] == pytest.approx(0.05, rel=0.15)
+    short = standing.fit_sensors(synthetic.stand(11, 2, 10.0, truth, synthetic.Disturbed(), g), truth.period)
+    assert "stand still" in short.refused["noise"]
+
+
+def heard_by(k, count=60_000, delay=0.4, jitter=0.02, seed=2, drones=6):
+    """Packets by the reception law itself, with clocks that differ by seconds."""
+    g = np.random.default_rng(seed)
+    ahead = g.normal(0.0, 3.0, drones)
+    i = g.integers(0, drones, count)
+    j = (i + g.integers(1, drones, count)) % drones
+    d = g.uniform(0.0, 150.0, count)
+    fast = np.array([radio.received(x, 0.0, k) for x in d])
+    slow = np.array([radio.received(x, 1.0, k) for x in d])
+    missed = (1.0 - fast) ** 2 * np.where(g.random(count) < 0.2, 1.0 - slow, 1.0)
+    sent = g.uniform(0.0, 300.0, count)
+    t = sent + delay + ahead[i] + g.normal(0.0, jitter, count)
+    return pd.DataFrame({"receiver": i, "sender": j, "t": t, "stamp": sent + ahead[j], "distance": d,
+                         "got": (g.random(count) >= missed).astype(int)}), ahead  # fmt: skip
+
+
+def test_delay_and_clocks_come_back_from_packets_of_both_directions():
+    heard, ahead = heard_by(radio.Parameters(kind="links"))
+    found = packets.fit_delay(heard)
+    assert found.value == pytest.approx(0.4, rel=0.02) and found.interval[0] < 0.4 < found.interval[1]
+    assert found.scatter == pytest.approx(0.02, rel=0.1)
+    for name, offset in found.ahead.items():
+        assert offset == pytest.approx(ahead[int(name)] - ahead.mean(), abs=0.005)
+    one_way = heard[heard["receiver"] < heard["sender"]]
+    assert "one direction only" in packets.fit_delay(one_way).reason
+
+
+def test_the_curve_of_reception_comes_back():
+    k = radio.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
+    found = packets.fit_links(heard_by(k)[0], 0.2, k)
+    assert not found.refused
+    for name in packets.LINKS:
+        low, high = found.interval[name]
+        assert low - (high - low) < getattr(k, name) < high + (high - low)
+    near = heard_by(k)[0]
+    near = near[near["distance"] < 40.0]
+    assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
+
+
+def test_the_period_of_decisions_comes_back():
+    logs, _ = fly(0.6, 4.0, 0.05, 0.1, hold=0.2, seconds=60.0)
+    period, (low, high), reason = periods.decision_period(logs)
+    assert not reason and period == pytest.approx(0.2, rel=1e-3) and low <= 0.2 + 1e-9 and high >= 0.2 - 1e-9
+    every_row, _ = fly(0.6, 4.0, 0.05, 0.1, hold=STEP, seconds=60.0)
+    assert "no faster than decisions" in periods.decision_period(every_row)[2]
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """One fleet, flown by the engine and logged with noise, lost rows and wrong clocks."""
+    numbers = {"body.tau": 0.6, "body.a_max": 4.0, "body.noise": 0.1, "radio.delay": 0.4, "radio.kind": "links"}
+    extra = {"agents": 10, "duration": 150.0, "radio.range": 250.0, "metrics.period": STEP}
+    truth = airflock.load("vasarhelyi_2018/real_6ms", {**extra, **numbers})
+    logger = synthetic.Disturbed(white=0.1, stamp_jitter=0.02)
+    logs, heard, recording = synthetic.fly_logs(truth, 3, logger, np.random.default_rng(3))
+    like = airflock.load("vasarhelyi_2018/real_6ms", {"radio.kind": "links", "radio.range": 250.0})
+    return truth, identify(logs, like, heard=heard), recording
+
+
+def test_a_fleet_is_identified_from_its_logs(fleet):
+    truth, found, _ = fleet
+    bounds = {"body.tau": 0.05, "body.a_max": 0.15, "body.noise": 0.2, "radio.delay": 0.02, "sensors.period": 0.01,
+              "radio.near": 0.3, "radio.far": 0.2}  # fmt: skip
+    for key, bound in bounds.items():
+        section, name = key.split(".")
+        assert found.numbers[key].told, found.numbers[key].reason
+        assert found.numbers[key].value == pytest.approx(getattr(getattr(truth, section), name), rel=bound), key
+    assert "on the ground" in found.numbers["sensors.noise"].reason
+    assert "preferred speed" in found.numbers["model.v_max"].reason or not found.numbers["model.v_max"].told
+    assert found.comparable and any("packets" in note for note in found.notes)
+
+
+def test_the_file_that_identify_writes_flies_with_those_numbers(fleet, tmp_path):
+    import tomlkit
+
+    _, found, _ = fleet
+    (tmp_path / "mine.toml").write_text(tomlkit.dumps(found.document(uncertain=True)))
+    back = airflock.load(str(tmp_path / "mine.toml"))
+    assert back.body.tau == pytest.approx(found.numbers["body.tau"].value, rel=1e-3)
+    low, high = back.document["body"]["tau"]["interval"]
+    assert low < back.body.tau < high and back.document["body"]["tau"]["unit"] == "s"
+    assert not back.published
+    text = tomlkit.dumps(found.document(uncertain=True)).replace(f"interval = [{low}", "interval = [99.0")
+    (tmp_path / "odd.toml").write_text(text)
+    with pytest.raises(ScenarioError, match=r"body.tau: interval = \[99.0, .*\] is not \[low, high\]"):
+        airflock.load(str(tmp_path / "odd.toml"))
+
+
+def test_conservative_numbers_make_a_flight_harder(fleet):
+    _, found, _ = fleet
+    plain, hard, harder = found.settings(), found.settings(0.95), found.settings(0.999)
+    for key in plain:
+        sign = 1.0 if HARDER[key] else -1.0
+        assert sign * plain[key] <= sign * hard[key] + 1e-12 <= sign * harder[key] + 2e-12, key
+    assert set(HARDER) == set(UNITS)
+    assert Number("radio.received_near", 0.98, 0.97, 0.99, 0.9, "").pessimistic(0.95) == pytest.approx(0.97)
+
+
+def test_recordings_can_be_identified_and_need_commands(fleet):
+    _, _, recording = fleet
+    logs = logs_of_recording(recording)
+    assert logs.drones == 10 and logs.new.sum() == 10 and logs.step == pytest.approx(STEP)
+    with pytest.raises(RecordingError, match="no command"):
+        logs_of_recording(recording.drop_vars("command"))
+
+
+def test_the_flight_card_lists_every_number_and_takes_ten_minutes():
+    card = flight_card(airflock.load("vasarhelyi_2018/real_6ms"))
+    assert {key for part in card for key in part.keys} == set(UNITS)
+    assert sum(part.seconds for part in card) < 660.0
+
+
+def test_all_faults_of_the_command_are_told_at_once(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,y\n0,1,2\n1,2,3\n")
+    command = [sys.executable, "-m", "airflock", "identify", str(tmp_path / "a.csv")]
+    wrong = ["--like", "vasarhelyi_2018/real_5ms", "--standing", "5", "--conservative", "2", "--out", "mine.txt"]
+    done = subprocess.run([*command, *wrong], capture_output=True, text=True)
+    lines = done.stderr.splitlines()
+    assert done.returncode == 2 and len(lines) == 4 and all(line.startswith("airflock: ") for line in lines)
+    assert any("did you mean vasarhelyi_2018/real_" in line for line in lines)
+    done = subprocess.run([*command, "--like", "vasarhelyi_2018/real_6ms"], capture_output=True, text=True)
+    assert done.returncode == 2 and "has no velocity" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_the_command_prints_one_json_object(tmp_path):
+    logs, _ = fly(0.5, 4.0, 0.05, 0.05, drones=2)
+    columns = {"t": logs.time, "x": np.cumsum(logs.velocity[:, 0]) * STEP, "y": np.cumsum(logs.velocity[:, 1]) * STEP}
+    for axis, name in enumerate("xy"):
+        columns |= {f"v{name}": logs.velocity[:, axis], f"c{name}": logs.command[:, axis]}
+    pd.DataFrame(columns).assign(id=logs.who).to_csv(tmp_path / "log.csv", index=False)
+    arguments = ["--like", "vasarhelyi_2018/real_6ms", "--check", "0", "--json", "--accept", "jumps"]
+    command = [sys.executable, "-m", "airflock", "identify", str(tmp_path / "log.csv"), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["numbers"]["body.tau"]["value"] == pytest.approx(0.5, rel=0.1)
+    assert found["numbers"]["radio.delay"]["value"] is None and "--heard" in found["numbers"]["radio.delay"]["reason"]

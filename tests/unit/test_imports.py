@@ -1,0 +1,326 @@
+"""Tracks of others: what a known motion reads as in every format, and one line for everything that is wrong."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import airflock
+from airflock.errors import RecordingError
+from airflock.recordings.imports import expressions, geodesy
+
+RATE = 20.0
+
+
+def circle(individual=0, seconds=20.0, rate=RATE):
+    """Exact motion on a circle: table with headers in SI units."""
+    t = np.arange(round(seconds * rate)) / rate
+    a, radius = 0.5 * t + individual, 10.0 + individual
+    x, y = radius * np.sin(a), radius * np.cos(a) + 3.0 * individual
+    vx, vy = 0.5 * radius * np.cos(a), -0.5 * radius * np.sin(a)
+    return pd.DataFrame({"t": t, "x": x, "y": y, "vx": vx, "vy": vy, "cx": 1.1 * vx, "cy": 1.1 * vy})
+
+
+def flock(count=3, **options):
+    return pd.concat([circle(i, **options).assign(id=f"bird_{i}") for i in range(count)], ignore_index=True)
+
+
+def values(recording, name="position"):
+    """(time, axis, individual)"""
+    return recording[name].transpose("time", "space", "keypoint", "individual").values[:, :, 0]
+
+
+def refused(what, **options):
+    with pytest.raises(RecordingError) as fault:
+        airflock.load_tracks(what, **options)
+    return str(fault.value)
+
+
+def test_a_long_table_is_read_to_the_last_bit():
+    table = flock()
+    found = airflock.load_tracks(table, precision=64)
+    assert list(found["individual"].values) == ["bird_0", "bird_1", "bird_2"]
+    for i in range(3):
+        own = circle(i)
+        assert np.array_equal(values(found)[:, :, i], own[["x", "y"]].to_numpy())
+        assert np.array_equal(values(found, "velocity")[:, :, i], own[["vx", "vy"]].to_numpy())
+        assert np.array_equal(values(found, "command")[:, :, i], own[["cx", "cy"]].to_numpy())
+    assert (found["confidence"] == 1.0).all() and found.attrs["fps"] == RATE
+
+
+def test_units_of_headers_and_expressions_say_the_same(tmp_path):
+    own = circle()
+    plain = airflock.load_tracks(own)
+    odd = pd.DataFrame(
+        {
+            "time_us": (own["t"] * 1e6).round().astype(int), "pos_e [mm]": own["x"] * 1e3, "pos_n_cm": own["y"] * 100.0,
+            "vel_e (km/h)": own["vx"] * 3.6, "vel_n": own["vy"], "cmd_e": own["cx"], "cmd_n": own["cy"],
+        }
+    )  # fmt: skip
+    odd.to_csv(tmp_path / "drone.csv", index=False)
+    by_header = airflock.load_tracks(tmp_path / "drone.csv")
+    by_map = airflock.load_tracks(
+        tmp_path / "drone.csv",
+        map={
+            "t": "time_us*1e-6",
+            "x": "'pos_e [mm]'/1000",
+            "y": "0.01 * pos_n_cm",
+            "vx": "'vel_e (km/h)'/3.6",
+            "id": "file",
+        },
+    )
+    assert list(by_map["individual"].values) == ["drone"]
+    for found in (by_header, by_map):
+        for name in ("position", "velocity", "command"):
+            np.testing.assert_allclose(values(found, name), values(plain, name), rtol=1e-6, atol=1e-5)
+
+
+def test_north_east_down_becomes_east_north_up():
+    own = circle().assign(z=5.0 + 0.0 * circle()["t"], vz=0.0)
+    ned = pd.DataFrame(
+        {"t": own["t"], "x": own["y"], "y": own["x"], "z": -own["z"], "vx": own["vy"], "vy": own["vx"], "vz": 0.0}
+    )
+    np.testing.assert_array_equal(values(airflock.load_tracks(ned, axes="ned")), values(airflock.load_tracks(own)))
+
+
+def test_files_of_one_individual_and_wide_and_long_tables_agree(tmp_path):
+    long = airflock.load_tracks(flock())
+    for i in range(3):
+        circle(i).to_csv(tmp_path / f"bird_{i}.csv", index=False)
+    files = airflock.load_tracks([tmp_path / f"bird_{i}.csv" for i in range(3)], same_clock=True)
+    xr.testing.assert_equal(files["position"], long["position"])
+    wide = pd.DataFrame({"time": circle()["t"]})
+    for i in range(3):
+        wide = wide.assign(**{f"x{i + 1}": circle(i)["x"], f"y{i + 1}": circle(i)["y"]})
+    np.testing.assert_array_equal(values(airflock.load_tracks(wide)), values(long))
+
+
+def test_arrays_and_movement_of_both_generations_agree(tmp_path):
+    array = np.stack([circle(i)[["x", "y"]].to_numpy() for i in range(3)], axis=1)
+    array[40:80, 1] = np.nan
+    found = airflock.load_tracks(array * 1e3, unit="mm", fps=RATE)
+    np.save(tmp_path / "tracks.npy", array * 1e3)
+    np.testing.assert_array_equal(
+        values(airflock.load_tracks(tmp_path / "tracks.npy", unit="mm", fps=RATE)), values(found)
+    )
+    assert np.isnan(values(found)[41:79, :, 1]).all() and not np.isnan(values(found)[:, :, 0]).any()
+    position = array.transpose(0, 2, 1)[:, :, None, :]
+    for dims in (("time", "space", "keypoint", "individual"), ("time", "space", "keypoints", "individuals")):
+        coords = {dims[0]: np.arange(len(array)), dims[1]: ["x", "y"], dims[2]: ["centroid"], dims[3]: ["a", "b", "c"]}
+        given = xr.Dataset({"position": (dims, position / 0.02)}, coords, {"fps": RATE, "time_unit": "frames"})
+        np.testing.assert_allclose(
+            values(airflock.load_tracks(given, unit="px", scale=0.02)), values(found), rtol=1e-5, atol=1e-6
+        )
+        flat = given.isel({dims[2]: 0}, drop=True)  # bounding boxes have no keypoints
+        np.testing.assert_allclose(
+            values(airflock.load_tracks(flat, unit="px", scale=0.02)), values(found), rtol=1e-5, atol=1e-6
+        )
+        assert "position has no unit" in refused(given)
+        assert "counts frames" in refused(given.assign_attrs(fps=None), unit="m")
+    two = xr.concat([given, given.assign_coords(keypoints=["nose"])], "keypoints")
+    assert "choose one: --keypoint" in refused(two, unit="m")
+    assert "no keypoint tail; it has centroid, nose" in refused(two, unit="m", keypoint="tail")
+    assert airflock.load_tracks(two, unit="m", keypoint="nose").sizes["keypoint"] == 1
+
+
+def test_trajectories_of_idtracker_are_read_with_their_frame_rate(tmp_path):
+    import h5py
+
+    array = np.stack([circle(i)[["x", "y"]].to_numpy() for i in range(2)], axis=1) / 1e-3
+    with h5py.File(tmp_path / "trajectories.h5", "w") as file:
+        file["trajectories"] = array
+        file.attrs["frames_per_second"] = RATE
+        file.attrs["body_length"] = 42.0
+    found = airflock.load_tracks(tmp_path / "trajectories.h5", unit="px", scale=1e-3)
+    np.testing.assert_allclose(values(found)[:, :, 1], circle(1)[["x", "y"]].to_numpy(), rtol=1e-6)
+    assert "body length of 42 px" in found.attrs["airflock_import"]
+
+
+def test_movebank_rows_become_local_metres():
+    lat0, lon0 = 47.48, 19.06
+    times = pd.date_range("2026-05-01 12:00", periods=60, freq="15min")
+    rows = [
+        {"event-id": k, "timestamp": str(when), "location-long": lon0 + 1e-4 * k,
+         "location-lat": lat0 + 2e-4 * k + 1e-3 * i, "individual-local-identifier": f"stork {i}"}
+        for i in range(2)
+        for k, when in enumerate(times)
+    ]  # fmt: skip
+    found = airflock.load_tracks(pd.DataFrame(rows))
+    assert list(found["individual"].values) == ["stork 0", "stork 1"] and found.attrs["fps"] == pytest.approx(1 / 900.0)
+    expected = geodesy.enu(lat0 + 2e-4 * np.arange(60), lon0 + 1e-4 * np.arange(60), 0.0, (lat0, lon0, 0.0))
+    np.testing.assert_allclose(values(found)[:, :, 0], expected[:, :2], rtol=1e-5, atol=1e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-85, 85), st.floats(-179, 179), st.floats(-100, 5000), st.floats(-1, 1), st.floats(-1, 1))
+def test_local_metres_keep_distances_and_directions(lat, lon, height, north, east):
+    """A rigid motion: distances are those through the earth; up is the direction of height; north is due north."""
+    origin = (lat, lon, height)
+    a, b = (lat + 0.02 * north, lon + 0.02 * east, height), (lat, lon + 0.01, height + 30.0)
+    local = geodesy.enu(*np.array([a, b]).T, origin)
+    through = np.linalg.norm(geodesy.ecef(*a) - geodesy.ecef(*b))
+    assert np.linalg.norm(local[0] - local[1]) == pytest.approx(through, abs=1e-6)
+    np.testing.assert_allclose(geodesy.enu(lat, lon, height + 7.0, origin), [0.0, 0.0, 7.0], atol=1e-6)
+    step = geodesy.enu(lat + 1e-5, lon, height, origin)
+    assert step[1] > 0.0 and abs(step[0]) < 1e-6
+    other = (lat + 0.01, lon - 0.01, 12.0)
+    np.testing.assert_allclose(geodesy.moved(geodesy.enu(*a, other)[None], other, origin)[0], local[0], atol=1e-6)
+
+
+def test_gaps_are_bridged_up_to_a_stated_length_and_else_absent():
+    own = circle(seconds=30.0)
+    short, long = slice(100, 110), slice(300, 400)  # 0.55 s and 5.05 s
+    cut = own.drop(index=[*range(*short.indices(600)), *range(*long.indices(600))])
+    found = airflock.load_tracks(cut, precision=64)
+    sure = found["confidence"].values[:, 0, 0]
+    assert (sure[short] == 0.5).all() and (sure[long] == 0.0).all() and (sure == 1.0).sum() == 490
+    assert np.isnan(values(found)[long]).all()
+    # cubic Hermite: the error of a circle (fourth derivative r w^4) over h is at most h^4 r w^4 / 384
+    bound = 0.55**4 * 10.0 * 0.5**4 / 384.0
+    assert np.abs(values(found)[short, :, 0] - own[["x", "y"]].to_numpy()[short]).max() < 1.5 * bound
+    strict = airflock.load_tracks(cut, bridge=0.1)
+    assert (strict["confidence"].values[short] == 0.0).all()
+
+
+def test_commands_are_held_and_never_interpolated():
+    own = circle()
+    own["cx"] = np.where(own["t"] < 5.02, 1.0, 2.0)
+    found = airflock.load_tracks(own, rate=80.0)
+    assert set(np.unique(values(found, "command")[:, 0, 0])) == {1.0, 2.0}
+
+
+REFUSED = """__import__('os')
+x.y
+x[0]
+x if y else z
+(lambda: 1)()
+x ** 9
+x @ y
+f(x)
+x; y
+1 +
+[x]
+x := 2"""
+
+
+@pytest.mark.parametrize("text", REFUSED.splitlines())
+def test_expressions_hold_arithmetic_only(text):
+    with pytest.raises(RecordingError, match="may hold column names"):
+        expressions.parsed(text, "x")
+
+
+@given(st.floats(-1e3, 1e3), st.floats(0.1, 1e3))
+def test_expressions_are_the_arithmetic_they_show(a, b):
+    tree = expressions.parsed("-(a - 2.5) * 'b b' / 4 + a", "x")
+    found = expressions.value(tree, {"a": np.array([a]), "b b": np.array([b])})
+    assert found[0] == -(a - 2.5) * b / 4 + a
+    assert expressions.names(tree).count("a") == 2
+
+
+def written(tmp_path, table, name="log.csv", **options):
+    table.to_csv(tmp_path / name, index=False, **options)
+    return tmp_path / name
+
+
+def test_each_fault_is_one_line_that_says_what_to_write(tmp_path):
+    own = circle()
+    swapped = own.rename(columns={"x": "y", "y": "x"})
+    line = refused(written(tmp_path, swapped))
+    assert line.count("\n") == 0 and "column x (x), row 2 on: moves like vy" in line and "write x:=y and y:=x" in line
+    ned = own.rename(columns={"x": "y", "y": "x"}).assign(vx=own["vx"], vy=own["vy"], z=-20.0)
+    assert "--axes ned" in refused(written(tmp_path, ned))
+    assert "vx:=-vx" in refused(written(tmp_path, own.assign(vx=-own["vx"])))
+    assert "positions are in mm" in refused(written(tmp_path, own.assign(x=1e3 * own["x"], y=1e3 * own["y"])))
+    micro = own.assign(**{"t [ms]": own["t"] * 1e6}).drop(columns="t")
+    assert "microseconds are named ms" in refused(written(tmp_path, micro))
+    doubled = pd.concat([own, own.iloc[10:20]])
+    line = refused(written(tmp_path, doubled))
+    assert "10 rows of log repeat a time" in line and "first row 402" in line and "--accept duplicates" in line
+    assert airflock.load_tracks(written(tmp_path, doubled), accept=["duplicates"]).sizes["time"] == len(own)
+    both = pd.concat([own, circle(5)]).assign(id="one")
+    assert "two individuals under one id" in refused(written(tmp_path, both))
+    turns = pd.concat([own.iloc[::2], circle(5).iloc[1::2]]).sort_values("t").assign(id="one")
+    assert "two individuals under one id" in refused(written(tmp_path, turns))
+    below = own.assign(z=-20.0)
+    assert "write z:=-z" in refused(written(tmp_path, below))
+
+
+def test_a_reset_of_the_estimator_splits_and_an_outlier_is_left_out(tmp_path):
+    own = circle()
+    reset = own.copy()
+    reset.loc[200:, "x"] += 4.0
+    line = refused(written(tmp_path, reset))
+    assert "row 202" in line and "jumps 4 m more than its velocity explains" in line
+    found = airflock.load_tracks(written(tmp_path, reset), accept=["jumps"], rate=40.0)
+    x = values(found)[:, 0, 0]
+    assert np.isnan(x[399]) and np.isfinite(x[398]) and np.isfinite(x[400])  # nothing between the two halves
+    spike = own.copy()
+    spike.loc[200, "y"] += 9.0
+    found = airflock.load_tracks(written(tmp_path, spike))
+    assert abs(values(found)[200, 1, 0] - own["y"][200]) < 1e-3
+    assert "1 outliers left out, first row 202" in found.attrs["airflock_import"]
+
+
+def test_files_that_are_no_tables_end_with_one_line(tmp_path):
+    own = circle()
+    (tmp_path / "a.zip").write_bytes(b"PK\x03\x04")
+    assert "unpack it first" in refused(tmp_path / "a.zip")
+    (tmp_path / "zip.csv").write_bytes(b"PK\x03\x04 and more")
+    assert "is a zip archive" in refused(tmp_path / "zip.csv")
+    comma = written(tmp_path, own, sep=";", decimal=",")
+    assert "has a decimal comma; write --decimal ," in refused(comma)
+    np.testing.assert_array_equal(values(airflock.load_tracks(comma, decimal=",")), values(airflock.load_tracks(own)))
+    (tmp_path / "odd.csv").write_text("t,x,y\n0,1,5,2,5\n")
+    assert "row 2 has 5 cells, the header 3" in refused(tmp_path / "odd.csv")
+    (tmp_path / "wide.csv").write_text(",".join(f"c{i}" for i in range(100_000)) + "\n")
+    assert "100000 columns are more than 2000" in refused(tmp_path / "wide.csv")
+    (tmp_path / "numbers.csv").write_text("1,2,3\n4,5,6\n")
+    assert "the first row holds numbers" in refused(tmp_path / "numbers.csv")
+    (tmp_path / "text.csv").write_text("t,x,y\n0,1,2\n1,one,2\n")
+    assert "column x, row 3: 'one' is no number" in refused(tmp_path / "text.csv")
+    np.save(tmp_path / "objects.npy", np.array({"trajectories": np.zeros(3)}, object), allow_pickle=True)
+    line = refused(tmp_path / "objects.npy", fps=25.0, unit="m")
+    assert "pickled" in line and "idtrackerai_format" in line
+    assert "is no format read here" in refused(written(tmp_path, own, "a.xlsx"))
+    assert "no such file" in refused(tmp_path / "nothing.csv")
+
+
+def test_all_faults_are_told_at_once(tmp_path):
+    table = written(tmp_path, circle().rename(columns={"t": "clock"}))
+    text = refused([table, tmp_path / "none.csv"], map={"q": "x", "x": "east"})
+    assert len(text.splitlines()) == 3 and "no target q" in text and "no column east" in text and "no such file" in text
+
+
+def test_clocks_of_several_files_need_a_reason(tmp_path):
+    files = [written(tmp_path, circle(i), f"{i}.csv") for i in range(2)]
+    assert "--same-clock" in refused(files)
+    late = circle(1)
+    late = late.assign(utc=1.7e9 + late["t"], t=late["t"] * (1 + 2e-5) + 77.0)
+    files = [written(tmp_path, circle().assign(utc=1.7e9 + circle()["t"]), "0.csv"), written(tmp_path, late, "1.csv")]
+    found = airflock.load_tracks(files)
+    np.testing.assert_allclose(
+        values(found)[:, :, 1], circle(1)[["x", "y"]].to_numpy(), atol=5e-3
+    )  # 20 s are too few for a drift
+
+
+def test_one_that_is_hardly_there_is_told(tmp_path):
+    table = pd.concat([circle().assign(id="a"), circle(1).iloc[:30].assign(id="b")])
+    assert "b is there for 8% of 19.95 s" in refused(written(tmp_path, table))
+    found = airflock.load_tracks(table, accept=["absent"])
+    assert np.isnan(values(found)[60:, :, 1]).all()
+
+
+def test_notes_tell_what_was_done():
+    own = circle().drop(columns=["vx", "vy", "cx", "cy"]).round({"x": 0, "y": 0})
+    notes = json.loads(airflock.load_tracks(own).attrs["airflock_import"])["notes"]
+    assert any("no velocity" in note for note in notes) and any("steps of 1 m" in note for note in notes)
+
+
+def test_tracks_that_are_scored_before_they_are_imported_are_told_how(tmp_path):
+    path = written(tmp_path, circle())
+    with pytest.raises(RecordingError, match="airflock import log.csv --save"):
+        airflock.load_recording(path)

@@ -1,0 +1,160 @@
+"""The mission table: every row fires, and gives way to a higher one; the limiter lets nothing dangerous through."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airflock.core.agent import State
+from airflock.core.maths import braking_curve
+from airflock.mavlink.orders import Do
+from airflock.onboard.limiter import limit
+from airflock.onboard.mission import FLY, TABLE, Facts, Phase, look
+from airflock.onboard.safety import Safety
+
+WELL, SAFE = Facts(), Safety()
+P = Phase
+PILOT = {"mode_ours": False}
+# number, phase, facts that fire it, next phase; facts of a higher row and where that leads
+ROWS = [
+    ("1", P.FLOCK, PILOT, P.MANUAL, None, None),
+    ("1", P.LAND, {"mode_ours": False, "mode_land": False}, P.MANUAL, None, None),
+    ("2", P.MANUAL, {"resume": True, "streamed_for": 2.0}, P.HOLD, None, None),
+    ("3", P.MANUAL, {"armed": False}, P.DONE, None, None),
+    ("4", P.FLOCK, {"killed": True}, P.DONE, PILOT, P.MANUAL),
+    ("5", P.FLOCK, {"position_bad_for": 0.1}, P.HOLD, PILOT, P.MANUAL),
+    ("5b", P.HOLD, {"position_bad_for": 5.1}, P.LAND, PILOT, P.MANUAL),
+    ("6", P.GOTO, {"gnss_bad_for": 0.1}, P.HOLD, {"position_bad_for": 9.0}, P.LAND),
+    ("6b", P.HOLD, {"gnss_bad_for": 10.1}, P.LAND, {"killed": True}, P.DONE),
+    ("7", P.FLOCK, {"battery_critical": True}, P.LAND, {"gnss_bad_for": 1.0}, P.HOLD),
+    ("8", P.FLOCK, {"battery_home": True}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("9", P.FLOCK, {"outside_for": 0.1}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("9b", P.RETURN, {"outside_for": 10.1}, P.LAND, PILOT, P.MANUAL),
+    ("10", P.FLOCK, {"near_fence": True}, None, {"outside_for": 1.0}, P.RETURN),
+    ("11", P.FLOCK, {"lost_near": True}, None, {"outside_for": 1.0}, P.RETURN),
+    ("11b", P.FLOCK, {"deaf_for": 20.1}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("12", P.FLOCK, {"few_for": 10.1}, P.HOLD, {"deaf_for": 20.1}, P.RETURN),
+    ("12b", P.HOLD, {"few_for": 30.1}, P.RETURN, {"position_bad_for": 6.0}, P.LAND),
+    ("13", P.FLOCK, {"clock_bad_for": 0.1}, P.HOLD, {"battery_home": True}, P.RETURN),
+    ("13b", P.HOLD, {"clock_bad_for": 10.1}, P.RETURN, {"outside_for": 11.0}, P.LAND),
+    ("14", P.FLOCK, {"operator_lost": True, "says": "hold"}, P.HOLD, {"battery_home": True}, P.RETURN),
+    ("14b", P.FLOCK, {"operator_lost": True, "says": "return"}, P.RETURN, {"clock_bad_for": 1.0}, P.HOLD),
+    ("15", P.FLOCK, {"overload": True}, P.HOLD, {"deaf_for": 21.0}, P.RETURN),
+    ("15b", P.HOLD, {"overloads": 3}, P.RETURN, {"battery_critical": True}, P.LAND),
+    ("16", P.BOOT, {"armed": False, "landed": True}, P.READY, {"fault": "another kind"}, P.FAULT),
+    ("16b", P.READY, {"fault": "another system", "armed": False}, P.FAULT, None, None),
+    ("17", P.READY, {"armed": False}, P.CLEARED, {"fault": "another kind"}, P.FAULT),
+    ("17b", P.CLEARED, {"armed": False, "misses": ("no position",)}, P.READY, {"fault": "x"}, P.FAULT),
+    ("18", P.CLEARED, {"armed": False, "due": True}, P.ARMING, {"misses": ("battery",)}, P.READY),
+    ("19", P.ARMING, {"streamed_for": 2.0}, P.TAKEOFF, {"killed": True}, P.DONE),
+    ("19b", P.ARMING, {"armed": False, "phase_for": 11.0}, P.READY, {"killed": True}, P.DONE),
+    ("20", P.TAKEOFF, {"at_layer": True}, P.GATHER, {"gnss_bad_for": 1.0}, P.HOLD),
+    ("21", P.TAKEOFF, {"neighbour_near": True}, P.HOLD, {"at_layer": True}, P.GATHER),
+    ("21b", P.TAKEOFF, {"climbing": False, "phase_for": 6.0}, P.LAND, PILOT, P.MANUAL),
+    ("22", P.GATHER, {"gathered": True}, P.FLOCK, {"few_for": 11.0}, P.HOLD),
+    ("22", P.GATHER, {"order": Do.GO}, P.FLOCK, {"clock_bad_for": 1.0}, P.HOLD),
+    ("23", P.FLOCK, {"order": Do.LAND}, P.LAND, {"battery_home": True}, P.RETURN),
+    ("23", P.GOTO, {"order": Do.RETURN}, P.RETURN, {"position_bad_for": 1.0}, P.HOLD),
+    ("23", P.FLOCK, {"time_over": True}, P.RETURN, PILOT, P.MANUAL),
+    ("23", P.FLOCK, {"order": Do.HOLD}, P.HOLD, {"outside_for": 1.0}, P.RETURN),
+    ("23", P.FLOCK, {"order": Do.GOTO}, P.GOTO, {"battery_home": True}, P.RETURN),
+    ("23", P.GOTO, {"order": Do.RESUME}, P.FLOCK, {"overload": True}, P.HOLD),
+    ("24", P.FLOCK, {"joined": True}, None, {"order": Do.HOLD}, P.HOLD),
+    ("25", P.HOLD, {"calm_for": 3.0, "before": P.GOTO}, P.GOTO, {"order": Do.LAND}, P.LAND),
+    ("26", P.RETURN, {"at_home": True}, P.LAND, {"position_bad_for": 1.0}, P.HOLD),
+    ("27", P.LAND, {"landed": True, "mode_land": True}, P.DONE, {"landed": False, "killed": True}, P.DONE),
+    ("28", P.BOOT, {"landed": False}, P.MANUAL, None, None),
+]
+
+
+def at(phase, given):
+    safety = replace(SAFE, operator_lost=given.get("says", "ignore"))
+    return look(phase, replace(WELL, **{k: v for k, v in given.items() if k != "says"}), safety)
+
+
+@pytest.mark.parametrize(("number", "phase", "given", "to", "higher", "then"), ROWS)
+def test_every_row_fires_and_gives_way_to_a_higher_one(number, phase, given, to, higher, then):
+    step = at(phase, given)
+    if to is None:
+        assert step.row is None and step.to == phase and number in step.effects
+    else:
+        assert (step.row.number, step.to) == (number, to)
+    if higher is not None:
+        above = at(phase, given | higher)
+        assert above.to == then and above.row.number != number
+        order = [row.number for row in TABLE]
+        assert order.index(above.row.number) < len(order) - order[::-1].index(number)
+
+
+def test_all_28_rows_of_the_table_are_here():
+    whole = {number.rstrip("b") for number, *_ in ROWS}
+    assert whole == {row.number.rstrip("b") for row in TABLE} == {str(k) for k in range(1, 29)}
+    assert {number for number, *_ in ROWS} == {row.number for row in TABLE}
+
+
+@pytest.mark.parametrize("phase", sorted(FLY - {P.TAKEOFF, P.GATHER}))
+def test_a_drone_that_flies_well_flies_on(phase):
+    assert at(phase, {}).row is None and at(phase, {}).to == phase
+
+
+@given(st.sampled_from(sorted(Phase)), st.data())
+def test_whatever_goes_wrong_the_pilot_comes_first_and_nothing_on_the_ground_flies_by_itself(phase, data):
+    names = [name for name, kind in Facts.__annotations__.items() if kind is bool]
+    odd = {name: data.draw(st.booleans(), label=name) for name in names}
+    odd |= {n: data.draw(st.sampled_from([0.0, 1.0, 99.0])) for n, k in Facts.__annotations__.items() if k is float}
+    odd["order"] = data.draw(st.sampled_from([None, *Do]))
+    step = at(phase, odd)
+    if phase in FLY and not odd["mode_ours"]:
+        assert step.to == P.MANUAL
+    if phase in (P.BOOT, P.READY, P.CLEARED, P.DONE, P.FAULT):
+        assert step.to not in FLY
+        assert step.to != P.ARMING or (phase == P.CLEARED and odd["due"])
+    if phase in (P.DONE, P.FAULT):
+        assert step.to == phase
+    if phase == P.MANUAL and step.to == P.HOLD:
+        assert odd["mode_ours"] and odd["resume"] and odd["healthy"]
+
+
+# -------------------------------------------------------------------------------------------------------- limiter
+
+numbers = st.one_of(st.floats(-50, 50), st.floats())
+states = st.builds(State, *[st.floats(-200, 200)] * 2, st.floats(-5, 200), *[st.floats(-8, 8)] * 2, st.floats(-3, 3))
+
+
+def square(own, half=100.0):
+    return [(half - n * p, -a * n, -b * n, 0.0) for a, b, p in ((1, 0, own.x), (0, 1, own.y)) for n in (1.0, -1.0)]
+
+
+@given(st.tuples(numbers, numbers, numbers), states)
+def test_whatever_is_wished_stays_within_all_limits(wish, own):
+    (vx, vy, vz), _ = limit(wish, own, square(own), (2.0, 60.0), SAFE)
+    assert all(map(math.isfinite, (vx, vy, vz)))
+    assert math.hypot(vx, vy) <= SAFE.speed_max * (1 + 1e-9) and abs(vz) <= SAFE.climb_max
+    for distance, nx, ny, _ in square(own):
+        outward = -(vx * nx + vy * ny)
+        assert outward <= braking_curve(distance, SAFE.brake, SAFE.brake_gain) + 1e-6
+    assert vz <= braking_curve(60.0 - own.z, SAFE.brake, SAFE.brake_gain) + 1e-9
+    assert -vz <= braking_curve(own.z - 2.0, SAFE.brake, SAFE.brake_gain) + 1e-9
+
+
+@given(st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1, 1)))
+def test_what_is_harmless_passes_unchanged(wish):
+    own = State(0.0, 0.0, 30.0, 0.0, 0.0, 0.0)
+    made = limit(wish, own, square(own), (2.0, 60.0), SAFE)
+    assert made.velocity == pytest.approx(wish, abs=1e-12) and not made.fenced
+
+
+@given(st.floats(0, 2 * math.pi), st.floats(-90, 90), st.floats(-90, 90))
+def test_a_drone_at_full_speed_stops_before_the_fence(direction, x, y):
+    """Wherever it comes from, a drone that follows the limiter with its own inertia never crosses the fence."""
+    own, dt = State(x, y, 20.0, 0.0, 0.0, 0.0), 0.05
+    wish = (6.0 * math.cos(direction), 6.0 * math.sin(direction), 0.0)
+    for _ in range(1200):
+        v = limit(wish, own, square(own), (2.0, 60.0), SAFE).velocity
+        ax, ay = (v[0] - own.vx) / SAFE.response, (v[1] - own.vy) / SAFE.response
+        k = min(1.0, SAFE.accel / max(math.hypot(ax, ay), 1e-9))
+        vx, vy = own.vx + k * ax * dt, own.vy + k * ay * dt
+        own = State(own.x + own.vx * dt, own.y + own.vy * dt, 20.0, vx, vy, 0.0)
+        assert max(abs(own.x), abs(own.y)) < 100.0

@@ -1,0 +1,178 @@
+"""Order parameters, metric sets and bodies of a user's own, from a file or given directly; no compiler needed."""
+
+import linecache
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.engine.simulate import finish, fly
+from airflock.errors import RuleError, ScenarioError
+from airflock.metrics.registry import SETS, metric_set, reports
+from airflock.recordings.flights import flown_document
+from airflock.recordings.scores import scenario_of
+from airflock.scenarios.files import load
+
+SMALL = {"agents": 4, "duration": 2.0, "world.side": 60.0, "start.separation": 5.0}
+METRIC = '''
+"""How far agents are spread along the east."""
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import airflock
+
+REPORTS = {"spread": ("m", "mean distance to the centre, east"), "fitness": ("", "narrow is good")}
+METRICS = ["speed"]
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    """One length."""
+    width: float = airflock.quantity(10.0, "m", low=0.1, high=1e3, meaning="a narrow flock")
+
+class Agent(NamedTuple):
+    """Distance, m."""
+    offset: float
+
+class Sample(NamedTuple):
+    """Mean, m."""
+    spread: float
+
+def agent(x, mean):
+    """Distance of one agent, m."""
+    return Agent(abs(x - mean.x))
+
+def sample(agents, n):
+    """Mean, m."""
+    return Sample(agents.offset / n)
+
+def fitness(values, agents, q):
+    """Narrow is good."""
+    return {"fitness": q.width / (q.width + values["spread"]) * (agents / 4.0)}
+'''
+BODY = '''
+"""A body that does half of what it is told."""
+from dataclasses import dataclass
+
+import airflock
+
+ACCEPTS = "velocity"
+INTEGRATION = "new"
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    """Obedience."""
+    share: float = airflock.quantity(0.5, "1", low=0.0, high=1.0, meaning="of the command that is flown")
+
+def move(cx, cy, cz, b):
+    """Velocity after one step, m/s."""
+    return b.share * cx, b.share * cy, b.share * cz
+'''
+
+
+def namespace(text):
+    """Names of a text, as a notebook cell defines them."""
+    name = f"<cell {hash(text)}>"
+    linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+    space = {"__name__": "cell"}
+    exec(compile(text, name, "exec"), space)
+    return space
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "spread.py").write_text(METRIC)
+    (tmp_path / "half.py").write_text(BODY)
+    return tmp_path
+
+
+def test_a_metric_of_ones_own_measures_what_its_rule_says(files):
+    found = load("vasarhelyi_2018/4ms", SMALL, metrics=files / "spread.py")
+    flown = fly(found, 1, record=True, device="python")
+    x = flown.frames[:, 0]
+    truth = np.abs(x - x.mean(axis=1, keepdims=True)).mean()
+    values = finish(found, flown.values)
+    assert values["spread"] == pytest.approx(truth, rel=1e-12)
+    assert values["fitness"] == pytest.approx(10.0 / (10.0 + truth), rel=1e-12)
+    assert found.measures.best == "fitness" and "phi_vel" in values  # METRICS: one of ours beside it
+    narrow = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.width": 1.0}, metrics=files / "spread.py")
+    assert finish(narrow, flown.values)["fitness"] == pytest.approx(1.0 / (1.0 + truth), rel=1e-12)
+    assert reports(found.measures)["spread"] == ("m", "mean distance to the centre, east")
+
+
+def test_a_body_of_ones_own_flies_half_of_the_command(files):
+    found = load("vasarhelyi_2018/4ms", SMALL, body=files / "half.py")
+    frames = fly(found, 1, record=True, device="python").frames
+    np.testing.assert_array_equal(frames[1:, 2:4], 0.5 * frames[:-1, 4:6])  # a decision at every sample
+    still = load("vasarhelyi_2018/4ms", {**SMALL, "body.share": 0.0}, body=files / "half.py")
+    assert np.ptp(fly(still, 1, record=True, device="python").frames[:, :2], axis=0).max() == 0.0
+
+
+def test_a_file_and_the_same_names_given_directly_are_one(files):
+    keys = {"metrics.width": 3.0, "body.share": 0.25}
+    from_file = load("vasarhelyi_2018/4ms", {**SMALL, **keys}, metrics=files / "spread.py", body=files / "half.py")
+    direct = load(
+        "vasarhelyi_2018/4ms", {**SMALL, **keys}, metrics=namespace(METRIC), body=airflock.body(namespace(BODY))
+    )
+    a, b = (finish(found, fly(found, 2, record=True, device="python").values) for found in (from_file, direct))
+    assert a == b
+    listed = load("vasarhelyi_2018/4ms", SMALL, metrics=["speed", airflock.metric(namespace(METRIC), "spread")])
+    assert listed.numbers["q"] == load("vasarhelyi_2018/4ms").numbers["q"]
+
+
+def test_a_recording_keeps_files_and_forgets_what_was_given_directly(files):
+    found = load("vasarhelyi_2018/4ms", SMALL, metrics=files / "spread.py", body=files / "half.py")
+    recording = airflock.simulate(found, 1, precision=64, device="python")
+    again = scenario_of(recording)
+    assert again.measures.name == "spread" and again.vehicle.name == "half"
+    direct = load("vasarhelyi_2018/4ms", SMALL, metrics=namespace(METRIC), body=namespace(BODY))
+    recording = airflock.simulate(direct, 1, precision=64, device="python")
+    again = scenario_of(recording)
+    assert again.measures.name == "vasarhelyi" and again.vehicle.name == "multirotor"
+
+
+def test_code_in_the_current_folder_is_found_and_its_whole_path_is_kept(files, monkeypatch):
+    monkeypatch.chdir(files)
+    keys = {**SMALL, "metrics.kind": "spread.py", "body.kind": "half.py"}
+    document = load("kidger/final_2d", {"agents": 3, "metrics.kind": "spread.py"}).document
+    assert document["metrics"]["kind"] == "spread.py"
+    kept = flown_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}))
+    assert kept["metrics"]["kind"] == str(files / "spread.py")
+    with pytest.raises(ScenarioError, match="body.tau is no key"):  # the preset's keys are another body's
+        load("vasarhelyi_2018/4ms", keys)
+
+
+BAD = {
+    "sample": (METRIC.replace("def sample(", "def simple("), "metric spread has"),
+    "asks": (METRIC.replace("agent(x, mean)", "agent(xx, mean)"), "did you mean"),
+    "twice": (METRIC.replace('["speed"]', '["speed", "speed"]'), "the metric speed comes twice"),
+    "unknown": (METRIC.replace('["speed"]', '["spede"]'), "'spede' is not a metric"),
+    "clock": (METRIC + "\nCLOCK = 'often'\n", "CLOCK = 'often'"),
+    "over": (METRIC + "\nOVER_TIME = {'spread': 'median'}\n", "OVER_TIME['spread'] = 'median'"),
+    "fitness": (METRIC.replace("fitness(values, agents, q)", "fitness(values, seeds)"), "asks for 'seeds'"),
+    "record": (METRIC.replace("(airflock.Parameters)", ""), "Parameters is not a frozen dataclass"),
+}
+
+
+@pytest.mark.parametrize("name", [name for name in BAD if name != "sample"])
+def test_a_faulty_metric_file_is_one_line(name, tmp_path):
+    text, line = BAD[name]
+    (tmp_path / "spread.py").write_text(text)
+    with pytest.raises(ScenarioError) as fault:
+        load("vasarhelyi_2018/4ms", SMALL, metrics=tmp_path / "spread.py")
+    assert line in str(fault.value) and len(str(fault.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("key", ["metrics.kind", "body.kind", "model.kind"])
+def test_a_file_that_is_not_there_is_one_line(key):
+    with pytest.raises(ScenarioError, match=f"{key} = 'nowhere.py': no such Python file"):
+        load("vasarhelyi_2018/4ms", {key: "nowhere.py"})
+
+
+def test_a_set_of_nothing_is_refused():
+    with pytest.raises(RuleError, match="measures nothing"):
+        metric_set({}, "empty")
+
+
+def test_every_set_says_what_is_best_or_that_nothing_is():
+    for found in SETS.values():
+        assert found.best in ("", *found.numbers(found.Parameters(kind=found.name)))

@@ -1,0 +1,52 @@
+"""A replacement in generated text that finds nothing to replace is an error that names the text."""
+
+import pytest
+
+from airflock.engine.cuda import cells
+from airflock.engine.cuda.build import CudaBuilder
+from airflock.engine.passes import driver, grid
+from airflock.engine.replace import ReplacementError, must_replace
+from airflock.engine.simulate import plan_of
+from airflock.scenarios.files import load
+
+LARGE = "couzin_2002/swarm"  # flown by cells where it is large
+
+
+def test_every_occurrence_is_replaced_in_text_and_in_lines():
+    assert must_replace("a b a", "a", "c") == "c b c"
+    assert must_replace("a b a", "a", "c", 1) == "c b a"
+    assert must_replace(["a b", "b", "a"], "a", "c") == ["c b", "b", "c"]
+
+
+@pytest.mark.parametrize("text", ["x = y[i]", ["x = y[i]", "z = 1"], "", []])
+def test_a_replacement_without_a_match_names_what_it_looked_for_and_the_text(text):
+    with pytest.raises(ReplacementError, match=r"'y\[j\]' was to become 'h\[j\]'") as found:
+        must_replace(text, "y[j]", "h[j]")
+    assert all(line in str(found.value) for line in ([text] if isinstance(text, str) else text))
+
+
+def respelled(lines):
+    """Lines in which a candidate is named in another way."""
+    return [line.replace("integer(j)", "whole(j)") for line in lines]
+
+
+def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(monkeypatch):
+    """The grid and the kernel of a large flock look for spellings of `neighbours`; none may be missed in silence."""
+    plan = plan_of(load(LARGE), precision=32).built(grid=True)
+    driver.flight(plan)
+    cells.crowd(plan)
+    meet, add = grid.neighbours, CudaBuilder.function
+    monkeypatch.setattr(
+        grid, "neighbours", lambda build, lines, before, inner, sums: meet(build, lines, before, respelled(inner), sums)
+    )
+    monkeypatch.setattr(
+        CudaBuilder,
+        "function",
+        lambda build, head, *bodies: add(
+            build, head, *[body if isinstance(body, str) else respelled(body) for body in bodies]
+        ),
+    )
+    with pytest.raises(ReplacementError, match=r"integer\(j\)"):
+        driver.flight(plan)
+    with pytest.raises(ReplacementError, match=r"integer\(j\)"):
+        cells.crowd(plan)

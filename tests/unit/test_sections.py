@@ -1,0 +1,61 @@
+"""One list of sections: whatever its order, a driver reads each number from the column that holds it."""
+
+from collections import namedtuple
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from airflock.engine import tables as engine_tables
+from airflock.engine.passes.build import Builder
+from airflock.engine.simulate import plan_of
+from airflock.scenarios import scenario as scenarios
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.sections import ORDER, SECTIONS
+
+
+def read_by_text(plan, row):
+    """Records as the text of a driver makes them from a row, by letter."""
+    build = Builder(plan)
+    space = {"row": row, "namedtuple": namedtuple}
+    lines = build.records(" ".join(plan.records))
+    exec("\n".join([*build.source.blocks, *lines]), space)
+    return {letter: space[letter] for letter in plan.records}
+
+
+@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "kidger/city", "vasarhelyi_2018/fixed_wing"])
+def test_any_order_of_sections_flies_the_same_numbers(name, seed, monkeypatch):
+    found = load(name).in_flight(0)
+    rng = np.random.default_rng(seed)
+    truth = engine_tables.read_by_drivers(found, 0.2)
+    rows = set()
+    for _ in range(5):  # the columns are laid out by one order and filled by another: by name they meet
+        for module in (scenarios, engine_tables):
+            monkeypatch.setattr(module, "ORDER", tuple(ORDER[i] for i in rng.permutation(len(ORDER))))
+        plan = plan_of(found, precision=64)
+        row = engine_tables.tables(found, plan, 0).row
+        rows.add(tuple(row.tolist()))
+        for letter, record in read_by_text(plan, row).items():
+            own = truth | {"c": truth["c"]._replace(period=record.period)} if letter == "c" else truth
+            for field, value in record._asdict().items():
+                assert value == (getattr(own[letter], field) or 0.0), f"{letter}.{field}"
+    assert len(rows) > 1  # the orders did differ
+
+
+def test_sections_are_the_records_of_a_scenario():
+    records = {section.field for section in ORDER}
+    assert records <= {field.name for field in fields(Scenario)}
+    found = load("vasarhelyi_2018/4ms")
+    assert set(found.records) == {"model", "", *SECTIONS}
+    for section in ORDER:
+        own = section.record is None or isinstance(found.records[section.key], section.record)
+        assert own or section.key == "body"
+
+
+def test_how_a_driver_is_built_is_no_field_to_patch():
+    plan = plan_of(load("vasarhelyi_2018/4ms"))
+    assert plan.built(grid=True, record=True).grid and not plan.grid
+    assert plan.built(record=True).built(record=False) == plan
+    with pytest.raises(TypeError):
+        replace(plan, record=True)

@@ -1,0 +1,153 @@
+"""Stages are code: no text in them is a statement, and each runs as it stands, as the driver made of it does."""
+
+import ast
+import math
+import types
+from collections import namedtuple
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airflock.core import random
+from airflock.engine import stages
+from airflock.engine.passes import decide, move, perceive
+from airflock.engine.passes.build import Builder
+from airflock.engine.plan import WHOLE
+from airflock.engine.simulate import plan_of
+from airflock.engine.stages import gusts, neighbours, noise, receive, surfaces, words
+from airflock.engine.stages import move as motion
+from airflock.engine.stages import perceive as measuring
+from airflock.engine.stages.state import Flock
+from airflock.engine.tables import tables
+from flocks import ISLANDS, scenario
+
+FILES = sorted(Path(stages.__file__).parent.glob("*.py"))
+
+
+def strings(tree):
+    """String constants of a file that are no docstrings."""
+    documented = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented:
+            yield node
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_no_text_in_a_stage_is_code(path):
+    """A name, at most (of a row, of a field, of a constant with its sign): never a statement or an expression."""
+    for node in strings(ast.parse(path.read_text())):
+        assert not node.value or node.value.lstrip("-").isidentifier(), f"{path.name}:{node.lineno}: {node.value!r}"
+
+
+SILENT = {"sensors__noise": 0.0, "body__noise": 0.0}
+CASES = {
+    "paper": ("vasarhelyi_2018", {}),
+    "loss, gusts, obstacles": ("viragh_2014", {"radio__loss": 0.5, "wind__gust": 2.0, "world__obstacles": ISLANDS}),
+    "links, 3-D": ("vasarhelyi_2018", {"world__dimensions": "3", "radio__kind": "links", "radio__near": 5.0}),
+    "periodic, late": ("vasarhelyi_2018", SILENT | {"world__edges": "periodic"}),
+    "at once": ("vasarhelyi_2018", SILENT | {"radio__delay": 0.0, "world__walls": "nearest_per_axis"}),
+}
+
+
+class World:
+    """Rows with random numbers in them, and the numbers of a scenario, for stages of one plan."""
+
+    def __init__(self, name, seed):
+        kind, keys = CASES[name]
+        found = scenario(kind, agents=6, world__side=60.0, world__height=50.0, start__separation=4.0, **keys)
+        self.plan = plan_of(found, precision=64)
+        self.tables = tables(found, self.plan, seed)
+        self.build = Builder(self.plan)
+        for make in (perceive.snapshot, perceive.perceive, perceive.receive, decide.neighbours, decide.boundaries):
+            make(self.build)
+        move.move(self.build)
+        rng, n = np.random.default_rng(seed), 6
+        dims = self.plan.dimensions
+        self.state = {
+            "work": rng.uniform(-12.0, 12.0, (len(self.build.rows), n)),
+            "ring": rng.uniform(-12.0, 12.0, (2, 2 * dims, n)),
+            "words": np.zeros((4, n), np.uint32).astype(object),
+            "store": np.concatenate([rng.uniform(-9.0, 9.0, (n, 2 * dims, n)), np.full((n, 1, n), -1e9)], 1),
+            "gust": np.array([0.3, -0.2, 0.1]),
+        }  # fmt: skip
+        whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
+        self.whole, self.row = types.SimpleNamespace(**whole), self.tables.row.tolist()
+        self.rest = {name: getattr(self.tables, name) for name in ("faces", "edges", "spans")} | {"scene": ()}
+
+    def text(self):
+        """The driver's functions as plain Python."""
+        held = {name: getattr(words, name) for name in ("real", "integer", "least", "most", "choose")}
+        held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT")}
+        held |= {name: getattr(random, name) for name in random.PRIMITIVES}
+        held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
+        held["njit"] = lambda *_, **__: lambda function: function
+        exec("\n\n".join([*self.build.source.blocks, *self.build.functions]), held)
+        return held
+
+    def by_text(self, step):
+        """One decision and one motion step by the text of the driver."""
+        made, state, n = self.text(), {name: array.copy() for name, array in self.state.items()}, 6
+        common = self.row, self.tables.whole.tolist(), state["work"]
+        made["snapshot"](1, n, state["work"], state["ring"])
+        made["perceive"](step, 0, n, *common, state["ring"], state["words"])
+        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"])
+        made["boundaries"](n, *common, *self.rest.values())
+        state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
+        return state
+
+    def directly(self, step):
+        """The same by the stages as they stand."""
+        state, n, plan, model = (
+            {name: array.copy() for name, array in self.state.items()},
+            6,
+            self.plan,
+            self.plan.model,
+        )
+        whole, numbers, at = self.whole, types.SimpleNamespace(), 0
+        for letter, fields in plan.records.items():
+            values = dict(zip(fields, self.row[at : at + len(fields)], strict=True)) | plan.constants.get(letter, {})
+            setattr(numbers, letter, types.SimpleNamespace(**values))
+            at += len(fields)
+
+        def take(name):
+            if name[0] == "u" and name[1:].isdigit():
+                return state["words"][int(name[1:])]
+            # a row that no driver has holds what nobody asks for
+            return state["work"][self.build.row(name)] if self.build.row(name) < len(state["work"]) else np.zeros(n)
+
+        flock = Flock(take, plan.dimensions, words.Itself())
+        measuring.snapshot(flock, 1, n, state["ring"], plan=plan)
+        measuring.perceive(flock, numbers, whole, step, 0, n, state["ring"], plan=plan)
+
+        def hear(i):
+            receive.receive(flock, numbers, whole, i, step, n, 0.7, 0.2, state["store"], plan=plan)
+
+        fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
+        sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
+        neighbours.neighbours(
+            range(n), range(n), flock, numbers, 0.2, hear, plan=plan, model=model, sums=sums, images=plan.periodic
+        )
+        surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
+        state["fastest"] = motion.move(
+            range(n), range(n), flock, numbers, step,
+            lambda: noise.noise(flock, whole, step, n, plan=plan),
+            lambda: gusts.gusts(numbers, whole, step, state["gust"]), plan=plan,
+        )  # fmt: skip
+        return state
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_stages_as_they_stand_do_what_the_driver_made_of_them_does(name, seed):
+    world = World(name, seed)
+    for step in (2, 3):  # an even step draws the outer noise of the odd one after it
+        direct, text = world.directly(step), world.by_text(step)
+        assert not np.array_equal(text["work"], world.state["work"])  # something happens
+        for part, expected in text.items():
+            np.testing.assert_allclose(
+                np.asarray(direct[part], float), np.asarray(expected, float), rtol=1e-12, atol=1e-12, err_msg=part
+            )
