@@ -1,32 +1,84 @@
-"""Files that are complete or not there at all: a temporary name in the same folder, then a rename."""
+"""Files that are complete or not there at all: a temporary name in the same folder, then a rename.
 
+A process that is killed leaves its temporary file. It held a lock on it, which the system has given back: so whoever
+writes beside it next knows that nobody needs it, and removes it.
+"""
+
+import fcntl
 import os
+import stat
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
+
+MARK = ".airflock-"  # in the name of every temporary file
+FRESH = 60.0  # s in which a temporary file may not be locked yet
 
 
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds."""
-    target = Path(path)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=target.suffix)
-    os.close(handle)
+    """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
+
+    A link is followed: the file that it names is replaced, not the link. Raises OSError where the path is that of
+    something else than a file, such as a named pipe.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not stat.S_ISREG(target.stat().st_mode):
+        raise OSError(0, "is there and is no regular file", str(path))
+    swept(target.parent)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
     temporary = Path(name)
     try:
+        with suppress(OSError):  # some file systems know no locks; then nothing is swept
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield temporary
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+    finally:
+        os.close(handle)
 
 
 def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
-    """Write text (UTF-8) or bytes; an OSError leaves the old file, or none, in place."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place."""
+    try:
+        with atomic(path) as temporary:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    except OSError as fault:
+        raise OSError(fault.errno, fault.strerror, str(path)) from fault
+
+
+@cache
+def swept(folder: Path) -> int:
+    """Remove what processes that were killed had begun to write into a folder, once a process; how many files."""
+    count = 0
+    with suppress(OSError):
+        for path in folder.glob(f".*{MARK}????????*"):
+            count += _remove(path)
+    return count
+
+
+def _remove(path: Path) -> bool:
+    """Remove a temporary file that no process holds."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        if time.time() - os.fstat(handle).st_mtime < FRESH:
+            return False
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        path.unlink()
+    except OSError:  # somebody is writing it, or it is not ours
+        return False
+    finally:
+        os.close(handle)
+    return True
 
 
 def _umask() -> int:

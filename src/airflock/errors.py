@@ -1,5 +1,27 @@
 """All errors that Airflock raises on purpose: one line each, ready for a person to read."""
 
+MOST_LETTERS = 2000  # of one line; what a stranger's file holds is echoed, and must not flood a terminal
+MOST_LINES = 50
+
+
+def bounded(text: str, most: int = MOST_LETTERS) -> str:
+    """A text without its middle where it is longer than `most` letters."""
+    if len(text) <= most:
+        return text
+    half = most // 2
+    return f"{text[:half]} ... ({len(text) - 2 * half} letters) ... {text[-half:]}"
+
+
+def bounded_lines(lines: list[str]) -> list[str]:
+    """The first lines, each bounded, and how many are left out."""
+    shown = [bounded(line) for line in lines[:MOST_LINES]]
+    return shown if len(lines) <= MOST_LINES else [*shown, f"and {len(lines) - MOST_LINES} more faults"]
+
+
+def printable(text: str) -> str:
+    """A text whose control letters are written out, so that it stays one line and moves no cursor."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
 
 class AirflockError(Exception):
     """Root of every error that the command line prints as one line before it exits with status 2.
@@ -23,7 +45,7 @@ class ScenarioError(AirflockError):
     """A scenario file or a set of its keys cannot be used; carries every fault that was found, one line each."""
 
     def __init__(self, faults: list[str]):
-        self.faults = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in fault) for fault in faults]
+        self.faults = [printable(fault) for fault in bounded_lines(faults)]
         super().__init__("\n".join(self.faults))
 
 

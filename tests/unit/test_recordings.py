@@ -93,7 +93,7 @@ def test_flight_with_a_law_given_directly_can_still_be_scored(tmp_path):
     assert scored[direct.index].to_numpy() == pytest.approx(direct.to_numpy(), abs=1e-9)
 
 
-def test_a_law_in_a_file_is_found_again_from_anywhere_and_no_other_of_its_name_is_taken(tmp_path, monkeypatch):
+def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flown_again_with_it(tmp_path, monkeypatch):
     from airflock.models import viragh_2014
     from airflock.recordings.files import fly_again
 
@@ -101,13 +101,17 @@ def test_a_law_in_a_file_is_found_again_from_anywhere_and_no_other_of_its_name_i
     (tmp_path / "sub" / "mine.py").write_text(Path(viragh_2014.__file__).read_text())
     (tmp_path / "sub" / "own.toml").write_text('duration = 2.0\nagents = 5\n[model]\nkind = "mine.py"\n')
     monkeypatch.chdir(tmp_path)
-    scenario = airflock.load("sub/own.toml")
+    scenario = airflock.load("sub/own.toml", trust=True)
     file = airflock.save(airflock.simulate(scenario, 1), tmp_path / "sub.nc")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "mine.py").write_text("raise ValueError('another law')\n")
     monkeypatch.chdir(tmp_path / "elsewhere")
     again = airflock.load_recording(file)
-    assert airflock.score(again)["phi_vel"][0] > 0.0 and fly_again(again)[0]
+    assert airflock.score(again)["phi_vel"][0] > 0.0
+    assert str(tmp_path) not in again.attrs["airflock_scenario"]
+    with pytest.raises(RecordingError, match="--law FILE.py"):
+        fly_again(again)
+    assert fly_again(again, law=tmp_path / "sub" / "mine.py") == (True, [])
     assert scenario.document["model"]["kind"] == "mine.py"
 
 

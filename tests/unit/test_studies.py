@@ -221,10 +221,10 @@ def test_own_fitness_is_read_from_beside_the_study(tmp_path):
         'scenario = "vasarhelyi_2018/4ms"\n[objective]\nmaximise = "hurry"\nown = "mine.py"\n'
         "[space.model]\np_rep = { low = 0.1, high = 0.2 }\n"
     )
-    study = load_study(tmp_path / "study.toml")
+    study = load_study(tmp_path / "study.toml", trust=True)
     before = study.document()
     (tmp_path / "mine.py").write_text("def hurry(score):\n    return 2.0 * score['phi_vel'] + 0.0\n")
-    found = differences(before, load_study(tmp_path / "study.toml").document())
+    found = differences(before, load_study(tmp_path / "study.toml", trust=True).document())
     assert len(found) == 1 and found[0].startswith("objective")
     assert study.objectives[0].of_candidate([{"phi_vel": 3.0}]) == 6.0 and study.space.keys == ("model.p_rep",)
 
@@ -233,9 +233,10 @@ def test_a_law_in_a_file_of_its_own_comes_along_with_the_winner(tmp_path):
     law = Path(airflock.__file__).parent / "models" / "viragh_2014.py"
     (tmp_path / "mine.py").write_text(law.read_text())
     (tmp_path / "mine.toml").write_text('duration = 1.0\nagents = 3\n[model]\nkind = "mine.py"\n')
-    study = load_study(tmp_path / "mine.toml", search={"population": 4, "generations": 1, "top": 1, "final_seeds": 2})
+    search = {"population": 4, "generations": 1, "top": 1, "final_seeds": 2}
+    study = load_study(tmp_path / "mine.toml", search=search, trust=True)
     finished(tmp_path / "a", study, lambda parameters, seed: {"fitness": sum(parameters.values())})
-    again = airflock.load(tmp_path / "a" / "best.toml")
+    again = airflock.load(tmp_path / "a" / "best.toml", trust=True)
     assert again.model.name == "mine" and (tmp_path / "a" / "mine.py").is_file()
 
 

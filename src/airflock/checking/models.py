@@ -56,7 +56,7 @@ def check_model(
     other units is the same flight; no rule leaves single precision. A law that rightly breaks one of them says which
     and why: VIOLATES = {"mirror": "neighbours are passed on the right"}. Raises CheckError for any other.
     """
-    found = law if isinstance(law, Model) else find_model(law) if isinstance(law, str) else model(law)
+    found = law if isinstance(law, Model) else find_model(law, trust=True) if isinstance(law, str) else model(law)
     made = law_of(found, dict(parameters or {}), dimensions)
     rng = np.random.default_rng(seed)
     scenes = [made.scene(rng) for _ in range(SCENES)]

@@ -30,6 +30,7 @@ def evolve(
     ] = "",
     device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu, cuda or auto.")] = "cpu",
     changes: options.Set = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
     threads: options.Threads = None,
@@ -57,6 +58,7 @@ def evolve(
         scenario,
         options.settings(changes, agents, duration),
         search_keys={key: value for key, value in given.items() if value is not None},
+        trust=trust,
     )
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")

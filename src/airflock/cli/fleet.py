@@ -108,7 +108,7 @@ def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, 
         tables.emit_json(told | ({"departure": departed._asdict()} if departed else {}))
         return
     title = f"{found.name}: fleet of {found.agents} {card.autopilot.name}, {found.flight.duration:g} s, {seeds} seeds"
-    tables.score_table(title, rows, {}, reports(found.metrics.kind))
+    tables.score_table(title, rows, {}, reports(found.measures))
     for run in runs[:1]:
         for time, member, note in run["notes"][:40]:
             tables.say(f"{time:8.2f} s  drone {member:3d}  {note}")

@@ -29,6 +29,7 @@ def harden(
     ] = None,
     generations: Annotated[int, typer.Option(min=1, help="Generations of that evolution.")] = 150,
     changes: options.Set = None,
+    trust: options.Trust = False,
     duration: options.Duration = None,
     threads: options.Threads = None,
     as_json: options.Json = False,
@@ -43,7 +44,7 @@ def harden(
     from airflock.scenarios.files import load
 
     path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
-    found = load(path, options.settings(changes, None, duration))
+    found = load(path, options.settings(changes, None, duration), trust=trust)
     options.writable((out, SCENARIOS))
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:

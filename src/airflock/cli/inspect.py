@@ -1,12 +1,15 @@
 """Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
+from airflock.doors import from_outside, is_file, read_text
 from airflock.errors import AirflockError
+
+PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
+EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
 
 
 def presets(
@@ -31,8 +34,10 @@ def presets(
         typer.echo(starting_set(for_speed), nl=False)
         return
     if name is not None:
-        files.load(name)  # complains about a wrong name
-        typer.echo((known.get(name) or Path(name)).read_text(encoding="utf-8"), nl=False)
+        if name not in known and not is_file(name):
+            files.load(name)  # complains about a wrong name
+        with from_outside(name):
+            typer.echo(read_text(known.get(name) or name), nl=False)
         return
     found = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
@@ -48,6 +53,8 @@ def validate(
         list[str], typer.Argument(metavar="FILE...", help="Scenario files, presets, studies or recordings.")
     ],
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
 ) -> None:
     """Check scenario and study files (every fault at once), or fly a recording again and compare the bits.
 
@@ -58,25 +65,39 @@ def validate(
     for name in files:
         found: list[str] = []
         with options.gathering(found):
-            _validate(name, changed)
+            _validate(name, changed, law, trust)
         faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
     options.refuse(faults)
 
 
-def _validate(name: str, changed: dict[str, Any]) -> None:
+def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) -> None:
     from airflock.evolve.validation import validate
 
-    verdict, notes = validate(name, changed)
+    verdict, notes = validate(name, changed, law, trust=trust)
     for note in notes:
         tables.say(f"note: {name}: {note}")
     typer.echo(f"{name}: {verdict}")
 
 
-def doctor(as_json: options.Json = False) -> None:
-    """Show versions, processor, GPUs and cache, and fly a ten-second self-check on each device.
+def doctor(
+    clear: Annotated[
+        bool, typer.Option("--clear-cache", help="Remove all compiled drivers, and do nothing else.")
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Show versions, cores, extras, GPUs and cache, and fly a ten-second self-check on each device.
 
     Example: airflock doctor
     """
+    if clear:
+        from airflock.engine.store import clear_cache, usual_folder
+
+        count, size = clear_cache()
+        if as_json:
+            tables.emit_json({"cache": str(usual_folder()), "removed": count, "freed_mb": round(size / 1e6, 1)})
+        else:
+            typer.echo(f"{usual_folder()}: {count} drivers removed, {size / 1e6:.1f} MB")
+        return
     from airflock.recordings.health import doctor as examine
 
     found = examine()

@@ -38,6 +38,8 @@ def plot(
     begin: Begin = None,
     end: End = None,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
@@ -52,7 +54,8 @@ def plot(
     from airflock.plots.save import save_figure
 
     settings = options.settings(changes, agents, duration)
-    save_figure(picture(what, kind, seed=seed, start=begin, stop=end, settings=settings), out)
+    figure = picture(what, kind, seed=seed, start=begin, stop=end, settings=settings, law=law, trust=trust)
+    save_figure(figure, out)
     tables.say(f"saved {out}")
 
 
@@ -65,6 +68,8 @@ def video(
     fps: Annotated[int, typer.Option(min=1, max=120, help="Pictures per second.")] = 25,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Times real time.")] = 10.0,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
@@ -77,7 +82,7 @@ def video(
     from airflock.plots.video import frame_count
     from airflock.plots.video import video as make_video
 
-    recording = flight_of(what, seed, options.settings(changes, agents, duration))
+    recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, **choice)

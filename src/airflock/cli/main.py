@@ -1,9 +1,12 @@
 """The command `airflock`: its verbs, and one line for everything that goes wrong."""
 
-import errno
 import os
+import signal
 import sys
-from typing import Any
+import threading
+import traceback
+import warnings
+from typing import Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -24,7 +27,7 @@ from airflock.cli import (
     run,
     sweep,
 )
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, bounded, bounded_lines, printable
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
@@ -41,6 +44,8 @@ class Verbs(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             raise AirflockError("interrupted; files that were not announced as saved were not written") from stop
+        except EOFError as fault:  # typer takes it for Ctrl-D
+            raise AirflockError(f"unexpected end of a file: {fault}; AIRFLOCK_DEBUG=1 shows where") from fault
 
 
 app = typer.Typer(
@@ -87,21 +92,47 @@ def _options(
 
 
 def main() -> None:
-    """Run the command; bad input ends with one line per fault and exit status 2."""
+    """Run the command; bad input ends with one line per fault and exit status 2, and so does SIGTERM."""
+    if threading.current_thread() is threading.main_thread():  # only there are signals heard
+        signal.signal(signal.SIGTERM, _stop)
+    warnings.showwarning = _note
     try:
-        app(standalone_mode=True)
+        try:
+            app(standalone_mode=True)
+        finally:
+            sys.stdout.flush()  # a full disk behind stdout tells so here, and not after the last line of Python
     except AirflockError as fault:
-        _end(str(fault))
+        _end(str(fault), fault)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except KeyboardInterrupt as stop:  # while the verb was still being looked up, or after it
+        _end("interrupted", stop)
     except OSError as fault:
-        if fault.errno not in (errno.ENOSPC, errno.EACCES, errno.EROFS, errno.EDQUOT, errno.ENOENT, errno.ENOTDIR):
-            raise
-        _end(f"{fault.filename or 'output'}: {fault.strerror}")
+        _end(f"{fault.filename or 'output'}: {fault.strerror or fault}", fault)
+    except MemoryError as fault:
+        _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
+    except Exception as fault:  # the border: whatever else goes wrong is one line, too
+        _end(f"unexpected {type(fault).__name__}: {fault}; please report it; AIRFLOCK_DEBUG=1 shows where", fault)
 
 
-def _end(text: str) -> None:
-    for line in text.splitlines():
-        sys.stderr.write(f"airflock: {line}\n")
+def _note(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """What Airflock warns of, as a line; what libraries say to programmers is not for who gives commands."""
+    if category is UserWarning:
+        sys.stderr.write(f"note: {bounded(printable(str(message)))}\n")
+
+
+def _stop(number: int, _: Any) -> NoReturn:
+    """SIGTERM, as batch systems send it, ends like Ctrl-C; a second one does not disturb what is being put away."""
+    signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _end(text: str, fault: BaseException) -> NoReturn:
+    if os.environ.get("AIRFLOCK_DEBUG"):
+        traceback.print_exception(fault)
+    for line in bounded_lines(text.splitlines()):
+        sys.stderr.write(f"airflock: {printable(line)}\n")
+    if isinstance(fault, OSError):
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  what could not be written must not be tried again at exit
     sys.exit(2)

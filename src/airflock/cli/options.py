@@ -1,6 +1,5 @@
 """Options that several verbs share, and what they turn into."""
 
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from airflock.doors import FormatError, from_outside, toml
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
@@ -18,13 +18,18 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change any key, for instance model.p_rep=0.14; repeatable."),
 ]
-Seeds = Annotated[int, typer.Option(min=1, help="Number of flights, with seeds 0, 1, 2, ...")]
+Seeds = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of flights, with seeds 0, 1, 2, ...")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="Seed of the first flight.")]
 Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_default="the scenario's")]
 Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_default="the scenario's")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
 Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
+Trust = Annotated[bool, typer.Option("--trust", help="Run the code that a file names: a law, fitness functions.")]
+Law = Annotated[
+    str | None,
+    typer.Option(metavar="NAME|FILE.py", help="Fly this law instead of the scenario's.", show_default=False),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 PlotFile = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the trajectories of the first flight.")
@@ -41,7 +46,10 @@ def settings(pairs: list[str] | None, agents: int | None = None, duration: float
         if not equals or not key.strip():
             faults.append(f"--set {pair}: write KEY=VALUE, for instance --set model.p_rep=0.14")
             continue
-        found[key.strip()] = value(text)
+        try:
+            found[key.strip()] = value(text, f"--set {key.strip()}")
+        except ScenarioError as fault:
+            faults += fault.faults
     if faults:
         raise ScenarioError(faults)
     if agents is not None:
@@ -51,12 +59,16 @@ def settings(pairs: list[str] | None, agents: int | None = None, duration: float
     return found
 
 
-def value(text: str) -> Any:
-    """A TOML value, or the text itself if it is none."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text.strip()
+def value(text: str, where: str) -> Any:
+    """A TOML value, or the text itself if it is none; `where` names the option in faults."""
+    with from_outside(where):
+        try:
+            document = toml(f"value = {text}")
+        except FormatError:
+            return text.strip()
+        if list(document) != ["value"]:
+            raise ScenarioError([f"{where}: holds more than one value; repeat the option for each key"])
+        return document["value"]
 
 
 @contextmanager

@@ -14,6 +14,8 @@ def run(
     seeds: options.Seeds = 1,
     first_seed: options.FirstSeed = 0,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
     threads: options.Threads = None,
@@ -38,7 +40,7 @@ def run(
         options.writable((save, RECORDINGS), (plot, PICTURES))
     with options.gathering(faults):
         changed = options.settings(changes, agents, duration)
-        found = load(scenario, changed)
+        found = load(scenario, changed, law, trust=trust)
     options.refuse(faults)
     for note in found.notes:
         tables.say(f"note: {note}")
@@ -102,16 +104,24 @@ def score(
 
     Example: airflock score flight.nc --set metrics.r_coll=2.0 --series course.csv
     """
+    from airflock.recordings.opened import Opening
+
+    options.writable((series, TABLES))
+    changed = options.settings(changes)
+    with Opening(files[0]) as first:  # another process opens it while this one imports
+        _score([first, *files[1:]], files, changed, series, aero, as_json)
+
+
+def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]
+    """Measure recordings, of which the first is being opened, and write or print what was asked for."""
     from airflock.metrics.registry import reports
     from airflock.recordings.files import load_recording
     from airflock.recordings.scores import aero_settings, measure, scenario_of
 
-    options.writable((series, TABLES))
-    changed = options.settings(changes)
     rows, courses = [], []
     about: dict[str, tuple[str, str]] = {}
-    for path in files:
-        recording = load_recording(path)
+    for source, path in zip(what, files, strict=True):
+        recording = load_recording(source)
         settings = aero_settings(recording, changed) if aero else changed
         values, course = measure(recording, settings)
         about |= reports(scenario_of(recording, settings).measures)

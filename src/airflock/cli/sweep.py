@@ -1,5 +1,6 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +10,8 @@ import typer
 from airflock.cli import options, tables
 from airflock.endings import PICTURES, TABLES
 from airflock.errors import ScenarioError
+
+MOST_VALUES = 100_000  # of one key, and points of a whole grid
 
 
 def sweep(
@@ -25,6 +28,8 @@ def sweep(
     seeds: options.Seeds = 5,
     first_seed: options.FirstSeed = 0,
     changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
     threads: options.Threads = None,
@@ -59,9 +64,12 @@ def sweep(
             axes.append(axis(text))
     with options.gathering(faults):
         distinct([key for key, _ in axes], plot)
+    size = math.prod(len(values) for _, values in axes)
+    if size > MOST_VALUES:
+        options.refuse([*faults, f"--over: a grid of {size} points is more than {MOST_VALUES}"])
     points = grid(dict(axes))
     with options.gathering(faults):
-        scenarios = scenarios_at(scenario, points, fixed)
+        scenarios = scenarios_at(scenario, points, fixed, law, trust=trust)
     with options.gathering(faults):
         show = shown(show, scenarios)
     options.refuse(faults)
@@ -109,13 +117,16 @@ def axis(text: str) -> tuple[str, list[Any]]:
             low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
         except ValueError as fault:
             raise ScenarioError([f"--over {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
-        if count < 1:
-            raise ScenarioError([f"--over {text}: the count must be at least 1"])
+        if not 1 <= count <= MOST_VALUES:
+            raise ScenarioError([f"--over {text}: the count must lie in [1, {MOST_VALUES}]"])
         step = (high - low) / max(count - 1, 1)
         return key, [low + step * i for i in range(count)]
     if not equals or not values:
         raise ScenarioError([f"--over {text}: write KEY=a,b,c or KEY=low:high:count"])
-    return key, [options.value(part) for part in values.split(",")]
+    found = [options.value(part, f"--over {key}") for part in values.split(",")]
+    if any(isinstance(value, (dict, list)) for value in found):
+        raise ScenarioError([f"--over {text}: a table or a list cannot be swept; give numbers or choices"])
+    return key, found
 
 
 def _print(tidy: Any, keys: list[str], show: str) -> None:

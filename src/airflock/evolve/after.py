@@ -27,6 +27,7 @@ from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
+from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 
 FINAL, SCORE = Batch("final", 0, 0), Batch("score", 0, 0)
@@ -189,7 +190,7 @@ def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
 
 def scenario_document(study: Study, parameters: dict[str, float], result: Result, folder: Path) -> dict[str, Any]:
     """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along."""
-    document = plain(study.scenario.document)
+    document = {formats.KEY: formats.FORMAT, **plain(study.scenario.document)}
     document.pop("published", None)
     law = Path(study.scenario.name).parent / str(document.get("model", {}).get("kind", ""))
     if law.suffix == ".py" and law.is_file():

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import StudyError
+from airflock.errors import StudyError, bounded
 
 OVER_SEEDS = ("mean", "worst", "quantile")
 Own = Callable[[Mapping[str, Any]], float]  # a fitness of the user's own, from the order parameters of one flight
@@ -37,7 +37,12 @@ class Objective:
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
             raise StudyError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
-        value = float(values[self.name]) if self.own is None else own_value(self.own, self.name, values)
+        if self.own is not None:
+            value = own_value(self.own, self.name, values)
+        elif isinstance(values[self.name], (int, float)):
+            value = float(values[self.name])
+        else:
+            raise StudyError(f"objective {self.name} = {bounded(repr(values[self.name]), 80)} is no number")
         return value if math.isfinite(value) else math.nan
 
     def of_candidate(self, flights: Sequence[Mapping[str, Any] | None]) -> float | None:

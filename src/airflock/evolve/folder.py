@@ -2,13 +2,13 @@
 
 import os
 import platform
-import tomllib
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from airflock import atomic
+from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.study import Study, same_or_refuse
 
@@ -48,10 +48,8 @@ def sweep(folder: Path) -> None:
 
 def read(path: Path) -> dict[str, Any]:
     """A TOML file as a dict."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-        raise StudyError(f"{path}: {fault}") from fault
+    with from_outside(path, StudyError):
+        return read_toml(path)
 
 
 def write(path: Path, document: Mapping[str, Any], comment: str = "") -> None:

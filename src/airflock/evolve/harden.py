@@ -21,6 +21,7 @@ from airflock.evolve.run import executor_for, run
 from airflock.evolve.search import Watch
 from airflock.evolve.space import Space, declared, with_parameters
 from airflock.evolve.study import Study, make_study
+from airflock.scenarios import formats
 from airflock.scenarios.files import loaded, make
 from airflock.scenarios.scenario import Scenario
 
@@ -222,7 +223,7 @@ def evolved_again(
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:
     """A scenario file with the parameters of a step, each with its reason."""
-    found: dict[str, Any] = plain(scenario.document)
+    found: dict[str, Any] = {formats.KEY: formats.FORMAT, **plain(scenario.document)}
     found.pop("published", None)
     known = declared(scenario)
     for key, value in step.parameters.items():

@@ -6,18 +6,22 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from airflock.doors import is_file
 from airflock.errors import RuleError, ScenarioError
 from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
-from airflock.scenarios.own_code import own_code
+from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario
 
 KEYS = ("maximise", "minimise", "over_seeds", "quantile", "own", "source", "note")
 
 
 def read_objectives(
-    table: Any, scenario: Scenario, folder: Path | None = None
+    table: Any, scenario: Scenario, folder: Path | None = None, *, trust: bool = False
 ) -> tuple[tuple[Objective, ...], list[str]]:
-    """Objectives from a table, by default the scenario's usual fitness; and all faults in it."""
+    """Objectives from a table, by default the scenario's usual fitness; and all faults in it.
+
+    trust : whether the file of functions that objective.own names may run
+    """
     if not isinstance(table, Mapping):
         return (), [f"objective = {table!r} is no table; write objective.maximise = {table!r}"]
     faults = []
@@ -27,12 +31,12 @@ def read_objectives(
             hint = f"did you mean objective.{near[0]}?" if near else f"known: {', '.join(KEYS)}"
             faults.append(f"objective.{key} is no key; {hint}")
     over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
-    if over not in OVER_SEEDS:
+    if not isinstance(over, str) or over not in OVER_SEEDS:
         faults.append(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
     if not isinstance(quantile, (int, float)) or isinstance(quantile, bool) or not 0.0 <= quantile <= 1.0:
         faults.append(f"objective.quantile = {quantile!r} lies outside [0, 1]")
         quantile = 0.1
-    own, text, more = _own(table.get("own"), folder)
+    own, text, more = _own(table.get("own"), folder, trust)
     faults += more
     found = []
     for key in ("maximise", "minimise"):
@@ -58,16 +62,19 @@ def read_objectives(
     return tuple(found), faults
 
 
-def _own(name: Any, folder: Path | None) -> tuple[dict[str, Own], str, list[str]]:
+def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, Own], str, list[str]]:
     """Functions of a user's own file by name, a hash of its text, and faults."""
     if name is None:
         return {}, "", []
     path = Path(str(name)) if folder is None else folder / str(name)
+    if path.suffix != ".py" or not is_file(path):
+        return {}, "", [f"objective.own = {name!r}: no such Python file"]
     try:
-        module = own_code("objective.own", str(name), folder)
-    except ScenarioError as fault:
-        return {}, "", [str(fault)]
+        text = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        module = own_module(path, f"objective.own = {name!r}", trust=trust)
     except RuleError as fault:
         return {}, "", [f"objective.own: {fault}"]
+    except ScenarioError as fault:
+        return {}, "", fault.faults
     own = {key: value for key, value in vars(module).items() if callable(value) and not key.startswith("_")}
-    return own, hashlib.sha256(path.read_bytes()).hexdigest()[:12], []
+    return own, text, []

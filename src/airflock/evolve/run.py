@@ -43,6 +43,7 @@ def evolve(
     timeout: float | None = None,
     sensitivity: str = "",
     watch: Watch | None = None,
+    trust: bool = False,
     **search_keys: Any,
 ) -> Result:
     """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
@@ -75,6 +76,8 @@ def evolve(
         "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv.
     watch : callable, optional
         Called with a Progress after each flight.
+    trust : bool
+        Whether code that files name may run: a law, fitness functions.
     **search_keys
         Keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
 
@@ -103,7 +106,7 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    study = study_of(what, settings, space, objective, fitness, search_keys)
+    study = study_of(what, settings, space, objective, fitness, search_keys, trust=trust)
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
@@ -121,15 +124,17 @@ def study_of(
     objective: Mapping[str, Any] | None = None,
     fitness: Own | None = None,
     search_keys: Mapping[str, Any] | None = None,
+    *,
+    trust: bool = False,
 ) -> Study:
     """The study that `evolve` is asked for."""
     if isinstance(what, Study):
         return what
     tables = {key: value for key, value in (("space", space), ("objective", objective)) if value is not None}
     if isinstance(what, Scenario):
-        study = make_study(tables, what.name, search=search_keys, scenario=what)
+        study = make_study(tables, what.name, search=search_keys, scenario=what, trust=trust)
     else:
-        study = load_study(what, settings=settings, search=search_keys, tables=tables)
+        study = load_study(what, settings=settings, search=search_keys, tables=tables, trust=trust)
     if fitness is not None:
         code = getattr(fitness, "__code__", None)
         text = _text_of(code) if code is not None else ""

@@ -92,7 +92,7 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
             faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
         elif name == "integer" and not isinstance(value, bool):
             faults.append(f"space.{key}.integer = {value!r} is none of true, false")
-        elif name in ("above", "tied") and value not in known:
+        elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
             near = get_close_matches(str(value), known, n=1, cutoff=0.5)
             faults.append(f"space.{key}.{name} = {value!r} is no number{f'; did you mean {near[0]}?' if near else ''}")
     if faults or "fixed" in entry or "tied" in entry:

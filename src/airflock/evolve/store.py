@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock.doors import FormatError, from_outside, json_object, json_value
 from airflock.errors import StudyError
 from airflock.evolve.executors import Landed
 
@@ -99,7 +100,11 @@ class Store:
         found = self.rows(
             "SELECT point FROM candidate WHERE stage=? AND run=? AND generation=? ORDER BY candidate", batch
         )
-        return [json.loads(point) for (point,) in found]
+        with from_outside(f"{self.path}: a point of {' '.join(map(str, batch))}", StudyError):
+            points = [_point(point) for (point,) in found]
+            if len({len(point) for point in points}) > 1:
+                raise FormatError("has another number of parameters than the others")
+        return points
 
     def ask(self, batch: Batch, points: Sequence[Sequence[float]], parameters: Sequence[Mapping[str, float]]) -> None:
         """Store candidates, all of a batch at once; a candidate that is there already stays."""
@@ -136,7 +141,8 @@ class Store:
         found = self.rows(
             "SELECT candidate, repeat, scores FROM flight WHERE stage=? AND run=? AND generation=?", batch
         )
-        return {(c, r): None if scores is None else _values(scores) for c, r, scores in found}
+        with from_outside(f"{self.path}: scores of {' '.join(map(str, batch))}", StudyError):
+            return {(c, r): None if scores is None else values_of(scores) for c, r, scores in found}
 
     def tell(self, batch: Batch, fitness: Sequence[Sequence[float | None]]) -> None:
         """Store the fitness of all candidates of a batch, one number for each objective."""
@@ -187,7 +193,9 @@ def plain_faults(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.DatabaseError as fault:
-        raise StudyError(f"{path}: {fault}; what was stored before is kept") from fault
+        lost = "file is not a database" in str(fault)
+        kept = "its flights cannot be read" if lost else "what was stored before is kept"
+        raise StudyError(f"{path}: {fault}; {kept}") from fault
 
 
 _encode = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
@@ -211,5 +219,13 @@ def _finite(value: Any) -> Any:
     return float(value) if math.isfinite(value) else None
 
 
-def _values(text: str) -> dict[str, Any]:
-    return {key: math.nan if value is None else value for key, value in json.loads(text).items()}
+def values_of(text: Any) -> dict[str, Any]:
+    """Values by name of a row's JSON, nan for null; raises FormatError where a row was tampered with."""
+    return {key: math.nan if value is None else value for key, value in json_object(text).items()}
+
+
+def _point(text: Any) -> list[float]:
+    found = json_value(text)
+    if not isinstance(found, list) or not all(isinstance(x, (int, float)) and math.isfinite(x) for x in found):
+        raise FormatError("is no list of finite numbers")
+    return [float(x) for x in found]

@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -13,13 +12,14 @@ from typing import Any
 from airflock import __version__
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
+from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_objectives
 from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
 from airflock.evolve.space import Space, full_space
 from airflock.evolve.space_table import read_space
-from airflock.scenarios import schema
+from airflock.scenarios import formats, schema
 from airflock.scenarios.files import load, tells_of_study
 from airflock.scenarios.scenario import Scenario
 
@@ -140,11 +140,11 @@ def shipped() -> dict[str, Path]:
 def is_study(name: str | os.PathLike[str]) -> bool:
     """Whether a name is that of a study's file, rather than of a scenario; a preset's name is the preset's."""
     path = Path(name)
-    if path.suffix != ".toml" or not path.is_file():
+    if path.suffix != ".toml" or not is_file(path):
         return False
     try:
-        return tells_of_study(tomllib.loads(path.read_text(encoding="utf-8")))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError):
+        return tells_of_study(read_toml(path))
+    except (TextError, OSError):  # whoever reads it next tells what is wrong
         return False
 
 
@@ -154,28 +154,29 @@ def load_study(
     settings: Mapping[str, Any] | None = None,
     search: Mapping[str, Any] | None = None,
     tables: Mapping[str, Any] | None = None,
+    trust: bool = False,
 ) -> Study:
     """Study from a file, from a shipped study's name, or of a scenario as it is, over all its model's ranges.
 
     settings : keys of the scenario to change, such as "duration"
     search   : keys of the table [search] to change, such as "population"
     tables   : tables "space" or "objective" that replace the file's
+    trust    : whether code that the files name may run: a law, fitness functions
     Raises ScenarioError with one line per fault.
     """
     known = shipped()
     text = str(name)
     path = known.get(text) or Path(text)
     document: Mapping[str, Any] = {}
-    if path.suffix == ".toml" and path.is_file():
-        try:
-            document = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
-            raise ScenarioError([f"{path}: {fault}"]) from fault
-    if not tells_of_study(document):
-        return make_study({"scenario": text, **(tables or {})}, text, settings=settings, search=search)
-    where = text if text in known else str(path)
-    document = {**document, **(tables or {})}
-    return make_study(document, where, settings=settings, search=search, folder=path.parent)
+    with from_outside(path):
+        if path.suffix == ".toml" and is_file(path):
+            document = read_toml(path)
+        if not tells_of_study(document):
+            document = {"scenario": text, **(tables or {})}
+            return make_study(document, text, settings=settings, search=search, trust=trust)
+        where = text if text in known else str(path)
+        document = {**document, **(tables or {})}
+        return make_study(document, where, settings=settings, search=search, folder=path.parent, trust=trust)
 
 
 def make_study(
@@ -186,24 +187,29 @@ def make_study(
     search: Mapping[str, Any] | None = None,
     folder: Path | None = None,
     scenario: Scenario | None = None,
+    trust: bool = False,
 ) -> Study:
-    """Study from a nested dict; `scenario` stands in for its key of that name."""
-    faults = []
+    """Study from a nested dict; `scenario` stands in for its key of that name; `trust` lets code run that it names."""
+    document, faults = formats.current(document, where), []
     for key in document:
         if key not in KEYS:
             near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
             faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
     if scenario is None:
-        scenario = _scenario(document, where, settings or {}, folder)
+        scenario = _scenario(document, where, settings or {}, folder, trust)
     space: Space | None
     if "space" in document:
         space, more = read_space(document["space"], scenario)
         faults += more
     else:
         space = full_space(scenario)
-    objectives, more = read_objectives(document.get("objective", {}), scenario, folder)
+    objectives, more = read_objectives(document.get("objective", {}), scenario, folder, trust=trust)
     faults += more
-    found, more = schema.check("search", {**document.get("search", {}), **(search or {})}, Search)
+    table = document.get("search", {})
+    if isinstance(table, Mapping):
+        found, more = schema.check("search", {**table, **(search or {})}, Search)
+    else:
+        found, more = schema.check("search", table, Search)
     faults += more
     if found is not None:
         faults += _search_faults(found, len(objectives))
@@ -212,13 +218,15 @@ def make_study(
     return Study(scenario, space, objectives, found, str(document.get("title", "")))
 
 
-def _scenario(document: Mapping[str, Any], where: str, settings: Mapping[str, Any], folder: Path | None) -> Scenario:
+def _scenario(
+    document: Mapping[str, Any], where: str, settings: Mapping[str, Any], folder: Path | None, trust: bool
+) -> Scenario:
     named, keys = document.get("scenario"), document.get("set", {})
     if not isinstance(named, str) or not isinstance(keys, Mapping):
         wrong = f"scenario = {named!r} is missing or no name" if not isinstance(named, str) else "set is no table"
         raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
     beside = folder / named if folder is not None else None
-    return load(beside if beside is not None and beside.is_file() else named, {**keys, **settings})
+    return load(beside if beside is not None and is_file(beside) else named, {**keys, **settings}, trust=trust)
 
 
 def _search_faults(search: Search, objectives: int) -> list[str]:

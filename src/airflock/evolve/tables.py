@@ -1,6 +1,5 @@
 """A study as tidy tables: one row a flight, or one row a candidate; and their export to CSV and parquet."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,8 +8,9 @@ from typing import Any
 import pandas as pd
 
 from airflock import atomic
+from airflock.doors import FormatError, from_outside, json_value
 from airflock.errors import StudyError
-from airflock.evolve.store import Store
+from airflock.evolve.store import Store, values_of
 
 KEY = ["stage", "run", "generation", "candidate"]
 
@@ -24,9 +24,10 @@ def candidates(store: Store, objectives: Sequence[str], stage: str = "search") -
     )
     found = []
     for run, generation, candidate, parameters, fitness in rows:
-        told = [math.nan if value is None else value for value in json.loads(fitness)]
         place = {"run": run, "generation": generation, "candidate": candidate}
-        found.append({**place, **json.loads(parameters), **dict(zip(objectives, told, strict=True))})
+        with from_outside(f"{store.path}: candidate {candidate} of generation {generation}", StudyError):
+            told = dict(zip(objectives, _fitness(fitness, len(objectives)), strict=True))
+            found.append({**place, **values_of(parameters), **told})
     return pd.DataFrame(found)
 
 
@@ -41,11 +42,21 @@ def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
     )
     found = []
     for *key, parameters, scores, reason, duration, worker, versions in rows:
-        values = {name: v for name, v in json.loads(scores or "{}").items() if not isinstance(v, list)}
         place = dict(zip([*KEY, "repeat", "seed"], key, strict=True))
         about = {"reason": reason, "duration": duration, "worker": worker, "versions": versions}
-        found.append({**place, **json.loads(parameters), **values, **about})
+        with from_outside(f"{store.path}: a flight of {' '.join(map(str, key))}", StudyError):
+            values = {name: v for name, v in values_of(scores or "{}").items() if not isinstance(v, list)}
+            found.append({**place, **values_of(parameters), **values, **about})
     return pd.DataFrame(found)
+
+
+def _fitness(text: Any, count: int) -> list[float]:
+    """Fitness of a row, one number for each objective; nan: failed."""
+    found = json_value(text)
+    sound = isinstance(found, list) and len(found) == count
+    if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
+        raise FormatError(f"fitness is no list of {count} numbers")
+    return [math.nan if value is None else float(value) for value in found]
 
 
 def export(store: Store, folder: Path) -> list[Path]:

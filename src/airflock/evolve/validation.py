@@ -18,7 +18,9 @@ class Valid(NamedTuple):
     notes: tuple[str, ...]
 
 
-def validate(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None) -> Valid:
+def validate(
+    name: str | os.PathLike[str], settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
+) -> Valid:
     """Check a scenario, a study or a recording; a recording is flown again and its bits are compared.
 
     Parameters
@@ -27,6 +29,11 @@ def validate(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = 
         A preset, a scenario file, a study file, or a recording (.nc).
     settings : mapping, optional
         Keys to change before the check.
+    law : optional
+        A flocking law of your own, or one by its name or file, instead of the file's; for a recording that was flown
+        with a law of its own, that law.
+    trust : bool
+        Whether code that the file names may run.
 
     Returns
     -------
@@ -49,17 +56,19 @@ def validate(name: str | os.PathLike[str], settings: Mapping[str, Any] | None = 
     """
     text = str(name)
     if text.lower().endswith(".nc"):
-        same, differences = fly_again(load_recording(name))
+        same, differences = fly_again(load_recording(name), law)
         if not same:
             told = "".join(f"\n{text}: {line}" for line in differences)
             reason = "see below" if differences else "although nothing that should matter differs"
             raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
         return Valid("flown again with the same bits", tuple(differences))
     if is_study(text):
-        study = load_study(text, settings=settings)
+        if law is not None:
+            raise AirflockError(f"{text}: is a study; --law is for scenarios and recordings")
+        study = load_study(text, settings=settings, trust=trust)
         plan_of(study.scenario)
         what = f"{len(study.space.axes)} parameters of {study.scenario.name} vary"
         return Valid(f"valid study; {what}; begin it with airflock evolve {text} --out DIR", ())
-    found = load(name, settings)
+    found = load(name, settings, law, trust=trust)
     plan_of(found)  # probes the rules
     return Valid(f"valid; {found.model.name}, {found.agents} agents, {found.flight.duration:g} s", found.notes)

@@ -19,7 +19,7 @@ from airflock.plots.transfer import transfer
 from airflock.recordings.files import load_recording
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import scenario_of
-from airflock.scenarios.files import load, make
+from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
 KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked")
@@ -35,6 +35,8 @@ def plot(
     start: float | None = None,
     stop: float | None = None,
     settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    trust: bool = False,
 ) -> Figure:
     """Draw a flight, a recording, or the rules of a model.
 
@@ -51,6 +53,10 @@ def plot(
         Window of time, s; which one is shown otherwise stands in the picture's title.
     settings : mapping, optional
         Keys of the scenario to change, such as {"radio.delay": 0.5}; a recording takes none.
+    law : optional
+        A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
+    trust : bool
+        Whether code that the scenario file names may run.
 
     Returns
     -------
@@ -72,9 +78,9 @@ def plot(
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}")
     if kind in OF_A_SCENARIO:
-        scenario = _scenario(what, settings)
+        scenario = _scenario(what, settings, law, trust)
         return rules(scenario) if kind == "rules" else transfer(scenario)
-    return _of_recording(flight_of(what, seed, settings), kind, start, stop)
+    return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop)
 
 
 def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None) -> Figure:
@@ -95,21 +101,23 @@ def _is_file(what: Any) -> bool:
     return isinstance(what, (str, os.PathLike)) and str(what).lower().endswith(".nc")
 
 
-def _scenario(what: What, settings: Mapping[str, Any] | None) -> Scenario:
+def _scenario(what: What, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
     if isinstance(what, xr.Dataset) or _is_file(what):
         return scenario_of(what if isinstance(what, xr.Dataset) else load_recording(what), settings)  # type: ignore[arg-type]
-    if isinstance(what, Scenario):
-        return make(what.document, what.name, settings, law=what.model) if settings else what
-    return load(what, settings)
+    return variant(what, settings, law, trust=trust)
 
 
-def flight_of(what: What, seed: int, settings: Mapping[str, Any] | None = None) -> xr.Dataset:
+def flight_of(
+    what: What, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
+) -> xr.Dataset:
     """The recording that is given or named, or a flight of the scenario that is."""
     if isinstance(what, xr.Dataset) or _is_file(what):
-        if settings:
-            raise AirflockError(f"{_name(what)}: is a recording; --set, --agents and --duration need a scenario to fly")
+        if settings or law is not None:
+            raise AirflockError(
+                f"{_name(what)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
+            )
         return what if isinstance(what, xr.Dataset) else load_recording(what)  # type: ignore[arg-type]
-    return simulate(_scenario(what, settings), seed)
+    return simulate(_scenario(what, settings, law, trust), seed)
 
 
 def _name(what: Any) -> str:

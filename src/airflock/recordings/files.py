@@ -1,7 +1,7 @@
 """Recordings on disk: netCDF that other tools open, complete or not there at all."""
 
-import json
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +9,17 @@ import numpy as np
 import xarray as xr
 
 from airflock import atomic
+from airflock.body.registry import BODIES
+from airflock.doors import from_outside
 from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
+from airflock.metrics.registry import SETS
+from airflock.recordings import attributes
 from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
-from airflock.recordings.scores import scenario_of
+from airflock.recordings.opened import Opening
+from airflock.scenarios.files import given_law, make
+from airflock.scenarios.own_code import law_hash
 
 FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
 
@@ -56,6 +62,9 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
         raise RecordingError(wrong)
     if target.is_dir():
         raise RecordingError(f"{target}: is a folder; give a file name ending in .nc")
+    if "airflock_scenario" in recording.attrs:  # a log of someone else's is no recording of ours
+        recording = recording.assign_attrs({attributes.FORMAT_KEY: attributes.FORMAT})
+        recording = recording.assign_attrs({attributes.CHECKSUM: attributes.checksum(recording)})
     try:
         packed = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
         content = recording.to_netcdf(None, engine="h5netcdf", encoding=packed)
@@ -65,13 +74,14 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a recording.
+def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
+    """Read a recording, in a process of its own.
 
     Parameters
     ----------
-    path : str or path
-        A netCDF file with position (time, space, keypoint, individual), m, and the time in s.
+    path : str, path or Opening
+        A netCDF file with position (time, space, keypoint, individual), m, and the time in s; or the Opening that has
+        begun to read it.
 
     Returns
     -------
@@ -83,6 +93,11 @@ def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
     RecordingError
         With everything that the file lacks.
 
+    Warns
+    -----
+    UserWarning
+        Where a recording of Airflock's was changed since it was written.
+
     Examples
     --------
     >>> import airflock
@@ -90,37 +105,49 @@ def load_recording(path: str | os.PathLike[str]) -> xr.Dataset:
     Traceback (most recent call last):
     airflock.errors.RecordingError: nowhere.nc: no such file
     """
-    source = Path(path)
-    if not source.is_file():
-        raise RecordingError(f"{source}: no such file")
-    if source.suffix.lower() in FOREIGN:
-        raise RecordingError(
-            f"{source}: holds tracks, but is no recording yet: airflock import {source.name} --save FILE.nc"
-        )
-    try:
-        with xr.open_dataset(source, engine="h5netcdf") as opened:
-            recording = opened.load()
-    except (OSError, ValueError, KeyError, RuntimeError) as fault:
-        raise RecordingError(f"{source}: is no netCDF recording: {str(fault).splitlines()[0]}") from fault
-    check(recording, str(source))
+    opening = path if isinstance(path, Opening) else Opening(path)
+    recording: xr.Dataset = opening.answer()
+    where = str(opening.path)
+    with from_outside(where, RecordingError):
+        check(recording, where)
+        attributes.check_format(recording, where)
+        noted = recording.attrs.get(attributes.CHECKSUM)
+        if noted is not None and noted != attributes.checksum(recording):
+            warnings.warn(f"{where}: was changed since Airflock wrote it", stacklevel=2)
     return recording
 
 
-def fly_again(recording: xr.Dataset) -> tuple[bool, list[str]]:
+def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
     """Fly a simulated recording again from its attributes.
 
+    law : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
     Returns whether all positions have the same bits, and what differs between then and now that could explain it.
     """
-    attributes: dict[str, Any] = dict(recording.attrs)
-    if "airflock_scenario" not in attributes or not int(attributes.get("random_start", 1)):
+    found: dict[str, Any] = dict(recording.attrs)
+    document = attributes.scenario_document(recording)
+    if document is None or not attributes.whole_number(recording, "random_start", 1):
         raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
-    scenario, flown = scenario_of(recording), json.loads(attributes["airflock_scenario"])
-    for section, what in (("model", "law"), ("body", "body")):
-        now, then = (document.get(section, {}).get("kind") for document in (scenario.document, flown))
-        if now != then:
-            raise RecordingError(f"recording: was flown with a {what} given directly, which is not in the file")
-    seed, precision = int(attributes["airflock_seed"]), int(attributes["airflock_precision"])
-    again = simulate(scenario, seed, precision=precision, device=str(attributes.get("airflock_device", "cpu")))
+    own = given_law(law) if law is not None else None
+    if own is None and attributes.flown_with_own_law(recording):
+        name = document.get("model", {}).get("kind")
+        raise RecordingError(
+            f"recording: was flown with a law of its own, {name!r}, which is not in the file; give it with "
+            "--law FILE.py (in Python: law=...)"
+        )
+    for section, known in (("body", BODIES), ("metrics", SETS)):
+        kind = document.get(section, {}).get("kind")
+        if kind is not None and kind not in known:
+            raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")
+    scenario = make(document, str(found.get("airflock_name", "recording")), law=own)
+    seed = attributes.whole_number(recording, "airflock_seed")
+    precision = attributes.whole_number(recording, "airflock_precision", 32)
+    again = simulate(
+        scenario,
+        seed,
+        precision=precision,
+        device=str(found.get("airflock_device", "cpu")),
+        events=attributes.events(recording),
+    )
     now = provenance(scenario, seed, precision)
     words = {
         "airflock_version": "version of Airflock",
@@ -130,10 +157,11 @@ def fly_again(recording: xr.Dataset) -> tuple[bool, list[str]]:
     }
     now["airflock_processor"] = processor()
     differences = [
-        f"{text}: {attributes.get(key)} then, {now[key]} now"
-        for key, text in words.items()
-        if attributes.get(key) != now[key]
+        f"{text}: {found.get(key)} then, {now[key]} now" for key, text in words.items() if found.get(key) != now[key]
     ]
+    noted, flown = found.get(attributes.LAW), law_hash(scenario.model)
+    if noted is not None and noted != flown:
+        differences.insert(0, f"law: {noted} then, {flown} now")
     same = again["position"].shape == recording["position"].shape and bool(
         np.array_equal(again["position"].values, recording["position"].values)
     )

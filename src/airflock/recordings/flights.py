@@ -5,7 +5,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,8 @@ from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.recordings.layout import dataset
-from airflock.scenarios.files import loaded
+from airflock.scenarios.files import MODELS, loaded
+from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
@@ -52,7 +53,7 @@ def simulate(
     say : callable, optional
         Told what auto picked.
     events : sequence of mappings, optional
-        What is done to the flight on its way, as `Flight.events` or the attribute airflock_events hold it.
+        What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
 
     Returns
     -------
@@ -96,19 +97,21 @@ def simulate(
 def recording_of(flight: Flight) -> xr.Dataset:
     """Recording of what an open flight has flown so far; it must have been opened with record=True.
 
-    Its attribute airflock_events holds what was done to the flight; with scenario and seed it gives the same bits.
+    Its attribute airflock_events holds what was done to the flight (`recordings.attributes.events` reads it); with
+    scenario and seed it gives the same bits.
     """
     scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
-        attributes["airflock_events"] = json.dumps([plain(event.plain()) for event in flight.events])
+        attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
     text = flight(plan_of(scenario, precision=precision, record=True))
+    own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
         "airflock_scenario": json.dumps(flown_document(scenario)),
         "airflock_name": scenario.name,
@@ -119,20 +122,18 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
         "airflock_sources": hashlib.sha256(text.encode()).hexdigest(),
         "airflock_toolchain": toolchain(),
         "airflock_processor": processor(),
+        **({"airflock_law": law_hash(scenario.model)} if own else {}),
     }
 
 
 def flown_document(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain values; code in files of its own with whole paths, so that it is found from anywhere.
-
-    What was given directly keeps its bare name, which is no file: see `recordings.scores.scenario_of`.
-    """
+    """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
     document: dict[str, Any] = plain(scenario.document)
     for section in ("model", "body", "metrics"):
-        kind = str(document.get(section, {}).get("kind", ""))
-        places = [place for place in (Path(scenario.name).parent / kind, Path(kind)) if place.is_file()]
-        if kind.endswith(".py") and places:
-            document[section]["kind"] = str(places[0].absolute())
+        table = document.get(section, {})
+        kind = table.get("kind") if isinstance(table, dict) else None
+        if isinstance(kind, str) and kind.endswith(".py"):
+            table["kind"] = PurePath(kind).stem
     return document
 
 

@@ -7,15 +7,16 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from airflock import __version__
-from airflock.engine.cuda.device import describe, trouble
+from airflock.engine.cuda import device as gpu
 from airflock.engine.simulate import score_flight, score_flights
-from airflock.engine.store import cache_folder
+from airflock.engine.store import cache_folder, cache_trouble, drivers, usual_folder
 from airflock.engine.threads import cores
 from airflock.recordings.flights import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
-PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "matplotlib", "numba-cuda")
+PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
+EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
 
 
 def doctor() -> dict[str, Any]:
@@ -25,7 +26,7 @@ def doctor() -> dict[str, Any]:
     -------
     dict
         Names and findings. `self_check` (and `gpu_self_check` where there is a GPU) is "passed" or "failed";
-        `first_flight_s` and `second_flight_s` are s, `cache_free_gb` is GB.
+        `first_flight_s` and `second_flight_s` are s, `cache_free_gb` is GB, `cache_mb` is MB.
 
     Examples
     --------
@@ -35,8 +36,12 @@ def doctor() -> dict[str, Any]:
     """
     found: dict[str, Any] = {"airflock": __version__, "python": platform.python_version(), "processor": processor()}
     found |= {"cores": cores(), "cache": str(cache_folder())}
+    trouble = cache_trouble(usual_folder())
+    found |= {"cache_note": f"for this process only: {trouble}"} if trouble else {}
+    kept = drivers(cache_folder())
+    found |= {"cache_drivers": len(kept), "cache_mb": round(sum(size for _, size, _ in kept) / 1e6, 1)}
     found["cache_free_gb"] = round(shutil.disk_usage(cache_folder()).free / 1e9, 1)
-    for name in PACKAGES:
+    for name in (*PACKAGES, *EXTRAS):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -55,11 +60,11 @@ def doctor() -> dict[str, Any]:
 
 def _gpu(scenario: Scenario, known: dict[str, float]) -> dict[str, Any]:
     """What GPUs there are, or why none can be used; and the same flight on the first of them."""
-    fault = trouble()
+    fault = gpu.trouble()
     if fault is not None:
         return {"gpu": fault}
     found: dict[str, Any] = {}
-    for number, device in enumerate(describe()):
+    for number, device in enumerate(gpu.describe()):
         text = "{name}, compute capability {compute_capability}, {multiprocessors} multiprocessors, {free_gb} of "
         found[f"gpu_{number}" if number else "gpu"] = (text + "{memory_gb} GB free").format(**device)
     for name in ("first", "second"):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airflock.errors import RecordingError
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
+SHORTEST = 1e-6  # s between frames: the shortest motion step there is
 UNITS = {"position": "m", "velocity": "m/s"}
 
 
@@ -66,8 +67,14 @@ def check(found: xr.Dataset, where: str = "recording") -> None:
             faults.append(f"position is empty ({sizes['time']} times, {sizes['individual']} individuals)")
         if sizes["space"] not in (2, 3):
             faults.append(f"space has {sizes['space']} components, not 2 or 3")
-        if "time" not in found.coords or (sizes["time"] > 1 and not (np.diff(found["time"].values) > 0).all()):
+        times = found["time"].values if "time" in found.coords else np.zeros(0, "U")
+        if times.ndim != 1 or times.dtype.kind not in "fiu" or not (np.diff(times.astype(float)) > 0).all():
             faults.append("time is no increasing coordinate, s")
+        for name in ("position", "velocity"):
+            if name in found and found[name].dtype.kind not in "fiu":
+                faults.append(f"{name} is of kind {found[name].dtype}, not numbers")
+            if name in found and {d: found[name].sizes.get(d) for d in DIMENSIONS} != {d: sizes[d] for d in DIMENSIONS}:
+                faults.append(f"{name} has not the dimensions {', '.join(DIMENSIONS)} of position")
     if faults:
         raise RecordingError("\n".join(f"{where}: {fault}" for fault in faults))
 
@@ -83,6 +90,8 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     times = found["time"].values.astype(float)
     steps = np.diff(times)
     period = float(np.median(steps)) if steps.size else 1.0
+    if not SHORTEST <= period < np.inf:
+        raise RecordingError(f"{where}: frames are {period:g} s apart, less than {SHORTEST:g} s or more than any time")
     if steps.size and np.abs(steps - period).max() > 0.01 * period + 1e-9:
         raise RecordingError(
             f"{where}: frames are {steps.min():g} to {steps.max():g} s apart; resample to a constant rate"

@@ -1,6 +1,5 @@
 """Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
 
-import json
 import os
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
@@ -15,6 +14,7 @@ from airflock.body.registry import BODIES
 from airflock.core.contract import Model
 from airflock.core.parameters import Parameters, declarations
 from airflock.core.vocabulary import Own, asks
+from airflock.doors import from_outside
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
 from airflock.engine.simulate import finish, plan_of, score_flights
@@ -22,8 +22,9 @@ from airflock.engine.tables import tables
 from airflock.errors import RecordingError
 from airflock.metrics import nearest
 from airflock.metrics.registry import POWER, SETS, reports
+from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
-from airflock.scenarios.files import MODELS, loaded, make
+from airflock.scenarios.files import loaded, make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
@@ -189,13 +190,11 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
     the metrics are the usual ones. A log brings no arena: it is open unless settings name one, and v_flock is its mean
     speed.
     """
-    text = recording.attrs.get("airflock_scenario")
-    if text:
-        try:
-            document = json.loads(text)
-        except json.JSONDecodeError as fault:
-            raise RecordingError(f"recording: attribute airflock_scenario is damaged: {fault}") from fault
-        return _flown(document, recording, dict(settings or {}))
+    check_format(recording)
+    document = scenario_document(recording)
+    if document is not None:
+        with from_outside(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
+            return _flown(document, recording, dict(settings or {}))
     frames, period = frames_of(recording)
     dims = frames.shape[1] // 2
     speed = float(np.linalg.norm(frames[:, dims:], axis=1).mean())
@@ -217,9 +216,9 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if not _in_file(_kind(document, "body"), BODIES):
         document = {**document, "body": {}}
-    if _kind(document, "model") in MODELS or _kind(document, "model").endswith(".py"):
+    if not flown_with_own_law(recording):
         return make(document, name, settings)
-    measured = json.loads(str(recording.attrs.get("airflock_metrics", "{}")))
+    measured = measured_by(recording)
     kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
     return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
@@ -237,5 +236,5 @@ def _kind(document: Mapping[str, Any], section: str) -> str:
 
 
 def _in_file(kind: str, known: Container[str]) -> bool:
-    """Whether a kind is the usual one, one of ours, or a file of its own; else it was given directly."""
-    return not kind or kind in known or kind.endswith(".py")
+    """Whether a kind is the usual one or one of ours; else it was the user's own, which is not in a recording."""
+    return not kind or kind in known

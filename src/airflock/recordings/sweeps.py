@@ -11,7 +11,7 @@ import pandas as pd
 from airflock.engine.simulate import picked, score_flights
 from airflock.errors import AirflockError, ScenarioError
 from airflock.metrics.registry import numbers_of
-from airflock.scenarios.files import load, make
+from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
 
@@ -22,6 +22,8 @@ def sweep(
     seeds: int | Iterable[int] = 5,
     *,
     settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    trust: bool = False,
     threads: int | None = None,
     precision: int = 32,
     done: Callable[[], None] | None = None,
@@ -40,6 +42,10 @@ def sweep(
         Number of flights at each point, or their seeds; the same at all points, so that differences are paired.
     settings : mapping, optional
         Keys that are changed at all points.
+    law : optional
+        A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
+    trust : bool
+        Whether code that the file names may run.
     threads : int, optional
         Flights side by side; by default one per core.
     precision : int
@@ -70,7 +76,7 @@ def sweep(
     (6, ['radio.delay', 'seed'])
     """
     points = grid(over)
-    scenarios = scenarios_at(what, points, settings)
+    scenarios = scenarios_at(what, points, settings, law, trust=trust)
     numbers = sound_seeds(seeds)
     return flown(points, scenarios, numbers, threads=threads, precision=precision, done=done, device=device, say=say)
 
@@ -81,7 +87,12 @@ def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 
 def scenarios_at(
-    what: Scenario | str | os.PathLike[str], points: Sequence[Mapping[str, Any]], settings: Mapping[str, Any] | None
+    what: Scenario | str | os.PathLike[str],
+    points: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any] | None,
+    law: Any = None,
+    *,
+    trust: bool = False,
 ) -> list[Scenario]:
     """The scenario at each point of a grid; raises ScenarioError with the faults of all."""
     faults: list[str] = []
@@ -89,10 +100,7 @@ def scenarios_at(
     for point in points:
         try:
             changed = {**(settings or {}), **point}
-            if isinstance(what, Scenario):
-                found.append(make(what.document, what.name, changed, law=what.model))
-            else:
-                found.append(load(what, changed))
+            found.append(variant(what, changed, law, trust=trust))
         except AirflockError as fault:
             faults += [line for line in str(fault).splitlines() if line not in faults]
     if faults:

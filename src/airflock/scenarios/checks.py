@@ -14,13 +14,15 @@ from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
 
 
-def body_of(table: Any, found: Model | None, folder: Path | None = None) -> tuple[Body, list[str]]:
+def body_of(
+    table: Any, found: Model | None, folder: Path | None = None, *, trust: bool = False
+) -> tuple[Body, list[str]]:
     """Body of the section body, by its key kind or else by what the model commands; and what is wrong with it."""
     usual = body_for(found.command if found else "velocity")
     kind = table.get("kind", usual) if isinstance(table, Mapping) else usual
     if isinstance(kind, str) and kind.endswith(".py"):
         try:
-            carried = body(own_code("body.kind", kind, folder), Path(kind).stem)
+            carried = body(own_code("body.kind", kind, folder, trust=trust), Path(kind).stem)
         except AirflockError as fault:
             return BODIES[usual], str(fault).splitlines()
     elif isinstance(kind, str) and kind in BODIES:
@@ -43,7 +45,7 @@ def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
     ]
 
 
-def metrics_set(table: Any, folder: Path | None = None) -> tuple[MetricSet, list[str]]:
+def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:
     """Metric set of the section metrics, by its key kind; and what is wrong with it."""
     kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL
     kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
@@ -51,7 +53,7 @@ def metrics_set(table: Any, folder: Path | None = None) -> tuple[MetricSet, list
         return SETS[kind], []
     if isinstance(kind, str) and kind.endswith(".py"):
         try:
-            return metric_set(own_code("metrics.kind", kind, folder), Path(kind).stem), []
+            return metric_set(own_code("metrics.kind", kind, folder, trust=trust), Path(kind).stem), []
         except AirflockError as fault:
             return SETS[USUAL], str(fault).splitlines()
     near = get_close_matches(str(kind), SETS, n=1)

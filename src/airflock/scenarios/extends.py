@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
 LONGEST = 10  # files in a chain of extends
@@ -57,11 +58,11 @@ def _plain(value: Any) -> Any:
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A document whose own files (a law, a mesh) are named from anywhere."""
+    """A document whose own files (a law, a body, order parameters, a mesh) are named from anywhere."""
     result = dict(document)
-    for section, key in (("model", "kind"), ("scene", "file")):
+    for section, key in (("model", "kind"), ("body", "kind"), ("metrics", "kind"), ("scene", "file")):
         table = result.get(section)
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None
-        if isinstance(name, str) and name and not Path(name).is_absolute() and (folder / name).is_file():
+        if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
     return result

@@ -1,7 +1,6 @@
 """Scenario files: TOML with units and sources, presets by name, and keys changed from outside."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -11,9 +10,10 @@ from typing import Any
 
 from airflock.core.contract import Body, MetricSet, Model, model
 from airflock.core.contract import body as gathered_body
+from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import AirflockError, ScenarioError
 from airflock.metrics.registry import as_set
-from airflock.scenarios import checks, geometry, places, schema, short_keys, units, wings
+from airflock.scenarios import checks, formats, geometry, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
 from airflock.scenarios.own_code import own_code
@@ -52,6 +52,7 @@ def load(
     *,
     metrics: Any = None,
     body: Any = None,
+    trust: bool = False,
 ) -> Scenario:
     """Scenario from a preset's name or a file.
 
@@ -71,6 +72,8 @@ def load(
         ours, or a namespace such as globals(); likewise the name of a set or a file.
     body : optional
         A body of your own carries the agents: a `Body`, a namespace, or a name or file.
+    trust : bool
+        Whether code that the file names, or a file that it extends, may run: a law, a body, order parameters.
 
     Returns
     -------
@@ -92,61 +95,71 @@ def load(
     Traceback (most recent call last):
     airflock.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
-    where = str(name)
-    document, folder = _read(where, None)
-    document, base = extended(document, where, folder, _read)
-    notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-    document, own = _given(document, metrics, body)
-    own["notes"] = notes
-    if law is None:
-        return make(document, where, settings, folder=folder, **own)
-    if isinstance(law, (str, os.PathLike)):
-        return make({**document, "model": {"kind": _whole_path(law)}, "published": {}}, where, settings, **own)
-    if not isinstance(law, (Model, Mapping)) and not hasattr(law, "__dict__"):
-        raise ScenarioError(
-            [f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
-        )
-    flown = law if isinstance(law, Model) else model(law)
-    return make({**document, "model": {"kind": flown.name}, "published": {}}, where, settings, law=flown, **own)
+    text = str(name)
+    where = text if text in presets() else str(Path(text))
+    with from_outside(where):
+        document, folder = _read(where, None)
+        document, base = extended(document, where, folder, _read)
+        document, own = _given(document, metrics, body)
+        own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
+        if law is None:
+            return make(document, where, settings, folder=folder, trust=trust, **own)
+        flown = given_law(law)
+        kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
+        document = {**document, "model": {"kind": kind}, "published": {}}
+        return make(document, where, settings, folder=folder, law=flown, trust=trust, **own)
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
-    """Document of a preset or of a file, looked for in a folder, and the folder that it lies in."""
+    """Document of a preset or of a file, looked for in a folder, in today's format, and the folder that it lies in."""
     known = presets()
     path = known.get(name) or (Path(name) if folder is None else folder / name)
-    if not path.is_file():
+    if not is_file(path):
         near = get_close_matches(name, known, n=1, cutoff=0.4)
         hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as fault:
-        raise ScenarioError([f"{name}: {fault}"]) from fault
+    with from_outside(name):
+        document = read_toml(path)
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
-    return document, path.parent
+    return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
 def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics and the body which are given directly, and these themselves for `make`."""
+    """A document that names the metrics and the body which the caller gives, and these themselves for `make`.
+
+    Giving them is consent to run them. Raises ScenarioError.
+    """
     document = dict(document)
     own: dict[str, Any] = {}
+    faults: list[str] = []
     if isinstance(metrics, (str, os.PathLike)):
-        document["metrics"] = {**document.get("metrics", {}), "kind": _whole_path(metrics)}
+        own["measures"], faults = checks.metrics_set({"kind": str(metrics)}, trust=True)
     elif metrics is not None:
         own["measures"] = as_set(metrics)
+    if metrics is not None:
         document["metrics"] = {**document.get("metrics", {}), "kind": own["measures"].name}
     if isinstance(body, (str, os.PathLike)):
-        document["body"] = {"kind": _whole_path(body)}
+        own["vehicle"], more = checks.body_of({"kind": str(body)}, None, trust=True)
+        faults = [*faults, *more]
     elif body is not None:
         own["vehicle"] = body if isinstance(body, Body) else gathered_body(body)
+    if body is not None:
         document["body"] = {"kind": own["vehicle"].name}
+    if faults:
+        raise ScenarioError(faults)
     return document, own
 
 
-def _whole_path(name: str | os.PathLike[str]) -> str:
-    """A name, or the whole path of a user's Python file."""
-    return str(Path(name).absolute()) if str(name).endswith(".py") else str(name)
+def given_law(law: Any) -> Model:
+    """Model of a law that the caller gives: which is consent to run it."""
+    if isinstance(law, Model):
+        return law
+    if isinstance(law, (str, os.PathLike)):
+        return find_model(str(law), told="law", trust=True)
+    if isinstance(law, Mapping) or hasattr(law, "__dict__"):
+        return model(law)
+    raise ScenarioError([f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"])
 
 
 def loaded(what: Any) -> Scenario:
@@ -173,12 +186,15 @@ def make(
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
     notes: tuple[str, ...] = (),
+    trust: bool = False,
 ) -> Scenario:
     """Scenario from a nested dict.
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle : a model, a metric set, a body given directly, not by name
+    trust : whether code that the document names may run
     """
+    document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
@@ -186,7 +202,7 @@ def make(
     found = law
     if found is None:
         try:
-            found = find_model(table.get("kind"), folder)
+            found = find_model(table.get("kind"), folder, trust=trust)
         except AirflockError as fault:
             faults += str(fault).splitlines()
     if found is not None and "aero" in merged:
@@ -194,12 +210,12 @@ def make(
         faults += more
         found = found if more else wings.descending(found)
     if vehicle is None:
-        vehicle, more = checks.body_of(merged.get("body", {}), found, folder)
+        vehicle, more = checks.body_of(merged.get("body", {}), found, folder, trust=trust)
     else:
         more = checks.carries(vehicle, found, vehicle.name)
     faults += more
     if measures is None:
-        measures, more = checks.metrics_set(merged.get("metrics", {}), folder)
+        measures, more = checks.metrics_set(merged.get("metrics", {}), folder, trust=trust)
         faults += more
     own = SECTIONS | {"body": vehicle.Parameters, "metrics": measures.Parameters}
     records = ({"model": found.Parameters} if found else {}) | own
@@ -225,7 +241,7 @@ def make(
 
 def _beside(scene: Any, folder: Path | None) -> Any:
     """A scene whose mesh file is looked for beside the scenario file, if it is not where the name says."""
-    if scene.kind != "mesh" or folder is None or Path(scene.file).is_file() or not (folder / scene.file).is_file():
+    if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
 
@@ -299,25 +315,30 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
     return faults
 
 
-def find_model(kind: Any, folder: Path | None = None) -> Model:
-    """Model by name, or from a user's own Python file (relative to the scenario file)."""
+def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
+    """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
     if not isinstance(kind, str):
-        raise ScenarioError([f"model.kind = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
+        raise ScenarioError([f"{told} = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
-        return model(own_code("model.kind", kind, folder), Path(kind).stem)
+        return model(own_code(told, kind, folder, trust=trust), Path(kind).stem)
     near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
-    raise ScenarioError([f"model.kind = {kind!r} is no model; {hint}"])
+    raise ScenarioError([f"{told} = {kind!r} is no model; {hint}"])
 
 
 def _published(table: Any) -> dict[str, tuple[float, float | None]]:
-    found = {}
+    """Numbers of a paper by name: mean, and standard deviation where it is given; what is no number is left out."""
+
+    def number(value: Any) -> bool:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+
+    found: dict[str, tuple[float, float | None]] = {}
     for key, entry in (table if isinstance(table, Mapping) else {}).items():
-        if isinstance(entry, Mapping) and isinstance(entry.get("mean"), (int, float)):
+        if isinstance(entry, Mapping) and number(entry.get("mean")):
             spread = entry.get("sd")
-            found[key] = (float(entry["mean"]), float(spread) if spread is not None else None)
+            found[key] = (float(entry["mean"]), float(spread or 0.0) if number(spread) else None)
     return found
 
 

@@ -1,25 +1,72 @@
-"""Code of the user's own: the one place where a file that a scenario or a study names is run."""
+"""Python files of the user's own: run only by consent, and whatever goes wrong in one is one line.
 
+A scenario or a study is data; a file of code that it names runs with all rights of the one who opens it. So it is
+imported only if the caller says so: `trust=True`, `--trust`, or by giving the law itself (`law=`, `--law`).
+"""
+
+import hashlib
+import inspect
+import json
 from importlib import util
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 
-from airflock.errors import RuleError, ScenarioError
+from airflock.core.contract import Model
+from airflock.doors import is_file
+from airflock.errors import RuleError, ScenarioError, bounded
 
 
-def own_code(key: str, name: str, folder: Path | None = None) -> ModuleType:
-    """Module from a user's Python file, beside the scenario file or in the current folder; key: what named it.
+def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:
+    """Module of a Python file that a key names, beside the scenario file or else in the current folder.
 
-    Raises ScenarioError where there is no such file, RuleError where it fails.
+    Raises what `own_module` raises.
     """
     beside = Path(name) if folder is None else folder / name
-    path = beside if beside.is_file() else Path(name)
-    spec = util.spec_from_file_location(path.stem, path) if path.suffix == ".py" and path.is_file() else None
+    return own_module(beside if is_file(beside) else Path(name), f"{key} = {name!r}", trust=trust)
+
+
+def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
+    """Module of a Python file that a scenario or study names.
+
+    told  : key and value that name it, for faults
+    trust : whether the caller consents to running it
+    Raises ScenarioError without consent or without the file, and RuleError for what its import raises.
+    """
+    if not is_file(path):
+        raise ScenarioError([f"{told}: no such file"])
+    if not trust:
+        raise ScenarioError(
+            [f"{told}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
+        )
+    spec = util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
-        raise ScenarioError([f"{key} = {name!r}: no such Python file"])
+        raise ScenarioError([f"{told}: is no Python file"])
     module = util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as fault:  # the user's own file may fail in any way
-        raise RuleError(f"{path}: {type(fault).__name__}: {fault}") from fault
+    except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
+        reason = bounded(" ".join(str(fault).split()))
+        raise RuleError(f"{path}: {type(fault).__name__}: {reason}") from fault
     return module
+
+
+def law_hash(law: Model) -> str:
+    """Hash of the text of a law's rules and of the functions of its own that they call."""
+    texts: dict[str, str] = {}
+    left = [value for value in vars(law).values() if isinstance(value, FunctionType)]
+    while left:
+        rule = left.pop()
+        if rule.__qualname__ in texts:
+            continue
+        try:
+            texts[rule.__qualname__] = inspect.cleandoc(inspect.getsource(rule))
+        except (OSError, TypeError):  # typed at a prompt: there is only its code
+            texts[rule.__qualname__] = rule.__code__.co_code.hex()
+        inside = [cell.cell_contents for cell in rule.__closure__ or ()]
+        called = [rule.__globals__.get(name) for name in rule.__code__.co_names]
+        left += [
+            found
+            for found in (*inside, *called)
+            if isinstance(found, FunctionType) and found.__module__ == rule.__module__
+        ]
+    return hashlib.sha256(json.dumps(sorted(texts.items())).encode()).hexdigest()[:16]

@@ -3,6 +3,7 @@
 import math
 import tomllib
 
+from airflock.scenarios import formats
 from airflock.scenarios.files import presets
 
 SPEEDS = (4.0, 6.0, 8.0, 16.0, 32.0)  # columns of Table S1, m/s
@@ -59,6 +60,7 @@ def starting_set(v_flock: float) -> str:
     scale = max(1.0, v_flock / 8.0)
     growth = "Table S2: grows with the speed above 8 m/s"
     lines = [
+        f"{formats.KEY} = {formats.FORMAT}",
         f'title = "Starting set for {v_flock:g} m/s, by the scaling rules of Vásárhelyi et al. 2018; '
         'tune it before flying"',
         "agents = 100",

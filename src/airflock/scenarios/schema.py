@@ -95,7 +95,7 @@ def _line(section: str, item: Any, record: type) -> str:
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return f"{name} = {with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
+            return f"{name} = {with_unit(_number(value), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
         near = get_close_matches(str(value), declared.options, n=1)
@@ -114,3 +114,11 @@ def _line(section: str, item: Any, record: type) -> str:
         else "a list of polygons [[east, north], ...]"
     )
     return f"{name} is not {what} in {declared.unit}"
+
+
+def _number(value: float) -> str:
+    """A number for a person; a whole number may be too large to be a float."""
+    try:
+        return f"{value:g}"
+    except OverflowError:
+        return "a whole number beyond 1e308"

@@ -1,0 +1,97 @@
+"""Attributes of a recording, read as text from outside: the scenario, numbers, the format, the checksum.
+
+Format 1 is that of version 0.1. Format 2 names no file of code: a law of the user's own is its bare name and a hash,
+and `airflock_checksum` tells whether somebody changed what Airflock wrote.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from airflock.doors import from_outside, json_object
+from airflock.errors import RecordingError, bounded
+from airflock.scenarios.files import MODELS
+
+FORMAT = 2
+FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"
+EVENTS = "airflock_events"
+
+
+def check_format(recording: xr.Dataset, where: str = "recording") -> None:
+    """Raise RecordingError for a format that only a newer Airflock knows."""
+    found = whole_number(recording, FORMAT_KEY, 1, where)
+    if not 1 <= found <= FORMAT:
+        raise RecordingError(f"{where}: is of format {found}; this Airflock reads formats 1 to {FORMAT}")
+
+
+def whole_number(recording: xr.Dataset, name: str, usual: int | None = None, where: str = "recording") -> int:
+    """A whole number of the attributes; `usual` where it is missing. Raises RecordingError for anything else."""
+    value: Any = recording.attrs.get(name, usual)
+    if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not -(2**64) < int(value) < 2**64:
+        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is no whole number"
+        raise RecordingError(f"{where}: attribute {name} {told}")
+    return int(value)
+
+
+def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
+    """The scenario that a recording was flown with; None for a flight log; RecordingError if damaged."""
+    found = _object(recording, "airflock_scenario")
+    if found is not None and not isinstance(found.get("model", {}), Mapping):
+        raise RecordingError("recording: attribute airflock_scenario is damaged: model is no table")
+    return found
+
+
+def measured_by(recording: xr.Dataset) -> dict[str, Any]:
+    """What a flight was measured by: the section [metrics] with all its values."""
+    return _object(recording, "airflock_metrics") or {}
+
+
+def _object(recording: xr.Dataset, name: str) -> dict[str, Any] | None:
+    text = recording.attrs.get(name)
+    if text is None or (isinstance(text, str) and not text):
+        return None
+    with from_outside(f"recording: attribute {name} is damaged", RecordingError):
+        return json_object(text)
+
+
+def events(recording: xr.Dataset) -> list[Any]:
+    """What was done to the flight on its way, as `simulate(..., events=...)` takes it."""
+    found = (_object(recording, EVENTS) or {}).get("events", [])
+    if not isinstance(found, list):
+        raise RecordingError(f"recording: attribute {EVENTS} is damaged: it holds no list of events")
+    return found
+
+
+def flown_with_own_law(recording: xr.Dataset) -> bool:
+    """Whether the law was the user's own, which is not in the recording."""
+    document = scenario_document(recording)
+    kind = (document or {}).get("model", {}).get("kind")
+    return document is not None and (LAW in recording.attrs or kind not in MODELS)
+
+
+def checksum(recording: xr.Dataset) -> str:
+    """Hash of all arrays and attributes but itself, the same before saving and after loading."""
+    found = hashlib.sha256()
+    for name in sorted(map(str, recording.variables)):
+        values = recording[name].values
+        plain = values.astype(str) if values.dtype.kind in "OSU" else values
+        content = json.dumps(plain.tolist()).encode() if plain.dtype.kind == "U" else np.ascontiguousarray(plain).data
+        found.update(f"{name} {recording[name].dims} {plain.shape}\n".encode())
+        found.update(content)
+    for name in sorted(recording.attrs):
+        if name != CHECKSUM:
+            found.update(f"{name} {_plain(recording.attrs[name])!r}\n".encode())
+    return found.hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, list, tuple)):
+        flat = [_plain(entry) for entry in np.asarray(value).ravel().tolist()]
+        return flat[0] if len(flat) == 1 else flat  # a netCDF file holds a list of one as a number
+    return value.item() if isinstance(value, np.generic) else value

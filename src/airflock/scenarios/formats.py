@@ -1,0 +1,26 @@
+"""Formats of the files that last: each carries a number, and an older file is read as it was meant.
+
+A scenario or study without the key `format` is of format 1, as version 0.1 wrote them. A change that would make an
+older file mean something else raises the number and adds a step to MIGRATIONS; a newer file is refused in one line.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from airflock.errors import ScenarioError
+
+KEY = "format"
+FORMAT = 1  # of scenarios and studies
+MIGRATIONS: tuple[Callable[[Mapping[str, Any]], Mapping[str, Any]], ...] = ()  # step i reads format i + 1 as i + 2
+
+
+def current(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
+    """A document of any format known here as one of today's, without its key `format`."""
+    found = document.get(KEY, 1)
+    if isinstance(found, bool) or not isinstance(found, int) or found < 1:
+        raise ScenarioError([f"{where}: {KEY} = {found!r} is no number of a format; leave it out, or give {FORMAT}"])
+    if found > FORMAT:
+        raise ScenarioError([f"{where}: {KEY} = {found} is newer than this Airflock, which reads up to {FORMAT}"])
+    for step in MIGRATIONS[found - 1 :]:
+        document = step(document)
+    return {key: value for key, value in document.items() if key != KEY}

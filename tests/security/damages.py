@@ -1,0 +1,163 @@
+"""Cases of the fuzz: damaged caches, and disks that are full at some byte."""
+
+import os
+import pickle
+import random
+import resource
+import shutil
+import sys
+from functools import cache
+
+from mutations import GOLDEN, damage
+
+from airflock import atomic
+from airflock.errors import AirflockError
+
+DRIVER = "from numba import njit\n\n\n@njit(cache=True)\ndef fly(x):\n    return x * 0.5 + 1.0\n"
+
+
+class Planted:
+    """A pickle that runs code when it is loaded."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.mark),)
+
+
+def fly(folder):
+    """Load the driver with a cache folder as a new process would, and fly it."""
+    from airflock.engine import store
+
+    os.environ["AIRFLOCK_CACHE"] = str(folder)
+    for name in [name for name in sys.modules if name.startswith("airflock_driver_planted")]:
+        del sys.modules[name]
+    return store.load_driver(DRIVER, "planted").fly(3.0)
+
+
+def damaged_cache(seed, number, folder, tell=False):
+    """A cache in which one thing is damaged or planted flies the same numbers, now and the next time."""
+    rng = random.Random(f"cache {seed} {number}")
+    home, mark = folder / "cache", folder / "mark"
+    if not (folder / "sound").exists():
+        assert fly(folder / "sound") == 2.5
+    shutil.rmtree(home, ignore_errors=True)
+    shutil.copytree(folder / "sound", home)
+    _damage(rng, home, mark, tell)
+    for _ in range(2):
+        assert fly(home) == 2.5, "other numbers"
+        assert not mark.exists(), "planted code ran"
+    return True
+
+
+def _damage(rng, home, mark, tell):
+    files = sorted(path for path in home.rglob("*") if path.is_file())
+    path, what = rng.choice(files), rng.randrange(9)
+    if tell:
+        sys.stdout.write(f"{what} {path}\n")
+    text = f"import os\nos.path.isdir({str(mark)!r}) or os.mkdir({str(mark)!r})\n"
+    if what < 3:
+        path.write_bytes(damage(rng, path.read_bytes()))
+    elif what == 3:
+        path.write_bytes(b"")
+    elif what == 4:
+        path.unlink()
+    elif what == 5:  # a driver of other physics, or of a stranger's code
+        source = next(p for p in files if p.suffix == ".py")
+        kept = source.stat()
+        source.write_text(rng.choice([DRIVER.replace("0.5", "0.2"), text + DRIVER, ""]))
+        os.utime(source, ns=(kept.st_atime_ns, kept.st_mtime_ns))
+    elif what == 6:
+        ending = rng.choice([".nbi", ".nbc"])
+        target = next(p for p in files if p.suffix == ending)
+        target.write_bytes(pickle.dumps(Planted(mark)) + target.read_bytes())
+    elif what == 7:  # the folder of a driver is a file
+        driver = next(p for p in files if p.suffix == ".py").parent
+        shutil.rmtree(driver)
+        driver.write_text("no folder")
+    else:
+        (path.parent / "__pycache__").mkdir(exist_ok=True)
+        for name in ("planted.cpython-311.pyc", "numba.py", "planted.py"):
+            (path.parent / "__pycache__" / name).write_text(text)
+
+
+@cache
+def results():
+    """A recording, a figure, a table and a document to write."""
+    import pandas as pd
+
+    from airflock.plots.trajectories import trajectories
+    from airflock.recordings.files import load_recording
+
+    recording = load_recording(GOLDEN / "recording.nc")
+    table = pd.DataFrame({"a": range(5000), "b": [0.1] * 5000})
+    return recording, trajectories(recording), table.to_csv(), {"model": {f"k{i}": i / 7 for i in range(400)}}
+
+
+def full_disk(seed, number, folder, tell=False):
+    """A disk that is full at some byte: one fault, and the file that was there before is as it was."""
+    rng = random.Random(f"disk {seed} {number}")
+    what = rng.choice(["recording", "figure", "table", "document", "store"])
+    place = folder / f"disk{number}"
+    place.mkdir()
+    target = place / {"recording": "a.nc", "figure": "a.png", "table": "a.csv", "document": "a.toml"}.get(what, "a")
+    before = b"what was there before" if rng.random() < 0.5 and what != "store" else None
+    if before is not None:
+        target.write_bytes(before)
+    limit = int(10 ** rng.uniform(0.0, 5.5))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    results()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    fault = None
+    try:
+        _write(what, target)
+    except AirflockError as refused:
+        fault = str(refused)
+        assert "\n" not in fault and "a" in fault
+    except OSError as refused:  # the command line makes a line of it
+        assert what in ("table", "document") and refused.filename == str(target), f"a bare {refused!r} from {what}"
+        fault = str(refused)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    if tell:
+        sys.stdout.write(f"{what} of {limit} bytes: {fault}\n")
+    if what == "store":
+        return fault is None
+    left = sorted(path.name for path in place.iterdir())
+    if fault is not None:
+        assert left == ([target.name] if before is not None else []), f"left over: {left}"
+        assert before is None or target.read_bytes() == before, "half-written"
+    else:
+        assert left == [target.name] and target.stat().st_size <= limit
+    shutil.rmtree(place)
+    return fault is None
+
+
+def _write(what, target):
+    from airflock.evolve.executors import Flight, Landed
+    from airflock.evolve.folder import write
+    from airflock.evolve.store import Batch, Store
+    from airflock.plots.save import save_figure
+    from airflock.recordings.files import save
+
+    recording, figure, table, document = results()
+    if what == "recording":
+        save(recording, target)
+    elif what == "figure":
+        save_figure(figure, target)
+    elif what == "table":
+        atomic.write(target, table)
+    elif what == "document":
+        write(target, document)
+    else:
+        target.mkdir()
+        with Store(target) as store:
+            store.begin({})
+            batch = Batch("search", 0, 0)
+            for i in range(200):
+                store.ask(batch, [[0.5]] * (i + 1), [{"model.p_rep": 0.1}] * (i + 1))
+                store.land(batch, Landed(Flight(i, 0, {}, 7), {"fitness": 0.25, "long": [0.1] * 50}))
+
+
+CASES = {"caches": damaged_cache, "disks": full_disk}
