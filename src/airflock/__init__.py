@@ -1,7 +1,45 @@
 """Airflock: decentralised flocks of drones and birds. The public names below load on first use."""
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getattr__ below loads each on first use
+    from airflock import plots as plots
+    from airflock.checking.bodies import check_body as check_body
+    from airflock.checking.metrics import check_metric as check_metric
+    from airflock.checking.models import check_model as check_model
+    from airflock.core.contract import body as body
+    from airflock.core.contract import metric as metric
+    from airflock.core.contract import model as model
+    from airflock.core.parameters import Parameters as Parameters
+    from airflock.core.parameters import choice as choice
+    from airflock.core.parameters import quantity as quantity
+    from airflock.display.displays import display as display
+    from airflock.engine.flight import Flight as Flight
+    from airflock.engine.flight import Flight as open  # noqa: F401
+    from airflock.errors import AirflockError as AirflockError
+    from airflock.evolve.harden import harden as harden
+    from airflock.evolve.run import evolve as evolve
+    from airflock.evolve.validation import validate as validate
+    from airflock.identify.run import identify as identify
+    from airflock.metrics.registry import metric_set as metric_set
+    from airflock.papers.recompute import paper as paper
+    from airflock.plots.picture import plot as plot
+    from airflock.plots.video import video as video
+    from airflock.recordings.files import load_recording as load_recording
+    from airflock.recordings.files import save as save
+    from airflock.recordings.flights import recording_of as recording_of
+    from airflock.recordings.flights import simulate as simulate
+    from airflock.recordings.health import doctor as doctor
+    from airflock.recordings.imports.load import load_tracks as load_tracks
+    from airflock.recordings.scores import over_time as over_time
+    from airflock.recordings.scores import score as score
+    from airflock.recordings.sweeps import sweep as sweep
+    from airflock.scenarios.files import load as load
+    from airflock.scenarios.files import presets as presets
+    from airflock.scenarios.keys import keys as keys
+    from airflock.scenarios.scaling import starting_set as starting_set
+    from airflock.scenarios.scenario import Scenario as Scenario
 
 __version__ = "0.1.0"
 
@@ -10,6 +48,9 @@ _WHERE = {
     "Scenario": "airflock.scenarios.scenario",
     "load": "airflock.scenarios.files",
     "presets": "airflock.scenarios.files",
+    "keys": "airflock.scenarios.keys",
+    "starting_set": "airflock.scenarios.scaling",
+    "validate": "airflock.evolve.validation",
     "model": "airflock.core.contract",
     "body": "airflock.body",
     "metric": "airflock.core.contract",
@@ -24,23 +65,33 @@ _WHERE = {
     "Flight": "airflock.engine.flight",
     "recording_of": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
+    "over_time": "airflock.recordings.scores",
+    "sweep": "airflock.recordings.sweeps",
     "evolve": "airflock.evolve",
+    "harden": "airflock.evolve.harden",
+    "display": "airflock.display",
+    "plot": "airflock.plots.picture",
+    "plots": "airflock.plots",
+    "video": "airflock.plots.video",
     "save": "airflock.recordings.files",
     "identify": "airflock.identify",
     "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
+    "paper": "airflock.papers.recompute",
+    "doctor": "airflock.recordings.health",
 }
+_MODULES = ("evolve", "display", "identify", "body", "plots")  # packages; all but plots can be called (decision 0010)
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 
 
-def __getattr__(name: str) -> Any:
-    if name in _WHERE:
-        module = import_module(_WHERE[name])
-        if name in ("evolve", "body", "identify"):
-            return module  # which can be called
-        return getattr(module, "Flight" if name == "open" else name)
-    raise AttributeError(f"module 'airflock' has no attribute {name!r}")
+if not TYPE_CHECKING:  # a type checker shall tell names that do not exist
+
+    def __getattr__(name: str) -> Any:
+        if name in _WHERE:
+            module = import_module(_WHERE[name])
+            return module if name in _MODULES else getattr(module, "Flight" if name == "open" else name)
+        raise AttributeError(f"module 'airflock' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -24,7 +24,17 @@ def printable(text: str) -> str:
 
 
 class AirflockError(Exception):
-    """Root of every error that the command line prints as one line before it exits with status 2."""
+    """Root of every error that the command line prints as one line before it exits with status 2.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> try:
+    ...     airflock.load("vasarhelyi_2018/4m")
+    ... except airflock.AirflockError as fault:
+    ...     print(fault)
+    vasarhelyi_2018/4m: no such file or preset; did you mean vasarhelyi_2018/4ms?
+    """
 
 
 class ParameterError(AirflockError):

@@ -87,7 +87,7 @@ def test_all_faults_of_a_file_are_reported_together(tmp_path):
     file.write_text(
         'agents = "many"\nduratoin = 3\n[model]\nkind = "vasarhelyi"\n[sensors]\nperiod = -1\n'
         '[world]\narena = "polygon"\ncorners = [[0, 0], [10, 0], [1, 1], [0, 10]]\n'
-        '[radio]\nrange = { value = 80, unit = "km" }\n'
+        '[radio]\nrange = { value = 80, unit = "kg" }\n'
     )
     done = airflock("validate", file)
     assert done.returncode == 2

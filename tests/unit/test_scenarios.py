@@ -96,7 +96,7 @@ def faults_of(settings, base="vasarhelyi_2018/4ms"):
         ("model.p_rop", 0.1, "did you mean model.p_rep?"),
         ("model.p_rep", "fast", "model.p_rep = 'fast' is not a number; give [0, 10] 1/s"),
         ("model.v_flock", -3.0, "model.v_flock = -3 m/s lies outside ["),
-        ("radio.delay", {"value": 1.0, "unit": "ms"}, "radio.delay = 1.0 ms: the unit is s"),
+        ("radio.delay", {"value": 1.0, "unit": "kg"}, "radio.delay = 1.0 kg: the unit is s, or one of us, ms, min, h"),
         ("world.arena", "sqare", "did you mean square?"),
         ("agents", 2.5, "agents = 2.5 is not a whole number"),
         ("agents", 100000, "do not fit at start.separation"),

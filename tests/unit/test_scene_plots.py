@@ -1,6 +1,7 @@
 """Pictures of flights in scenes, drawn from recordings made by hand: nothing is compiled."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pandas as pd
@@ -9,8 +10,10 @@ import pytest
 import airflock
 from airflock.cli import tables
 from airflock.errors import RecordingError
-from airflock.plots import flocked, rays, through
+from airflock.plots.flocked import flocked
+from airflock.plots.rays import cast_at, rays
 from airflock.plots.scene import paths_of
+from airflock.plots.through import nearby, scenery, through
 from airflock.plots.video import video
 from airflock.recordings.flights import plain
 from airflock.recordings.layout import dataset
@@ -33,48 +36,49 @@ def recording(name="kidger/city", **keys):
 @pytest.mark.parametrize("name", ["kidger/city", "kidger/forest", "kidger/final_2d"])
 def test_paths_through_a_scene_show_what_stands_there(name):
     made = recording(name)
-    figure = through.through(made)
+    figure = through(made)
     axes = figure.axes[0]
     assert axes.get_xlabel() == "east (m)"
-    shown = through.nearby(airflock.load(name), paths_of(made))
-    assert len(shown) and len(through.scenery(made, paths_of(made))) >= len(shown)
+    shown = nearby(airflock.load(name), paths_of(made))
+    assert len(shown) and len(scenery(made, paths_of(made))) >= len(shown)
     if name == "kidger/city":
         assert len(axes.collections[0].get_paths()) == len(shown)  # a ground plan of each building
-        assert through.through(made, space=True).axes[0].get_zlabel() == "up (m)"
+        assert through(made, space=True).axes[0].get_zlabel() == "up (m)"
     if name == "kidger/final_2d":
         with pytest.raises(RecordingError, match="flown in a plane"):
-            through.through(made, space=True)
+            through(made, space=True)
 
 
 def test_rays_of_an_agent_are_those_that_its_model_casts():
     made = recording()
-    found, command = rays.cast_at(made, 3, 20)
+    found, command = cast_at(made, 3, 20)
     free = [ray for ray in found if ray.free >= ray.length]
     assert len(found) > 1 and found[0].free < found[0].length  # the building ahead
     assert free == found[-1:]  # it stops at the first free ray and flies there
     assert np.array(command) / np.linalg.norm(command) == pytest.approx(found[-1][:3], abs=1e-6)
-    assert len(rays.rays(made, start=20 / 60, agent=3).axes[0].collections[1].get_segments()) == len(found)
+    assert len(rays(made, start=20 / 60, agent=3).axes[0].collections[1].get_segments()) == len(found)
     with pytest.raises(RecordingError, match="has no agent 9"):
-        rays.rays(made, agent=9)
+        rays(made, agent=9)
 
 
 def test_share_flocked_is_drawn_with_goals_and_collisions(monkeypatch):
+    module = import_module("airflock.plots.flocked")
     index = pd.Index(np.arange(40) / 60.0, name="time")
     course = pd.DataFrame({"flocked": 1.0, "polarisation": 0.5, "n_clusters": 1.0, "n_coll": 1.0}, index=index)
-    monkeypatch.setattr(flocked, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
-    upper, lower = flocked.flocked(recording()).axes
+    monkeypatch.setattr(module, "measure", lambda *_: ({"time_to_goal": [0.2, np.nan]}, course))
+    upper, lower = flocked(recording()).axes
     assert len(upper.lines) == 3  # share, polarisation, and the goal that was reached
     assert lower.lines[1].get_ydata()[-1] == 40.0 and lower.get_yscale() == "symlog"
     few = course.assign(n_coll=[1.0] * 4 + [0.0] * 36)
-    monkeypatch.setattr(flocked, "measure", lambda *_: ({}, few))
-    lower = flocked.flocked(recording()).axes[1]
+    monkeypatch.setattr(module, "measure", lambda *_: ({}, few))
+    lower = flocked(recording()).axes[1]
     lower.figure.canvas.draw()
     low, high = lower.get_ylim()
     assert sum(low <= tick <= high and bool(text.get_text()) for tick, text in
                zip(lower.get_yticks(), lower.get_yticklabels(), strict=True)) >= 3  # fmt: skip
-    monkeypatch.setattr(flocked, "measure", lambda *_: ({}, course.drop(columns="flocked")))
+    monkeypatch.setattr(module, "measure", lambda *_: ({}, course.drop(columns="flocked")))
     with pytest.raises(RecordingError, match="metrics.kind = 'kidger'"):
-        flocked.flocked(recording())
+        flocked(recording())
 
 
 def test_a_video_shows_the_scene(tmp_path):

@@ -31,27 +31,18 @@ def display(
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """
-    from airflock.display import fly_show, points_of
-    from airflock.display.show import FAILURES, scenario_of
+    from airflock.display.displays import plan
+    from airflock.display.show import fly_show
 
     faults: list[str] = []
     with options.gathering(faults):
         options.writable((save, RECORDINGS), (plot, PICTURES))
-    if not 0.0 <= failing <= 0.9:
-        faults.append(f"--failing = {failing:g} lies outside [0, 0.9]")
-    if failure not in FAILURES:
-        faults.append(f"--failure = {failure!r} is none of {', '.join(FAILURES)}")
     settings: dict[str, Any] = {}
     with options.gathering(faults):
         settings = options.settings(changes)
-        scenario_of(drones, settings)
-    count = drones if points is None else points
-    if drones > count:
-        faults.append(f"--drones = {drones} are more than --points = {count}; give each drone a point, or fly fewer")
     found = []
-    for number, shape in enumerate(shapes):
-        with options.gathering(faults):
-            found.append(points_of(shape, count, spacing, seed=number))
+    with options.gathering(faults):
+        found = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
     options.refuse(faults)
     show = fly_show(found, drones, failing, failure, seed, settings)
     rows = [{"shape": shape, **vars(formed)} for shape, formed in zip(shapes, show.formed, strict=True)]

@@ -2,13 +2,12 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
 from airflock.endings import PICTURES, VIDEOS
-from airflock.errors import AirflockError
 
 
 class Kind(StrEnum):
@@ -31,14 +30,6 @@ Begin = Annotated[float | None, typer.Option(help="First instant shown, s.", sho
 End = Annotated[float | None, typer.Option(help="Last instant shown, s.", show_default="the end")]
 
 
-class Asked(NamedTuple):
-    """How a scenario is loaded: keys to change, the caller's own law, consent to code that the file names."""
-
-    changed: dict[str, Any]
-    law: str | None
-    trust: bool
-
-
 def plot(
     what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
     kind: Annotated[Kind, typer.Option(help="What to draw.")] = Kind.TRAJECTORIES,
@@ -59,69 +50,13 @@ def plot(
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """
     options.writable((out, PICTURES))
+    from airflock.plots.picture import plot as picture
     from airflock.plots.save import save_figure
 
-    asked = Asked(options.settings(changes, agents, duration), law, trust)
-    save_figure(_figure(what, kind, seed, begin, end, asked), out)
+    settings = options.settings(changes, agents, duration)
+    figure = picture(what, kind, seed=seed, start=begin, stop=end, settings=settings, law=law, trust=trust)
+    save_figure(figure, out)
     tables.say(f"saved {out}")
-
-
-def _figure(what: str, kind: Kind, seed: int, begin: float | None, end: float | None, asked: Asked) -> Any:
-    if kind is Kind.TRANSFER:
-        from airflock.plots.transfer import transfer
-
-        return transfer(_scenario(what, asked))
-    if kind is Kind.RULES:
-        from airflock.plots.rules import rules
-
-        return rules(_scenario(what, asked))
-    recording = _recording(what, seed, asked)
-    if kind in (Kind.SCENE, Kind.SPACE):
-        from airflock.plots.through import through
-
-        return through(recording, start=begin, stop=end, space=kind is Kind.SPACE)
-    if kind is Kind.RAYS:
-        from airflock.plots.rays import rays
-
-        return rays(recording, start=begin)
-    if kind is Kind.FLOCKED:
-        from airflock.plots.flocked import flocked
-
-        return flocked(recording, start=begin, stop=end)
-    if kind is Kind.SERIES:
-        from airflock.plots.series import series
-
-        return series(recording, start=begin, stop=end)
-    if kind is Kind.EXPOSURE:
-        from airflock.plots.exposure import exposure
-
-        return exposure(recording, start=begin, stop=end)
-    from airflock.plots.trajectories import trajectories
-
-    return trajectories(recording, start=begin, stop=end)
-
-
-def _scenario(what: str, asked: Asked) -> Any:
-    if what.lower().endswith(".nc"):
-        from airflock.recordings.files import load_recording
-        from airflock.recordings.scores import scenario_of
-
-        return scenario_of(load_recording(what), asked.changed)
-    from airflock.scenarios.files import load
-
-    return load(what, asked.changed, asked.law, trust=asked.trust)
-
-
-def _recording(what: str, seed: int, asked: Asked) -> Any:
-    if what.lower().endswith(".nc"):
-        if asked.changed or asked.law:
-            raise AirflockError(f"{what}: is a recording; --set, --agents, --duration and --law need a scenario to fly")
-        from airflock.recordings.files import load_recording
-
-        return load_recording(what)
-    from airflock.recordings.flights import simulate
-
-    return simulate(_scenario(what, asked), seed)
 
 
 def video(
@@ -143,10 +78,11 @@ def video(
     Example: airflock video vasarhelyi_2018/obstacles --duration 120 --out flight.mp4
     """
     options.writable((out, VIDEOS))
+    from airflock.plots.picture import flight_of
     from airflock.plots.video import frame_count
     from airflock.plots.video import video as make_video
 
-    recording = _recording(what, seed, Asked(options.settings(changes, agents, duration), law, trust))
+    recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, **choice)

@@ -12,7 +12,21 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, evolve, fleet, fly, harden, identify, imports, inspect, look, paper, run, sweep
+from airflock.cli import (
+    display,
+    evolve,
+    fleet,
+    fly,
+    harden,
+    identify,
+    imports,
+    inspect,
+    keys,
+    look,
+    paper,
+    run,
+    sweep,
+)
 from airflock.errors import AirflockError, bounded, bounded_lines, printable
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -57,6 +71,7 @@ app.command("fleet")(fleet.fleet)
 app.add_typer(fly.app, name="fly")
 app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
+app.command("keys")(keys.keys)
 app.command("validate")(inspect.validate)
 app.command("doctor")(inspect.doctor)
 

@@ -104,6 +104,26 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
     refuse(faults)
 
 
+def compile_aloud(scenario: Any, precision: int, device: str) -> None:
+    """Compile what flies a scenario on the processor before anything flies; tell a terminal if it takes over 1 s."""
+    import sys
+    from threading import Timer
+
+    if device != "cpu" or not sys.stderr.isatty():
+        return
+
+    from airflock.cli.tables import say
+    from airflock.engine.simulate import compile_for
+
+    told = Timer(1.0, say, ["compiling … (once for this kind of flight; later ones begin at once)"])
+    told.daemon = True
+    told.start()
+    try:
+        compile_for(scenario, precision=precision)
+    finally:
+        told.cancel()
+
+
 @contextmanager
 def progress(label: str, total: int, quiet: bool = False) -> Iterator[Callable[[], None]]:
     """A bar on the terminal while long work runs; yields a function to call after each part."""

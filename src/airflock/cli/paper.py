@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError
 
 
 def paper(
@@ -22,19 +21,9 @@ def paper(
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
-    from importlib import import_module
+    from airflock.papers.recompute import paper as recompute
 
-    from airflock.papers import PAPERS
-
-    if name not in PAPERS:
-        from difflib import get_close_matches
-
-        near = get_close_matches(name, PAPERS, n=1)
-        raise AirflockError(
-            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
-        )
-    module = import_module(f"airflock.papers.{name}")
-    claims = module.PAPER.run(only=only, quick=quick, seeds=seeds, threads=threads)
+    claims = recompute(name, only=only, quick=quick, seeds=seeds, threads=threads)
     if as_json:
         tables.emit_json([claim.as_dict() for claim in claims])
         return

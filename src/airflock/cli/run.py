@@ -31,7 +31,9 @@ def run(
     """
     from airflock.engine.simulate import picked, score_flights
     from airflock.metrics.registry import reports
+    from airflock.recordings.rare import remarks, upper_bound
     from airflock.scenarios.files import load
+    from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
     with options.gathering(faults):
@@ -42,8 +44,9 @@ def run(
     options.refuse(faults)
     for note in found.notes:
         tables.say(f"note: {note}")
-    numbers, flights = list(range(first_seed, first_seed + seeds)), [found] * seeds
+    numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     device = picked(flights, device, precision=precision, say=tables.say)
+    options.compile_aloud(found, precision, device)
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
         rows = score_flights(flights, numbers, threads=threads, precision=precision, done=done, device=device)
     if save or plot:
@@ -52,13 +55,17 @@ def run(
         from airflock.recordings.flights import plain
 
         runs = [{"seed": seed, **row} for seed, row in zip(numbers, rows, strict=True)]
+        bound = upper_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
+        bounds = {"collision_bound": bound} if seeds > 1 and "n_coll" in rows[0] else {}
         result = {"scenario": {"name": found.name, **plain(found.document)}, "seeds": seeds, "runs": runs}
-        tables.emit_json({**result, **tables.statistics(rows)})
+        tables.emit_json({**result, **tables.statistics(rows), **bounds})
         return
     count = f"{seeds} flights" if seeds > 1 else f"seed {first_seed}"
     title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
     published = {} if changed else found.published
     tables.score_table(title, rows, published, reports(found.measures))
+    for remark in remarks(rows, numbers):
+        tables.say(remark)
 
 
 def _record(found, numbers, precision, device, save, plot) -> None:  # type: ignore[no-untyped-def]

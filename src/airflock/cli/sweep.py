@@ -1,9 +1,7 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
-import itertools
 import math
 from collections.abc import Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,15 +49,14 @@ def sweep(
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    import pandas as pd
-
-    from airflock.engine.simulate import picked, score_flights
-    from airflock.scenarios.files import load
+    from airflock.recordings.sweeps import flown, grid, scenarios_at, shown
+    from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
     with options.gathering(faults):
         options.writable((table, TABLES), (plot, PICTURES))
-    fixed, axes, scenarios = {}, [], []
+    fixed: dict[str, Any] = {}
+    axes, scenarios = [], []
     with options.gathering(faults):
         fixed = options.settings(changes, agents, duration)
     for text in over:
@@ -70,26 +67,19 @@ def sweep(
     size = math.prod(len(values) for _, values in axes)
     if size > MOST_VALUES:
         options.refuse([*faults, f"--over: a grid of {size} points is more than {MOST_VALUES}"])
-    points = [
-        dict(zip([key for key, _ in axes], grid, strict=True)) for grid in itertools.product(*(v for _, v in axes))
-    ]
-    for point in points:
-        with options.gathering(faults):
-            scenarios.append(load(scenario, {**fixed, **point}, law, trust=trust))
+    points = grid(dict(axes))
+    with options.gathering(faults):
+        scenarios = scenarios_at(scenario, points, fixed, law, trust=trust)
     with options.gathering(faults):
         show = shown(show, scenarios)
     options.refuse(faults)
     for note in dict.fromkeys(note for found in scenarios for note in found.notes):
         tables.say(f"note: {note}")
-    numbers = range(first_seed, first_seed + seeds)
-    jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in numbers]
-    flights = [found for _, found, _ in jobs]
-    device = picked(flights, device, precision=precision, say=tables.say)
-    with options.progress(f"{scenario}: flights", len(jobs), quiet=as_json) as done:
-        rows = score_flights(
-            flights, [j[2] for j in jobs], threads=threads, precision=precision, done=done, device=device
-        )
-    tidy = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    numbers = sound_seeds(range(first_seed, first_seed + seeds))
+    options.compile_aloud(scenarios[0], precision, device)
+    with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
+        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
+        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say)
     if table is not None:
         from airflock import atomic
 
@@ -99,28 +89,12 @@ def sweep(
         from airflock.plots.heatmap import heatmap
         from airflock.plots.save import save_figure
 
-        save_figure(heatmap(tidy, [key for key, _ in axes], show, scenario=scenarios[0]), plot)
+        save_figure(heatmap(tidy, list(dict(axes)), show, scenario=scenarios[0]), plot)
         tables.say(f"saved {plot}")
     if as_json:
         tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
     else:
-        _print(tidy, [key for key, _ in axes], show)
-
-
-def shown(asked: str | None, scenarios: Sequence[Any]) -> str:
-    """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
-    from airflock.metrics.registry import numbers_of
-
-    each = [numbers_of(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
-    known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
-    if asked is None:
-        usual = [name for name in (found.measures.best for found in scenarios) if name in known]
-        return str((usual + known + [""])[0])
-    if each and asked not in known:
-        near = get_close_matches(asked, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-        raise ScenarioError([f"--show {asked}: no such order parameter; {hint}"])
-    return asked
+        _print(tidy, list(dict(axes)), show)
 
 
 def distinct(keys: Sequence[str], plot: Path | None) -> None:

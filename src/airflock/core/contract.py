@@ -65,7 +65,38 @@ def names_of(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
 
 
 def model(namespace: Any, name: str = "") -> Model:
-    """Gather a model from a module, a class or a mapping of names; refuse what the contract does not know."""
+    """Gather a model from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds COMMAND, Parameters, decide, and any of neighbour, Sums, boundary, Walls, reach and the others that
+        `Model` lists. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+    name : str, optional
+        How the model is called; by default the namespace's.
+
+    Returns
+    -------
+    Model
+        To be given to `airflock.load(..., law=...)`.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or a rule asks for what there is not; names the nearest word.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Straight:
+    ...     COMMAND = "velocity"
+    ...     class Parameters(airflock.Parameters):
+    ...         pass
+    ...     def decide(own):
+    ...         return own.vx, own.vy, own.vz
+    >>> airflock.model(Straight).command
+    'velocity'
+    """
     found, name = names_of(namespace, name)
     for needed in ("Parameters", "COMMAND", "decide"):
         if needed not in found:

@@ -63,13 +63,72 @@ Declaration = Quantity | Choice | Points | Text
 
 
 def quantity(default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "") -> Any:
-    """Declare a number; a default of None makes it optional."""
+    """Declare a number of a record of parameters.
+
+    Parameters
+    ----------
+    default : float or None
+        None makes it optional: it then comes from the rest of the scenario.
+    unit : str
+        SI unit, "1" for a plain number.
+    low, high : float
+        Allowed range, both ends included.
+    meaning : str
+        What it is, for help texts and error messages.
+    source : str
+        Where the default comes from.
+
+    Returns
+    -------
+    dataclasses.Field
+        To be assigned in the body of a frozen dataclass derived from `airflock.Parameters`.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Gains(airflock.Parameters):
+    ...     push: float = airflock.quantity(0.2, "1/s", low=0.0, high=5.0, meaning="repulsion gain")
+    >>> Gains().push
+    0.2
+    >>> Gains(push=9.0)
+    Traceback (most recent call last):
+    airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
+    """
     record = Quantity(unit, float(low), float(high), meaning, source, default is None)
     return field(default=default, metadata={"airflock": record})
 
 
 def choice(default: str, options: tuple[str, ...], *, meaning: str, source: str = "") -> Any:
-    """Declare an enumerated choice."""
+    """Declare an enumerated choice of a record of parameters.
+
+    Parameters
+    ----------
+    default : str
+        One of the options.
+    options : tuple of str
+        What it may be. A choice is a constant in a compiled flight, so a rule may branch on it for free.
+    meaning : str
+        What it decides.
+    source : str
+        Where the default comes from.
+
+    Returns
+    -------
+    dataclasses.Field
+        To be assigned in the body of a frozen dataclass derived from `airflock.Parameters`.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Form(airflock.Parameters):
+    ...     limit: str = airflock.choice("cap", ("cap", "rescale"), meaning="how a wish is limited")
+    >>> Form().limit
+    'cap'
+    """
     return field(default=default, metadata={"airflock": Choice(options, meaning, source)})
 
 
@@ -104,7 +163,20 @@ def _declared(item: Field[Any]) -> Declaration:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Base of every record of parameters: numbers become floats, and all faults are reported together."""
+    """Base of every record of parameters: numbers become floats, and all faults are reported together.
+
+    A record is a frozen dataclass whose fields are declared by `quantity` and `choice`. Raises ParameterError.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Two(airflock.Parameters):
+    ...     speed: float = airflock.quantity(4.0, "m/s", low=0.1, high=30.0, meaning="preferred speed")
+    >>> Two(speed=5)
+    Two(speed=5.0)
+    """
 
     def __post_init__(self) -> None:
         faults = []

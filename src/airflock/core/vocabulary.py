@@ -236,7 +236,7 @@ def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...
     for name in names:
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ""
+            hint = f"; did you mean {near[0]}?" if near else "."
             where = f"{owner}.{kind}" if owner else kind
             raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
     return names

@@ -6,6 +6,7 @@ alignment, a slower but earlier braking at walls. Each step here flies the same 
 price in fitness and its gain in distance are differences of pairs.
 """
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from airflock.evolve.search import Watch
 from airflock.evolve.space import Space, declared, with_parameters
 from airflock.evolve.study import Study, make_study
 from airflock.scenarios import formats
-from airflock.scenarios.files import make
+from airflock.scenarios.files import loaded, make
 from airflock.scenarios.scenario import Scenario
 
 S4 = "Table S4"
@@ -108,15 +109,47 @@ def _inside(value: float, how: Any) -> float:
 
 
 def harden(
-    scenario: Scenario,
-    seeds: Sequence[int],
+    scenario: Scenario | str | os.PathLike[str],
+    seeds: Sequence[int] = range(100),
     *,
     steps: Sequence[Step] = RECIPE,
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[Measured]:
-    """Fly each step of the recipe on the same seeds."""
+    """Fly each step of the recipe of Vásárhelyi et al. 2018, Table S4, on the same seeds.
 
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        An optimum: a scenario, or its name or file, such as best.toml of a study.
+    seeds : sequence of int
+        Seeds of the flights of each step.
+    steps : sequence of Step
+        What is changed, one after another.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    done : callable, optional
+        Called after each flight.
+
+    Returns
+    -------
+    list of Measured
+        The optimum and each step: parameters, fitness, r_min (m), and what the step costs and gains.
+
+    Raises
+    ------
+    ScenarioError
+        If the model has no such parameters, or the flights have no fitness.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> steps = airflock.harden(short, range(2))
+    >>> steps[0].name, round(steps[1].parameters["model.p_rep"], 3)
+    ('optimum', 0.195)
+    """
+    scenario = loaded(scenario)
     return measured(scenario, recipe(scenario, steps), seeds, threads, done)
 
 

@@ -48,22 +48,63 @@ def evolve(
 ) -> Result:
     """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
 
-    what      : a preset, a scenario or study file, a Scenario, or a Study
-    out       : the study's folder; `resume` continues the study in it to the identical end
-    settings  : keys of the scenario to change, such as {"duration": 300.0}
-    space     : sections of parameters that vary, as in a study file: {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
-    objective : {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters
-    fitness   : instead of it, a function of your own: order parameters of one flight → number, more is better
-    scheduler : address of a dask scheduler; by default flights fly in this process, `threads` at a time
-    device    : cpu, cuda, or auto
-    timeout   : s that a flight may take on a dask worker
-    sensitivity : "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv
-    watch     : called with a Progress after each flight
-    trust     : whether code that files name may run: a law, fitness functions
-    search_keys : keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
+    Parameters
+    ----------
+    what : str, path, Scenario or Study
+        A preset, a scenario or study file, a Scenario, or a Study.
+    out : str or path
+        The study's folder.
+    resume : bool
+        Continue the study in the folder to the identical end.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"duration": 300.0}.
+    space : mapping, optional
+        Sections of parameters that vary, as in a study file: {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}.
+    objective : mapping, optional
+        {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters.
+    fitness : callable, optional
+        Instead of it, a function of your own: order parameters of one flight → number, more is better.
+    scheduler : str, optional
+        Address of a dask scheduler; by default flights fly in this process.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    device : str
+        cpu, cuda, or auto.
+    timeout : float, optional
+        Time that a flight may take on a dask worker, s.
+    sensitivity : str
+        "sobol" or "morris": also fly what tells which parameters matter; table sensitivity.csv.
+    watch : callable, optional
+        Called with a Progress after each flight.
+    trust : bool
+        Whether code that files name may run: a law, fitness functions.
+    **search_keys
+        Keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
 
-    Returns the Result; the same stands in the folder as result.toml, best.toml, tables and pictures.
-    Raises ScenarioError, StudyError, and Interrupted at Ctrl-C.
+    Returns
+    -------
+    Result
+        The optimum, its fitness on fresh seeds, and working ranges; the same stands in the folder as result.toml,
+        best.toml, tables and pictures.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the scenario, the study or its folder cannot be used; Interrupted at Ctrl-C.
+
+    Notes
+    -----
+    CMA-ES is that of pycma; stages after the search and their reasons are on the page "Evolving a flock".
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> vary = {"model": {"p_rep": {"low": 0.0, "high": 1.0}}}
+    >>> few = {"population": 4, "generations": 2, "pool": 2, "top": 1, "final_seeds": 2}
+    >>> result = airflock.evolve(short, "study", space=vary, **few)
+    >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
+    True
     """
     study = study_of(what, settings, space, objective, fitness, search_keys, trust=trust)
     folder = Path(out)

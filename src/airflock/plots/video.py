@@ -56,15 +56,43 @@ def video(
     height: int = 720,
     done: Callable[[], None] | None = None,
 ) -> Path:
-    """Write a video of a recording; raises PictureError and leaves nothing behind when it cannot.
+    """Write a video of a recording.
 
-    path        : ends in .mp4 or .gif
-    fps         : pictures per second; `frame_count` says how many there will be
-    speed       : times real time
-    start, stop : window of time, s; by default all of it
-    tail        : flight behind each agent that is drawn, s; 0 draws none
-    height      : of the picture, pixels; its width follows from the arena; both are made even
-    done        : called after each picture
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Simulated or flown.
+    path : str or path
+        Ends in .mp4 or .gif.
+    fps : float
+        Pictures per second; `frame_count` says how many there will be.
+    speed : float
+        Times real time.
+    start, stop : float, optional
+        Window of time, s; by default all of it.
+    tail : float
+        Flight behind each agent that is drawn, s; 0 draws none.
+    height : int
+        Of the picture, pixels; its width follows from the arena; both are made even.
+    done : callable, optional
+        Called after each picture.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    PictureError
+        When it cannot be written; then nothing is left behind.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.video(airflock.simulate(short), "flight.gif", fps=5, height=120).name
+    'flight.gif'
     """
     instants = _instants(recording, fps, speed, start, stop)
     positive(height=height)

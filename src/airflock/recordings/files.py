@@ -25,9 +25,35 @@ FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", 
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a recording as .nc: to a temporary name first, then renamed; raises RecordingError and leaves nothing.
+    """Write a recording as netCDF: to a temporary name first, then renamed.
 
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        position (time, space, keypoint, individual) in m, and whatever else there is.
+    path : str or path
+        Ends in .nc.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    RecordingError
+        If it is no recording or cannot be written; then nothing is left behind.
+
+    Notes
+    -----
     The file is made in memory, because the HDF5 library crashes the process when the disk is full.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.save(airflock.simulate(short), "flight.nc").name
+    'flight.nc'
     """
     check(recording, str(path))
     target = Path(path)
@@ -49,10 +75,35 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
 
 
 def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
-    """Read a recording, in a process of its own; raises RecordingError with everything that it lacks.
+    """Read a recording, in a process of its own.
 
-    path : or the Opening that has begun to read it
-    Warns where a recording of Airflock's was changed since it was written.
+    Parameters
+    ----------
+    path : str, path or Opening
+        A netCDF file with position (time, space, keypoint, individual), m, and the time in s; or the Opening that has
+        begun to read it.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `airflock.simulate` returns it.
+
+    Raises
+    ------
+    RecordingError
+        With everything that the file lacks.
+
+    Warns
+    -----
+    UserWarning
+        Where a recording of Airflock's was changed since it was written.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.load_recording("nowhere.nc")
+    Traceback (most recent call last):
+    airflock.errors.RecordingError: nowhere.nc: no such file
     """
     opening = path if isinstance(path, Opening) else Opening(path)
     recording: xr.Dataset = opening.answer()

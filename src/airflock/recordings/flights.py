@@ -38,14 +38,45 @@ def simulate(
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
-    scenario  : or the name of a preset or scenario file, which is then loaded
-    seed      : any integer from 0 to 2^64 - 1; the same seed gives the same bits
-    precision : 32 or 64 bits per number
-    start     : positions and velocities to start from, (component, agent) in m and m/s, instead of random ones
-    device    : cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked
-    events    : what is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it
-    Returns an xarray Dataset (time, space, keypoint, individual) with position, velocity and command; its attributes
-    hold the scenario, the seed, versions and processor, so that it can be flown again.
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        A scenario, or the name of a preset or scenario file.
+    seed : int
+        From 0 to 2^64 - 1; the same seed gives the same bits.
+    precision : int
+        Bits per number, 32 or 64.
+    start : array, optional
+        Positions and velocities to start from, (component, agent) in m and m/s, instead of random ones.
+    device : str
+        cpu, cuda (a GPU), python (no compiler, for debuggers), or auto, which tells `say` what it picked.
+    say : callable, optional
+        Told what auto picked.
+    events : sequence of mappings, optional
+        What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
+
+    Returns
+    -------
+    xarray.Dataset
+        position (m), velocity (m/s) and command, each (time, space, keypoint, individual). Its attributes hold the
+        scenario, the seed, versions and processor, so that it can be flown again.
+
+    Raises
+    ------
+    ScenarioError, FlightError
+        If the scenario or the flight is faulty.
+
+    Notes
+    -----
+    The layout follows the package movement (time, space, keypoint, individual).
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short, seed=7)
+    >>> dict(recording.position.sizes)
+    {'time': 6, 'space': 2, 'keypoint': 1, 'individual': 4}
     """
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)

@@ -23,7 +23,7 @@ from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
 from airflock.metrics import nearest
-from airflock.metrics.registry import POWER, SETS
+from airflock.metrics.registry import POWER, SETS, reports
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
 from airflock.scenarios.files import loaded, make
@@ -42,27 +42,98 @@ def score(
     done: Callable[[], None] | None = None,
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
+    aero: bool = False,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
-    what     : scenario, or the name of a preset or scenario file (flown with `seeds`: a number of them, or the seeds
-               themselves), or recording
-    settings : for a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with
-    threads  : flights side by side; by default one per core
-    done     : called after each flight
-    device   : cpu, cuda (a GPU, all flights together), python, or auto, which tells `say` what it picked
+    Parameters
+    ----------
+    what : Scenario, str, path or xarray.Dataset
+        A scenario, or the name of a preset or scenario file, which is flown; or a recording, which is measured.
+    seeds : int or iterable of int
+        A number of flights, with seeds 0, 1, 2, ..., or the seeds themselves.
+    settings : mapping, optional
+        For a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    precision : int
+        Bits per number, 32 or 64.
+    done : callable, optional
+        Called after each flight.
+    device : str
+        cpu, cuda (a GPU, all flights together), python, or auto, which tells `say` what it picked.
+    say : callable, optional
+        Told what auto picked.
+    aero : bool
+        For a recording, measure the power that its geometry saves.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per flight, one column per order parameter; `attrs["units"]` and `attrs["meanings"]` say what they are.
+
+    Raises
+    ------
+    ScenarioError, RecordingError, FlightError
+        If the scenario, the recording or the flight is faulty.
+
+    Notes
+    -----
+    Which order parameters there are is the key `metrics.kind`; their sources stand beside them in `airflock.metrics`.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> table = airflock.score(short, seeds=3)
+    >>> table.index.tolist(), table.attrs["units"]["phi_vel"]
+    ([0, 1, 2], 'm/s')
     """
     if isinstance(what, xr.Dataset):
+        settings = aero_settings(what, settings) if aero else settings
         values, _ = measure(what, settings)
-        return pd.DataFrame([values])
+        return _about(pd.DataFrame([values]), scenario_of(what, settings))
     scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = score_flights([scenario] * len(found), found, **options)
-    return pd.DataFrame(rows, index=pd.Index(found, name="seed"))
+    return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
+
+
+def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
+    """A table with units and meanings of its columns among its attributes."""
+    known = reports(scenario.measures)
+    table.attrs["units"] = {name: known[name][0] for name in table.columns if name in known}
+    table.attrs["meanings"] = {name: known[name][1] for name in table.columns if name in known}
+    return table
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> pd.DataFrame:
-    """Order parameters at every instant of a recording; the index is time in s."""
+    """Order parameters at every instant of a recording.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Simulated, flown or loaded from a file.
+    settings : mapping, optional
+        Keys such as {"metrics.r_coll": 2.0} that replace those it was flown with.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per frame that is measured, with the time in s as index, and one column per order parameter.
+
+    Raises
+    ------
+    RecordingError
+        If positions are missing or frames are not evenly spaced.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.over_time(airflock.simulate(short))["phi_vel"].shape
+    (6,)
+    """
     return measure(recording, settings)[1]
 
 

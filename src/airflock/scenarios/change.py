@@ -1,22 +1,23 @@
 """Change: a scenario with some of its keys set anew, as a flight in the air takes it."""
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
 from airflock.body.registry import BODIES
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import SETS
-from airflock.scenarios.files import MODELS, make
+from airflock.scenarios.files import MODELS, load, make
 from airflock.scenarios.scenario import Scenario
 
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
 
-def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """The scenario with keys like "model.p_rep" set anew, checked as a whole as if it came from a file.
+def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario with keys set anew, checked as a whole as if it came from a file.
 
-    A flight can take everything that a scenario file says but the number of agents, the dimensions, the motion step and
-    the start. Raises ScenarioError with one line per fault.
+    Its law, its body and its order parameters stay those that it has where they are no names of ours, unless their
+    kind is set anew. Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}
     if scenario.scene.kind == "mesh":  # which was looked for beside the scenario file
@@ -29,7 +30,27 @@ def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         for name, section, known in (("measures", "metrics", SETS), ("vehicle", "body", BODIES))
         if f"{section}.kind" not in settings and document.get(section, {}).get("kind", "") not in ("", *known)
     }
-    new = make(document, scenario.name, settings, law=None if shipped else scenario.model, **own)
+    return make(document, scenario.name, settings, law=None if shipped else scenario.model, **own)
+
+
+def variant(
+    what: Scenario | str | os.PathLike[str], settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False
+) -> Scenario:
+    """A scenario, or the one that a name or file stands for, with keys set anew; law and trust as in `load`."""
+    if not isinstance(what, Scenario):
+        return load(what, settings, law, trust=trust)
+    if law is not None:
+        raise ScenarioError([f"{what.name}: is a Scenario already; give its law to load(name, law=...)"])
+    return remade(what, settings) if settings else what
+
+
+def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """The scenario with keys like "model.p_rep" set anew, for a flight in the air.
+
+    A flight can take everything that a scenario file says but the number of agents, the dimensions, the motion step and
+    the start. Raises ScenarioError with one line per fault.
+    """
+    new = remade(scenario, settings)
     faults = [
         f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"
         for key, what in LASTING.items()

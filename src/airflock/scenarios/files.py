@@ -13,7 +13,9 @@ from airflock.core.contract import body as gathered_body
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import AirflockError, ScenarioError
 from airflock.metrics.registry import as_set
-from airflock.scenarios import checks, formats, geometry, places, schema, wings
+from airflock.scenarios import checks, formats, geometry, places, schema, short_keys, units, wings
+from airflock.scenarios.advice import advice
+from airflock.scenarios.extends import extended
 from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -26,7 +28,19 @@ TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "t
 
 
 def presets() -> dict[str, Path]:
-    """Name → file of every preset shipped with the package."""
+    """Name and file of every preset that comes with the package.
+
+    Returns
+    -------
+    dict
+        Name such as "vasarhelyi_2018/4ms" → path of its file.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> "vicsek_1995/ordered" in airflock.presets()
+    True
+    """
     root = Path(str(resources.files("airflock"))) / "presets"
     return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
 
@@ -42,34 +56,73 @@ def load(
 ) -> Scenario:
     """Scenario from a preset's name or a file.
 
-    settings : keys like "model.p_rep" with the values that replace the file's
-    law      : a flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead
-               of the file's, or one by its name or its file; its parameters start from their defaults
-    metrics  : order parameters of your own measure the flight: a `MetricSet`, a metric, a list of metrics and of names
-               of ours, or a namespace such as globals(); likewise the name of a set or a file
-    body     : a body of your own carries the agents: a `Body`, a namespace, or a name or file
-    trust    : whether code that the file names, such as a law in a Python file, may run
-    Raises ScenarioError with one line per fault.
+    Parameters
+    ----------
+    name : str or path
+        A preset's name or a scenario file (TOML).
+    settings : mapping, optional
+        Keys with the values that replace the file's: whole keys such as "model.p_rep", or their last word where only
+        one section has it. A value may carry a unit: {"delay": "400 ms"}. What is read otherwise than it is written
+        stands in the scenario's `notes`.
+    law : optional
+        A flocking law of your own (a module, a class, a mapping such as globals(), or a Model) flies instead of the
+        file's, or one by its name or its file. Its parameters start from their defaults.
+    metrics : optional
+        Order parameters of your own measure the flight: a `MetricSet`, a metric, a list of metrics and of names of
+        ours, or a namespace such as globals(); likewise the name of a set or a file.
+    body : optional
+        A body of your own carries the agents: a `Body`, a namespace, or a name or file.
+    trust : bool
+        Whether code that the file names, or a file that it extends, may run: a law, a body, order parameters.
+
+    Returns
+    -------
+    Scenario
+        Everything about a flight but the seed, in SI units.
+
+    Raises
+    ------
+    ScenarioError
+        With one line per fault: file, key, value, unit, allowed range, and the nearest right key.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> scenario = airflock.load("vasarhelyi_2018/4ms", {"delay": "400 ms", "agents": 30})
+    >>> scenario.radio.delay, scenario.agents
+    (0.4, 30)
+    >>> airflock.load("vasarhelyi_2018/4ms", {"radio.delay": 60.0})
+    Traceback (most recent call last):
+    airflock.errors.ScenarioError: vasarhelyi_2018/4ms: radio.delay = 60 s lies outside [0, 30] s
     """
-    known = presets()
     text = str(name)
-    path = known.get(text) or Path(text)
-    where = text if text in known else str(path)
-    if not is_file(path):
-        near = get_close_matches(text, known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
-        raise ScenarioError([f"{text}: no such file or preset{hint}"])
+    where = text if text in presets() else str(Path(text))
     with from_outside(where):
-        document: Mapping[str, Any] = read_toml(path)
-        if tells_of_study(document) and "model" not in document:
-            raise ScenarioError([f"{where}: is a study, not a scenario; check it with airflock validate, or evolve it"])
+        document, folder = _read(where, None)
+        document, base = extended(document, where, folder, _read)
         document, own = _given(document, metrics, body)
+        own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
         if law is None:
-            return make(document, where, settings, folder=path.parent, trust=trust, **own)
+            return make(document, where, settings, folder=folder, trust=trust, **own)
         flown = given_law(law)
         kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
         document = {**document, "model": {"kind": kind}, "published": {}}
-        return make(document, where, settings, folder=path.parent, law=flown, trust=trust, **own)
+        return make(document, where, settings, folder=folder, law=flown, trust=trust, **own)
+
+
+def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
+    """Document of a preset or of a file, looked for in a folder, in today's format, and the folder that it lies in."""
+    known = presets()
+    path = known.get(name) or (Path(name) if folder is None else folder / name)
+    if not is_file(path):
+        near = get_close_matches(name, known, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
+        raise ScenarioError([f"{name}: no such file or preset{hint}"])
+    with from_outside(name):
+        document = read_toml(path)
+    if tells_of_study(document) and not {"model", "extends"} & set(document):
+        raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
+    return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
 def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -132,14 +185,18 @@ def make(
     law: Model | None = None,
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
+    notes: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
     """Scenario from a nested dict.
 
-    where : names it in faults; law, measures, vehicle : a model, a metric set, a body given directly, not by name
+    where : names it in faults; notes : what is known of it already
+    law, measures, vehicle : a model, a metric set, a body given directly, not by name
     trust : whether code that the document names may run
     """
-    merged, faults = _merged(formats.current(document, where), settings or {})
+    document = formats.current(document, where)
+    short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
+    merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
     found = law
@@ -160,8 +217,13 @@ def make(
     if measures is None:
         measures, more = checks.metrics_set(merged.get("metrics", {}), folder, trust=trust)
         faults += more
-    own: dict[str, Body | MetricSet] = {"body": vehicle, "metrics": measures}
-    parts, more = _parts(merged, table, found, own)
+    own = SECTIONS | {"body": vehicle.Parameters, "metrics": measures.Parameters}
+    records = ({"model": found.Parameters} if found else {}) | own
+    named, told, more = short_keys.whole_keys(short, records, TOP)
+    faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
+    merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
+    faults += more
+    parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, measures)
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -173,7 +235,8 @@ def make(
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    return replace(scenario, notes=(*_notes(scenario), *places.place_notes(scenario)))
+    notes = (*notes, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    return replace(scenario, notes=notes)
 
 
 def _beside(scene: Any, folder: Path | None) -> Any:
@@ -210,15 +273,12 @@ def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str
 
 
 def _parts(
-    merged: Mapping[str, Any], table: Mapping[str, Any], found: Model | None, own: Mapping[str, Body | MetricSet]
+    merged: Mapping[str, Any], table: Any, found: Model | None, records: Mapping[str, type]
 ) -> tuple[dict[str, Any], list[str]]:
-    """The records of a scenario by section, None where one is faulty; and all their faults.
-
-    own : section → what brings its record
-    """
+    """The records of a scenario by section, None where one is faulty; and all their faults."""
     parts: dict[str, Any] = {}
     faults: list[str] = []
-    for section, record in (SECTIONS | {key: brings.Parameters for key, brings in own.items()}).items():
+    for section, record in records.items():
         given = merged.get(section, {})
         if section == "body" and isinstance(given, Mapping):
             given = {key: value for key, value in given.items() if key != "kind"}
@@ -227,7 +287,7 @@ def _parts(
     top: dict[str, Any] = {key: merged[key] for key in ("agents", "duration", "dt", "update") if key in merged}
     parts["flight"], more = schema.check("", top, Flight)
     faults += more
-    if found is not None:
+    if found is not None and isinstance(table, Mapping):
         keys = {key: value for key, value in table.items() if key != "kind"}
         parts["parameters"], more = schema.check("model", keys, found.Parameters)
         faults += more

@@ -12,13 +12,31 @@ BETWEEN = "between the columns of Table S1"
 
 
 def starting_set(v_flock: float) -> str:
-    """Scenario file (TOML text) for a flocking speed in m/s.
+    """Scenario file for a flocking speed, by the scaling rules of Vásárhelyi et al. 2018.
 
+    Parameters
+    ----------
+    v_flock : float
+        Flocking speed, m/s.
+
+    Returns
+    -------
+    str
+        TOML text; tune it before flying.
+
+    Notes
+    -----
     r0_rep and v_shill grow linearly with v_flock (their ratio to it, which Table S1 holds within 15 %, is interpolated
     between its columns), and v_shill is at least twice v_flock (Table S3). p_rep keeps the product p_rep · r0_rep, the
     repulsion speed at contact, which Table S1 holds near 3 m/s up to 16 m/s. The other gains are interpolated between
     the columns (geometrically in the speed), and held constant outside 4-32 m/s; so the set is Table S1 itself at its
     own speeds. Arena and radio range grow as in Table S2: with the speed above 8 m/s.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> print(airflock.starting_set(6.0).splitlines()[7])
+    v_flock = { value = 6, unit = "m/s", source = "asked for" }
     """
     columns = {
         v: tomllib.loads(presets()[f"vasarhelyi_2018/{v:g}ms"].read_text(encoding="utf-8"))["model"] for v in SPEEDS

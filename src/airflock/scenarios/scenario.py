@@ -13,6 +13,7 @@ from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.parameters import number_names
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
 from airflock.world import arena, goals, scenery, start
@@ -20,7 +21,7 @@ from airflock.world import arena, goals, scenery, start
 
 @dataclass(frozen=True)
 class Scenario:
-    """Everything about a flight but the seed.
+    """Everything about a flight but the seed; `airflock.load` makes one.
 
     model and parameters : the flocking law and its numbers
     body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
@@ -29,6 +30,12 @@ class Scenario:
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
     notes     : what was adjusted, for a person to read
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.load("vasarhelyi_2018/4ms", {"radio.delay": 0.5})
+    <Scenario vasarhelyi_2018/4ms: 100 agents, 600 s, model vasarhelyi_2018, multirotor, square arena of 250 m>
     """
 
     name: str
@@ -51,6 +58,13 @@ class Scenario:
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Scenario {sentence(self)}>"
+
+    def _repr_html_(self) -> str:
+        """Tables of all keys that differ from their defaults, for a notebook."""
+        return html(self)
 
     @property
     def agents(self) -> int:

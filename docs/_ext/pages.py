@@ -1,0 +1,293 @@
+"""Pages made from the code: models, order parameters, robots, rules, keys, commands, presets.
+
+All are written to docs/generated when a build begins; a page is only touched when its text changes.
+"""
+
+import ast
+import re
+import tomllib
+from collections.abc import Iterable
+from inspect import getsource
+from typing import Any
+
+from repository import repository
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from writing import DOCS, ROOT, key_table, plain, prose, put, table
+
+RULES = ("neighbour", "boundary", "flock", "decide")
+PAPERS = {
+    "vasarhelyi_2018": "vasarhelyi_2018", "viragh_2014": "vasarhelyi_2018", "reynolds_1987": "zapotecatl_2016",
+    "vicsek_1995": "vicsek_1995", "couzin_2002": "couzin_2002", "kidger": "kidger", "dimock_2003": "dimock_2003",
+    "formation": "kidger",
+}  # fmt: skip
+PICTURES = {
+    "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
+    "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "kidger": "30_city", "formation": "40_display",
+    "dimock_2003": "51_formation_flight",
+}  # fmt: skip
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages before sphinx looks for them."""
+    app.connect("config-inited", lambda *_: write_all(), priority=1)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def write_all() -> None:
+    """Write every generated page."""
+    models()
+    order_parameters()
+    robots()
+    vocabulary()
+    keys()
+    commands()
+    presets()
+    repository()
+
+
+def equations(name: str) -> dict[str, str]:
+    """Equations of a model by the function that computes them."""
+    parts = re.split(r"^## (\w+)\n", (DOCS / "equations" / f"{name}.md").read_text(encoding="utf-8"), flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def models() -> None:
+    """A page for each model: docstring, equations beside code, parameters, presets, what reproduces."""
+    from airflock.scenarios.files import MODELS, find_model, load
+    from airflock.scenarios.files import presets as known
+    from airflock.scenarios.keys import keys as keys_of
+
+    scenarios = {name: load(name) for name in known()}
+    rows = []
+    for name in MODELS:
+        model = find_model(name)
+        title, _, rest = model.doc.strip().partition("\n")
+        source = (ROOT / "src/airflock/models" / f"{name}.py").read_text(encoding="utf-8")
+        functions = {
+            node.name: ast.get_source_segment(source, node) or ""
+            for node in ast.parse(source).body
+            if isinstance(node, ast.FunctionDef)
+        }
+        written = equations(name)
+        missing = sorted(set(written) - set(functions))
+        if missing:
+            raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
+        pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
+        pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`. ")
+        pieces.append(f"[A picture of it](/generated/gallery/{PICTURES[name]}) is in the gallery.\n")
+        pieces.append("\n## Equations beside code\n")
+        for rule, text in written.items():
+            code = functions[rule]
+            pieces.append(
+                f"\n### {rule}\n\n:::::{{container}} beside\n::::{{container}} equation\n{text.strip()}\n::::\n"
+                f"::::{{container}} code\n```python\n{code}\n```\n::::\n:::::\n"
+            )
+        pieces.append("\n## Parameters\n\n" + key_table(keys_of(name)))
+        mine = {key: found for key, found in scenarios.items() if found.model.name == name}
+        if mine:
+            listed = ((f"`{key}`", plain(str(found.document.get("title", "")))) for key, found in mine.items())
+            pieces.append("\n## Presets\n\n" + table(("preset", "what it is"), listed))
+            first = next(iter(mine))
+            pieces.append(f"\n```sh\nairflock run {first} --plot flight.png\n```\n")
+        pieces.append(f"\n## What reproduces\n\n{_reproduced(name)}\n")
+        put(f"models/{name}.md", "".join(pieces))
+        rows.append((f"[`{name}`]({name}.md)", plain(title), model.command, len(mine)))
+    index = "# Models\n\nOne publication, one file. Each page has the paper's equations beside the code that flies.\n\n"
+    index += table(("model", "publication", "command", "presets"), rows)
+    index += "\n```{toctree}\n:hidden:\n\n" + "\n".join(MODELS) + "\n```\n"
+    put("models/index.md", index)
+
+
+def _reproduced(name: str) -> str:
+    paper = PAPERS[name]
+    link = f"[{paper}](../papers/{paper}/index.md)"
+    if name == "viragh_2014":
+        return f"It is Algorithm A of {link}, and is compared there."
+    if name == "formation":
+        return f"It is ours. What its displays do is on the page of {link}."
+    return f"Every number that was compared with the publication, hit or miss, is on the page of {link}."
+
+
+def order_parameters() -> None:
+    """Definition, unit, range and reference of every order parameter."""
+    from airflock.metrics import fitness_dimock, fitness_kidger, fitness_vasarhelyi, registry
+
+    known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
+    homes: dict[str, Any] = {}
+    units: dict[str, tuple[str, str]] = {}
+    sets: dict[str, list[str]] = {}
+    for kind, found in registry.SETS.items():
+        for metric in found:
+            homes |= {name: metric.sample for name in metric.reports if name not in homes}
+        for name, about in registry.reports(kind).items():
+            units.setdefault(name, about)
+            sets.setdefault(name, []).append(kind)
+    for module in (fitness_kidger, fitness_dimock, fitness_vasarhelyi):
+        homes |= dict.fromkeys(module.REPORTS, module.fitness)
+    wrong = sorted(set(units) ^ set(known))
+    if wrong:
+        raise ExtensionError(f"order_parameters.toml and metrics/registry.py differ in {', '.join(wrong)}")
+    import sys
+
+    pieces = [
+        "# Order parameters\n\nWhat a flight is scored with. The key `metrics.kind` picks a set; "
+        "`airflock keys metrics` lists what they can be told.\n\n",
+        table(("metrics.kind", "order parameters"), ((f"`{k}`", _names(registry.reports(k))) for k in registry.SETS)),
+        "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
+        "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
+        "$\\Theta$ is 1 above zero, else 0.\n",
+    ]
+    for name, (unit, meaning) in units.items():
+        about = known[name]
+        meant = plain(meaning)
+        pieces.append(f"\n({name})=\n## {name}\n\n{meant[0].upper()}{meant[1:]}.\n\n$${about['formula']}$$\n\n")
+        home = homes.get(name)
+        reference = ""
+        if home is not None:
+            module = sys.modules[home.__module__]
+            reference = plain((module.__doc__ or "").strip().split("\n\n")[0].replace("\n", " "))
+        rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
+        rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
+        pieces.append(table(("what", "of it"), rows))
+        pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
+    put("order_parameters.md", "".join(pieces))
+
+
+def _names(found: Iterable[str]) -> str:
+    return ", ".join(f"[{name}](#{name})" for name in found)
+
+
+def robots() -> None:
+    """Bodies, sensors, radio and wind: what stands between a command and a motion."""
+    import sys
+
+    from airflock.body import radio, sensors, wind
+    from airflock.body.registry import BODIES
+    from airflock.scenarios.keys import keys as keys_of
+
+    pieces = [
+        "# Bodies, sensors, radio, wind\n\nA model commands; a body obeys as far as it can. Neighbours hear of it "
+        "through the radio, and an agent knows itself through its sensors.\n"
+    ]
+    for name, body in BODIES.items():
+        module = sys.modules[body.move.__module__]
+        pieces.append(f'\n## body.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
+        pieces.append(f"It takes a command of kind {body.accepts}.\n\n```python\n{getsource(body.move)}```\n\n")
+        pieces.append(key_table(keys_of(name)))
+    for name, module in (("sensors", sensors), ("radio", radio), ("wind", wind)):
+        pieces.append(f"\n## {name}\n\n{prose(module.__doc__ or '')} {prose(module.Parameters.__doc__ or '')}\n\n")
+        rules = [value for value in vars(module).values() if getattr(value, "__module__", "") == module.__name__]
+        for rule in rules:
+            if not isinstance(rule, type):
+                pieces.append(f"```python\n{getsource(rule)}```\n\n")
+        pieces.append(key_table(keys_of(name)))
+    put("robots.md", "".join(pieces))
+
+
+def vocabulary() -> None:
+    """What each kind of rule may ask for, by name."""
+    from airflock.core.vocabulary import VOCABULARY, Percept
+
+    told = {
+        "reach": "of a model: the largest distance at which a neighbour matters, m",
+        "sight": "of a model: how far `percept.cast` looks, m",
+        "wall_reach": "of a model: the distance beyond which a surface says nothing, m",
+        "neighbour": "of a model: asked for each neighbour that is heard; returns Sums",
+        "boundary": "of a model: asked for each wall and obstacle; returns Walls",
+        "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
+        "decide": "of a model: returns the command, and its Memory where it has one",
+        "move": "of a body: returns the velocity after a step",
+        "pair": "of an order parameter: asked for each pair of agents",
+        "linked": "of an order parameter: whether two agents belong to one cluster",
+        "agent": "of an order parameter: asked for each agent",
+        "member": "of an order parameter: asked for each member of a cluster",
+        "cluster": "of an order parameter: asked for each cluster",
+        "sample": "of an order parameter: the values of one instant",
+        "survey": "of an order parameter: asked once for the whole flock",
+        "within": "of an order parameter: distance beyond which it contributes nothing, m",
+    }
+    wrong = sorted(set(told) ^ set(VOCABULARY))
+    if wrong:
+        raise ExtensionError(f"the page of the vocabulary does not know the rules {', '.join(wrong)}")
+    pieces = [
+        "# What a rule may ask for\n\nA rule is a plain function of floats. Its argument names, in any order, say what "
+        "it wants to know; a flight computes only what is asked for. A difference is always neighbour minus own.\n"
+    ]
+    for kind, names in VOCABULARY.items():
+        rows = ((f"`{name}`", plain(text)) for name, text in names.items())
+        pieces.append(f"\n## {kind}\n\nA rule {told[kind]}.\n\n{table(('name', 'what it is'), rows)}")
+    pieces.append("\n## percept\n\nWhat `decide` may call of its percept.\n\n")
+    methods = (getattr(Percept, name) for name in ("ray", "cast", "normal", "uniform"))
+    rows = ((f"`percept.{m.__name__}`", plain(" ".join((m.__doc__ or "").split()))) for m in methods)
+    put("vocabulary.md", "".join(pieces) + table(("call", "what it gives"), rows))
+
+
+def keys() -> None:
+    """Every key of a scenario file, and the units that values may carry."""
+    from airflock.scenarios.files import MODELS
+    from airflock.scenarios.keys import about, records
+    from airflock.scenarios.keys import keys as keys_of
+    from airflock.scenarios.units import UNITS
+
+    pieces = [
+        "# Every key of a scenario file\n\nThe same lists are printed by `airflock keys`, `airflock keys radio`, "
+        "`airflock keys delay`, and with `--json` for machines. A dash means that the value comes from the rest of the "
+        "scenario. Four more keys stand at the top: `title`, `extends` (a preset or file to begin from), `published` "
+        "(what a paper reports), and `model.kind` and `body.kind` name the law and the body.\n"
+    ]
+    for name in records():
+        head = f'model.kind = "{name}"' if name in MODELS else name
+        pieces.append(f"\n## {head}\n\n{plain(about(name))}\n\n{key_table(keys_of(name))}")
+    pieces.append(
+        '\n## Units\n\nA plain number is in the declared SI unit. A text such as `"400 ms"`, or a table with value '
+        "and unit, is converted; a note tells every conversion.\n\n"
+    )
+    rows = ((f"`{unit}`", ", ".join(f"`{other}`" for other in known)) for unit, known in UNITS.items())
+    pieces.append(table(("declared", "also"), rows))
+    put("keys.md", "".join(pieces))
+
+
+def commands() -> None:
+    """Every command with its options, and the function that does the same."""
+    import typer.main
+
+    from airflock.cli.counterparts import COUNTERPARTS
+    from airflock.cli.main import app
+
+    group = typer.main.get_command(app)
+    pieces = [
+        "# Commands and functions\n\nEvery command has a function that does the same, and its options are that "
+        "function's arguments.\n\n",
+        table(("command", "in Python"), ((f"[`airflock {n}`](#{n})", f"`{c.call}`") for n, c in COUNTERPARTS.items())),
+    ]
+    for name, command in sorted(group.commands.items()):  # type: ignore[attr-defined]
+        pieces.append(f"\n({name})=\n## {name}\n\n{plain(_help(command.help or ''))}\n\n")
+        rows = []
+        for option in command.params:
+            named = option.opts[0].startswith("-")
+            flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
+            about = COUNTERPARTS[name].options.get(option.name, "")
+            argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
+            rows.append((flag, plain(getattr(option, "help", "") or ""), argument))
+        pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")
+    put("commands.md", "".join(pieces))
+
+
+def _help(text: str) -> str:
+    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text)
+
+
+def presets() -> None:
+    """All presets with their titles."""
+    from airflock.scenarios.files import load
+    from airflock.scenarios.files import presets as known
+
+    rows = []
+    for name in known():
+        found = load(name)
+        size = f"{found.agents} agents, {found.flight.duration:g} s"
+        rows.append((f"`{name}`", plain(str(found.document.get("title", ""))), size))
+    text = "# Presets\n\nFly one with `airflock run NAME`, see its file with `airflock presets NAME`, "
+    text += 'begin your own from it with `extends = "NAME"`.\n\n'
+    put("presets.md", text + table(("name", "what it is", "size"), rows))

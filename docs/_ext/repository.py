@@ -1,0 +1,73 @@
+"""The Markdown of the repository as pages: reports on papers, decisions, ARCHITECTURE, with links that hold here."""
+
+import re
+import shutil
+from pathlib import Path
+
+from writing import DOCS, OUT, ROOT, put
+
+
+def repository() -> None:
+    """Papers' reports, decisions and other Markdown of the repository, with links that hold within the site."""
+    for name in ("ARCHITECTURE", "CONTRIBUTING", "CHANGELOG"):
+        copy(ROOT / f"{name}.md", f"project/{name.lower()}.md")
+    copy(DOCS / "evolve.md", "evolve.md")
+    decisions = sorted((DOCS / "decisions").glob("*.md"))
+    for path in decisions:
+        copy(path, f"project/decisions/{path.name}")
+    listed = "\n".join(path.stem for path in decisions)
+    head = "# Decisions\n\nWhat was weighed and why it was decided so.\n\n"
+    put("project/decisions/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
+    papers = sorted(path for path in (ROOT / "papers").iterdir() if (path / "README.md").is_file())
+    for folder in papers:
+        extra = [path for path in sorted(folder.glob("*.md")) if path.name != "README.md"]
+        tree = "\n".join(path.stem.lower() for path in extra)
+        after = f"\n\n```{{toctree}}\n:maxdepth: 1\n\n{tree}\n```\n" if extra else ""
+        copy(folder / "README.md", f"papers/{folder.name}/index.md", after)
+        for path in extra:
+            copy(path, f"papers/{folder.name}/{path.stem.lower()}.md")
+    listed = "\n".join(f"{path.name}/index" for path in papers)
+    head = (
+        "# Papers\n\nEvery publication that is recomputed: each number that was compared, what was flown for it, and "
+        "whether it was met. `airflock paper NAME` flies it again.\n\n"
+    )
+    put("papers/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
+
+
+def copy(source: Path, name: str, after: str = "") -> None:
+    """A Markdown file of the repository: pictures come along, links to files that are no pages become their names."""
+    target = OUT / name
+
+    def link(match: re.Match[str]) -> str:
+        bang, text, where = match[1], match[2], match[3]
+        path, _, anchor = where.partition("#")
+        if where.startswith(("http://", "https://", "#")):
+            return match[0] if not where.startswith("#") else text
+        file = (source.parent / path).resolve()
+        if bang and file.is_file():
+            picture = target.parent / "pictures" / file.name
+            picture.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, picture)
+            return f"![{text}](pictures/{file.name})"
+        page = _page_of(file)
+        if page is not None:
+            return f"[{text}](/generated/{page})"
+        return f"{text} (`{path}`)" if path.strip("./") != text.strip("`") else text
+
+    text = source.read_text(encoding="utf-8")
+    put(name, re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, text) + after)
+
+
+def _page_of(file: Path) -> str | None:
+    """The generated page of a file of the repository; None if it has none."""
+    if not file.is_relative_to(ROOT):
+        return None
+    parts = file.relative_to(ROOT).parts
+    if parts[0] == "papers" and len(parts) in (2, 3) and (len(parts) == 2 or file.suffix == ".md"):
+        rest = "index" if len(parts) == 2 or parts[2] == "README.md" else file.stem.lower()
+        return f"papers/{parts[1]}/{rest}.md"
+    if parts[:2] == ("docs", "decisions"):
+        return f"project/decisions/{parts[2] if len(parts) == 3 else 'index.md'}"
+    if parts[-1] in ("ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md") and len(parts) == 1:
+        return f"project/{parts[-1].lower()}"
+    return "evolve.md" if parts == ("docs", "evolve.md") else None

@@ -1,0 +1,22 @@
+"""
+How much wind a flock bears
+===========================
+
+Gusts push all drones; beyond some strength they are pushed over the walls.
+"""
+
+from matplotlib.figure import Figure
+
+import airflock
+
+gusts = [0.0, 5.0, 10.0, 15.0, 20.0, 25.0]
+settings = {"agents": 40, "duration": 200.0}
+table = airflock.sweep("vasarhelyi_2018/4ms", {"wind.gust": gusts}, seeds=4, settings=settings)
+mean = table.groupby("wind.gust")[["phi_corr", "f_wall"]].mean()
+
+figure = Figure(figsize=(6, 3.5), layout="constrained")
+axes = figure.subplots()
+for name, marker in (("phi_corr", "o"), ("f_wall", "s")):
+    axes.plot(mean.index, mean[name], marker=marker, label=name)
+axes.set(xlabel="standard deviation of the gusts, m/s", ylim=(0, 1.05))
+axes.legend(frameon=False)

@@ -1,0 +1,11 @@
+"""
+A drone display
+===============
+
+Points of a shape are assigned to drones so that the squared ways are least; they are assigned anew when drones fail.
+"""
+
+import airflock
+
+show = airflock.display(["AIR", "FLY"], 60, failing=0.05, seed=1)
+figure = airflock.plots.stood(show, ["AIR", "FLY"])

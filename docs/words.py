@@ -1,0 +1,97 @@
+"""Check the words of the documentation: one spelling for each term, no sentence of more than 35 words.
+
+python docs/words.py          # tells file, line and what is wrong; exit status 1 if anything is
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+DOCS = Path(__file__).parent
+LONGEST = 35  # words of a sentence
+# what not to write → what the glossary, or plain English as we spell it, has instead
+SPELLINGS = {
+    r"neighbors?": "neighbour", r"behaviors?": "behaviour", r"colors?": "colour", r"optimi[z]\w*": "optimise",
+    r"minimi[z]\w*": "minimise", r"maximi[z]\w*": "maximise", r"centers?": "centre", r"flight logs?": "recording",
+    r"latency": "delay", r"crash(?:es)?": "collision", r"time lag": "delay", r"shilling": "shill agent",
+    r"order-parameters?": "order parameter", r"hyper-?parameters?": "parameter", r"swarm law": "law",
+    r"ruleset": "law", r"random seed": "seed", r"trajector(?:y|ies) file": "recording", r"config(?: file)?": "scenario",
+    r"parameter file": "scenario", r"utili[sz]e": "use", r"leverage": "use", r"in order to": "to",
+}  # fmt: skip
+ALLOWED = {"glossary.md": {"latency", "flight logs"}}
+
+
+def main() -> int:
+    """Print every fault; 1 if there is one."""
+    faults = [fault for path in pages() for fault in faults_of(path)]
+    for fault in faults:
+        print(fault)
+    return int(bool(faults))
+
+
+def pages() -> list[Path]:
+    """Texts written by hand: pages, and examples with their comments."""
+    scripts = [path for folder in ("gallery", "notebooks", "tours") for path in sorted((DOCS / folder).glob("*.py"))]
+    return [*sorted(DOCS.glob("*.md")), *sorted((DOCS / "equations").glob("*.md")), *scripts]
+
+
+def faults_of(path: Path) -> Iterator[str]:
+    """Faults of one text, each with file and line."""
+    allowed = ALLOWED.get(path.name, set())
+    for line, text in paragraphs(path):
+        for wrong, right in SPELLINGS.items():
+            for match in re.finditer(rf"\b{wrong}\b", text, re.IGNORECASE):
+                if match[0].lower() not in allowed:
+                    yield f"{path.relative_to(DOCS)}:{line}: {match[0]!r}: write {right}"
+        for sentence in re.split(r"(?<=[.!?:;])\s+", text):
+            count = len(re.findall(r"[A-Za-zÀ-ž0-9][\w'’.-]*", sentence))
+            if count > LONGEST:
+                yield f"{path.relative_to(DOCS)}:{line}: a sentence of {count} words: {sentence[:60]} ..."
+
+
+def paragraphs(path: Path) -> Iterator[tuple[int, str]]:
+    """Line number and text of each paragraph, without code, equations and markup; a glossary's fence is no code."""
+    text = path.read_text(encoding="utf-8")
+    lines = _comments(text) if path.suffix == ".py" else list(enumerate(text.splitlines(), 1))
+    fenced, begun, gathered = False, 0, []
+    for number, line in [*lines, (0, "")]:
+        if line.lstrip().startswith("```") and "{glossary}" not in line:
+            fenced = not fenced
+            continue
+        ends = not line.strip() or line.lstrip().startswith(("|", "#", "* ", "$$", ":::", "```"))
+        if (ends or fenced) and gathered:
+            yield begun, _plain(" ".join(gathered))
+            gathered = []
+        if fenced or not line.strip() or line.lstrip().startswith(("$$", ":::", "```")):
+            continue
+        if line.lstrip().startswith("|"):
+            for cell in line.strip().strip("|").split(" | "):
+                yield number, _plain(cell)
+            continue
+        begun = begun if gathered else number
+        gathered.append(line.strip())
+
+
+def _comments(text: str) -> list[tuple[int, str]]:
+    """The docstring and the comments of a script, line by line; code becomes an empty line."""
+    docstring = ast.get_docstring(ast.parse(text), clean=True) or ""
+    head = list(enumerate(docstring.splitlines(), 2))
+    body = [
+        (number, line[2:] if line.startswith("# ") and not line.startswith("# %%") else "")
+        for number, line in enumerate(text.splitlines(), 1)
+        if number > len(head) + 1
+    ]
+    return [(n, "" if re.fullmatch(r"[=-]{3,}", line) else line) for n, line in [*head, (0, ""), *body]]
+
+
+def _plain(text: str) -> str:
+    """Text without code, equations and targets of links."""
+    text = re.sub(r"`[^`]*`", "x", text)
+    text = re.sub(r"\$[^$]*\$", "x", text)
+    return re.sub(r"\]\([^)]*\)", "]", text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,56 @@
+"""Verb keys: every key that a scenario file may hold."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from airflock.cli import options, tables
+
+if TYPE_CHECKING:
+    from airflock.scenarios.keys import Key
+
+
+def keys(
+    section: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SECTION|MODEL|KEY",
+            help="For instance radio, couzin_2002, model, body, top, or delay.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the sections of a scenario file, or every key of one: meaning, unit, range, default and source.
+
+    Example: airflock keys radio
+    """
+    from airflock.scenarios import keys as known
+
+    found = known.keys(section)
+    if as_json:
+        tables.emit_json([{**key._asdict(), "options": list(key.options)} for key in found])
+        return
+    if section is None:
+        names = list(known.records())
+        width = max(map(len, names))
+        for name in names:
+            count = len(known.keys(name))
+            typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {known.about(name)}")
+        return
+    _print(found)
+
+
+def _print(found: "list[Key]") -> None:
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.text import Text
+
+    console = Console()
+    width = max(len(key.name) for key in found)
+    for key in found:
+        owner = f"   ({key.of})" if len({key.of for key in found}) > 1 and key.of else ""
+        line = Text.assemble((f"{key.name:<{width}}", "bold"), f"   {key.standard}   [{key.allowed}]", (owner, "cyan"))
+        source = f" ({key.source})" if key.source else ""
+        console.print(line)
+        console.print(Padding(Text.assemble(key.meaning, (source, "dim")), (0, 0, 0, 4)))

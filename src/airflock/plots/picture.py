@@ -1,0 +1,124 @@
+"""One door to the pictures of a scenario or a recording, by the name of the kind."""
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from airflock.errors import AirflockError
+from airflock.plots.exposure import exposure
+from airflock.plots.flocked import flocked
+from airflock.plots.rays import rays
+from airflock.plots.rules import rules
+from airflock.plots.series import series
+from airflock.plots.through import through
+from airflock.plots.trajectories import trajectories
+from airflock.plots.transfer import transfer
+from airflock.recordings.files import load_recording
+from airflock.recordings.flights import simulate
+from airflock.recordings.scores import scenario_of
+from airflock.scenarios.change import variant
+from airflock.scenarios.scenario import Scenario
+
+KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked")
+OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
+What = Scenario | xr.Dataset | str | os.PathLike[str]
+
+
+def plot(
+    what: What,
+    kind: str = "trajectories",
+    *,
+    seed: int = 0,
+    start: float | None = None,
+    stop: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    trust: bool = False,
+) -> Figure:
+    """Draw a flight, a recording, or the rules of a model.
+
+    Parameters
+    ----------
+    what : Scenario, xarray.Dataset, str or path
+        A scenario or the name of one, which is flown; or a recording or a file (.nc) of one.
+    kind : str
+        trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; rules of a
+        model; transfer, the partial fitnesses.
+    seed : int
+        Seed of the flight, where a scenario is flown.
+    start, stop : float, optional
+        Window of time, s; which one is shown otherwise stands in the picture's title.
+    settings : mapping, optional
+        Keys of the scenario to change, such as {"radio.delay": 0.5}; a recording takes none.
+    law : optional
+        A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
+    trust : bool
+        Whether code that the scenario file names may run.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        `airflock.plots.save_figure(figure, "flight.png")` writes it.
+
+    Raises
+    ------
+    AirflockError
+        If there is no such kind, or the kind does not fit what is drawn.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> figure = airflock.plot("vasarhelyi_2018/4ms", "rules")
+    >>> len(figure.axes) > 0
+    True
+    """
+    if kind not in KINDS:
+        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}")
+    if kind in OF_A_SCENARIO:
+        scenario = _scenario(what, settings, law, trust)
+        return rules(scenario) if kind == "rules" else transfer(scenario)
+    return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop)
+
+
+def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None) -> Figure:
+    if kind in ("scene", "space"):
+        return through(recording, start=start, stop=stop, space=kind == "space")
+    if kind == "rays":
+        return rays(recording, start=start)
+    if kind == "flocked":
+        return flocked(recording, start=start, stop=stop)
+    if kind == "series":
+        return series(recording, start=start, stop=stop)
+    if kind == "exposure":
+        return exposure(recording, start=start, stop=stop)
+    return trajectories(recording, start=start, stop=stop)
+
+
+def _is_file(what: Any) -> bool:
+    return isinstance(what, (str, os.PathLike)) and str(what).lower().endswith(".nc")
+
+
+def _scenario(what: What, settings: Mapping[str, Any] | None, law: Any, trust: bool) -> Scenario:
+    if isinstance(what, xr.Dataset) or _is_file(what):
+        return scenario_of(what if isinstance(what, xr.Dataset) else load_recording(what), settings)  # type: ignore[arg-type]
+    return variant(what, settings, law, trust=trust)
+
+
+def flight_of(
+    what: What, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
+) -> xr.Dataset:
+    """The recording that is given or named, or a flight of the scenario that is."""
+    if isinstance(what, xr.Dataset) or _is_file(what):
+        if settings or law is not None:
+            raise AirflockError(
+                f"{_name(what)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
+            )
+        return what if isinstance(what, xr.Dataset) else load_recording(what)  # type: ignore[arg-type]
+    return simulate(_scenario(what, settings, law, trust), seed)
+
+
+def _name(what: Any) -> str:
+    return "recording" if isinstance(what, xr.Dataset) else str(what)

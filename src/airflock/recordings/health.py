@@ -1,0 +1,76 @@
+"""Whether this machine can fly: versions, processor, GPUs, and the same short flight on each device."""
+
+import platform
+import shutil
+import time
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from airflock import __version__
+from airflock.engine.cuda import device as gpu
+from airflock.engine.simulate import score_flight, score_flights
+from airflock.engine.store import cache_folder, cache_trouble, drivers, usual_folder
+from airflock.engine.threads import cores
+from airflock.recordings.flights import processor
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+
+PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
+EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
+
+
+def doctor() -> dict[str, Any]:
+    """Versions, processor, GPUs and cache of this machine, and a ten-second self-check on each device.
+
+    Returns
+    -------
+    dict
+        Names and findings. `self_check` (and `gpu_self_check` where there is a GPU) is "passed" or "failed";
+        `first_flight_s` and `second_flight_s` are s, `cache_free_gb` is GB, `cache_mb` is MB.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.doctor()["self_check"]
+    'passed'
+    """
+    found: dict[str, Any] = {"airflock": __version__, "python": platform.python_version(), "processor": processor()}
+    found |= {"cores": cores(), "cache": str(cache_folder())}
+    trouble = cache_trouble(usual_folder())
+    found |= {"cache_note": f"for this process only: {trouble}"} if trouble else {}
+    kept = drivers(cache_folder())
+    found |= {"cache_drivers": len(kept), "cache_mb": round(sum(size for _, size, _ in kept) / 1e6, 1)}
+    found["cache_free_gb"] = round(shutil.disk_usage(cache_folder()).free / 1e9, 1)
+    for name in (*PACKAGES, *EXTRAS):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    began = time.perf_counter()
+    scenario = load("vasarhelyi_2018/4ms", {"duration": 10.0})
+    values = score_flight(scenario, 0)
+    found["first_flight_s"] = round(time.perf_counter() - began, 3)
+    began = time.perf_counter()
+    again = score_flight(scenario, 0)
+    found["second_flight_s"] = round(time.perf_counter() - began, 4)
+    healthy = values == again and 0.5 < values["phi_vel"] < 5.0 and values["r_min"] > 0.0
+    found["self_check"] = "passed" if healthy else f"failed: {values}"
+    return found | _gpu(scenario, values)
+
+
+def _gpu(scenario: Scenario, known: dict[str, float]) -> dict[str, Any]:
+    """What GPUs there are, or why none can be used; and the same flight on the first of them."""
+    fault = gpu.trouble()
+    if fault is not None:
+        return {"gpu": fault}
+    found: dict[str, Any] = {}
+    for number, device in enumerate(gpu.describe()):
+        text = "{name}, compute capability {compute_capability}, {multiprocessors} multiprocessors, {free_gb} of "
+        found[f"gpu_{number}" if number else "gpu"] = (text + "{memory_gb} GB free").format(**device)
+    for name in ("first", "second"):
+        began = time.perf_counter()
+        values = score_flights([scenario], [0], device="cuda")[0]
+        found[f"gpu_{name}_flight_s"] = round(time.perf_counter() - began, 4)
+    near = all(abs(values[key] - known[key]) < 0.02 * max(1.0, abs(known[key])) for key in ("phi_vel", "r_min_mean"))
+    found["gpu_self_check"] = "passed" if near else f"failed: {values}"
+    return found

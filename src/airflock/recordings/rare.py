@@ -1,0 +1,38 @@
+"""What a number of flights can say of rare events, and which flight was the worst."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from scipy.stats import beta
+
+CONFIDENCE = 0.95
+
+
+def upper_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> float:
+    """Largest probability of an event per flight that so few events allow (Clopper and Pearson 1934, one-sided).
+
+    events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 - confidence)^(1/n).
+    """
+    if events >= flights:
+        return 1.0
+    return float(beta.ppf(confidence, events + 1, flights - events))
+
+
+def remarks(rows: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str]:
+    """Sentences under a table of several flights: how often there were collisions at most, and the worst seed."""
+    if len(rows) < 2:
+        return []
+    said = []
+    if all("n_coll" in row for row in rows):
+        hit = sum(row["n_coll"] > 0.0 for row in rows)
+        bound = upper_bound(hit, len(rows))
+        said.append(
+            f"collisions in {hit} of {len(rows)} flights: with {100.0 * CONFIDENCE:g} % confidence at most "
+            f"{100.0 * bound:.2g} % of such flights have one"
+        )
+    if all("fitness" in row for row in rows):
+        worst, row = min(zip(seeds, rows, strict=True), key=lambda pair: pair[1]["fitness"])
+        said.append(
+            f"worst flight: seed {worst}, fitness {row['fitness']:.4g}; airflock plot ... --seed {worst} draws it"
+        )
+    return said

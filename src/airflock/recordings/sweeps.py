@@ -1,0 +1,133 @@
+"""Sweeps: order parameters over a grid of values of any keys."""
+
+import itertools
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any
+
+import pandas as pd
+
+from airflock.engine.simulate import picked, score_flights
+from airflock.errors import AirflockError, ScenarioError
+from airflock.metrics.registry import numbers_of
+from airflock.scenarios.change import variant
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seeds
+
+
+def sweep(
+    what: Scenario | str | os.PathLike[str],
+    over: Mapping[str, Sequence[Any]],
+    seeds: int | Iterable[int] = 5,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    law: Any = None,
+    trust: bool = False,
+    threads: int | None = None,
+    precision: int = 32,
+    done: Callable[[], None] | None = None,
+    device: str = "cpu",
+    say: Callable[[str], None] | None = None,
+) -> pd.DataFrame:
+    """Fly a scenario over a grid of values, several seeds at each point of the grid.
+
+    Parameters
+    ----------
+    what : Scenario, str or path
+        A scenario, or the name of a preset or scenario file.
+    over : mapping
+        Keys and the values that each takes; several keys make a grid.
+    seeds : int or iterable of int
+        Number of flights at each point, or their seeds; the same at all points, so that differences are paired.
+    settings : mapping, optional
+        Keys that are changed at all points.
+    law : optional
+        A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
+    trust : bool
+        Whether code that the file names may run.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    precision : int
+        Bits per number, 32 or 64.
+    done : callable, optional
+        Called after each flight.
+    device : str
+        cpu, cuda, python, or auto, which tells `say` what it picked.
+    say : callable, optional
+        Told what auto picked.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per flight (points times seeds): a column for each key of `over`, the seed, and the order parameters.
+
+    Raises
+    ------
+    ScenarioError
+        With the faults of all points, before anything flies.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> table = airflock.sweep(short, {"radio.delay": [0.0, 0.4, 0.8]}, seeds=2)
+    >>> table.shape[0], list(table.columns[:2])
+    (6, ['radio.delay', 'seed'])
+    """
+    points = grid(over)
+    scenarios = scenarios_at(what, points, settings, law, trust=trust)
+    numbers = sound_seeds(seeds)
+    return flown(points, scenarios, numbers, threads=threads, precision=precision, done=done, device=device, say=say)
+
+
+def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    """All combinations of the values of several keys."""
+    return [dict(zip(over, values, strict=True)) for values in itertools.product(*over.values())]
+
+
+def scenarios_at(
+    what: Scenario | str | os.PathLike[str],
+    points: Sequence[Mapping[str, Any]],
+    settings: Mapping[str, Any] | None,
+    law: Any = None,
+    *,
+    trust: bool = False,
+) -> list[Scenario]:
+    """The scenario at each point of a grid; raises ScenarioError with the faults of all."""
+    faults: list[str] = []
+    found = []
+    for point in points:
+        try:
+            changed = {**(settings or {}), **point}
+            found.append(variant(what, changed, law, trust=trust))
+        except AirflockError as fault:
+            faults += [line for line in str(fault).splitlines() if line not in faults]
+    if faults:
+        raise ScenarioError(faults)
+    return found
+
+
+def flown(
+    points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario], seeds: Sequence[int], **options: Any
+) -> pd.DataFrame:
+    """Tidy table of the flights of all seeds at all points; options as of `sweep`."""
+    jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
+    flights = [found for _, found, _ in jobs]
+    device = picked(flights, options.pop("device"), precision=options["precision"], say=options.pop("say"))
+    rows = score_flights(flights, [seed for _, _, seed in jobs], device=device, **options)
+    return pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+
+
+def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
+    """The order parameter to show: the one asked for, or what the flights are usually judged by; all must report it."""
+    each = [numbers_of(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
+    known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
+    if asked is None:
+        usual = [name for name in (found.measures.best for found in scenarios) if name in known]
+        return str((usual + known + [""])[0])
+    if each and asked not in known:
+        near = get_close_matches(asked, known, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+        raise ScenarioError([f"--show {asked}: no such order parameter; {hint}"])
+    return asked

@@ -1,0 +1,55 @@
+"""Notes on scenarios that are valid but hardly meant; nothing here stops a flight."""
+
+from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.scenario import Scenario
+
+APART = 100.0  # factor between the lengths of a law and of its arena above which one of them is hardly meant
+SEES_WALLS = {"ray", "cast"}
+
+
+def advice(scenario: Scenario) -> list[str]:
+    """What a person should know before flying a scenario."""
+    return [note for note in (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario)) if note]
+
+
+def _speed_alone(scenario: Scenario) -> str:
+    """The preferred speed is another one, and all gains are those of the default's speed."""
+    model, p = scenario.model, scenario.parameters
+    numbers = {name: default for name, declared, default in declarations(p) if isinstance(declared, Quantity)}
+    changed = [name for name, default in numbers.items() if getattr(p, name) != default]
+    if changed != ["v_flock"] or len(numbers) < 4:
+        return ""
+    hint = f"; airflock presets --for-speed {p.v_flock:.4g} gives a starting set"
+    return (
+        f"model.v_flock = {p.v_flock:.4g} m/s, but the other {len(numbers) - 1} numbers of {model.name} are its set "
+        f"for {numbers['v_flock']:g} m/s{hint if model.name == 'vasarhelyi_2018' else ''}"
+    )
+
+
+def _no_walls(scenario: Scenario) -> str:
+    """An arena with walls that the law does not know."""
+    model, world = scenario.model, scenario.world
+    code = getattr(model.decide, "__code__", None)
+    names = set(code.co_names) if code is not None else SEES_WALLS
+    if world.arena == "none" or world.edges != "open" or model.boundary or model.sight or names & SEES_WALLS:
+        return ""
+    return (
+        f"model {model.name} has no rule for walls (boundary), so agents leave the arena; "
+        "world.edges = 'bounce' or 'periodic' keeps them in a square, world.arena = 'none' needs no walls"
+    )
+
+
+def _lengths(scenario: Scenario) -> str:
+    """A law in millimetres in an arena of kilometres, or the other way round."""
+    model, size = scenario.model, largest_extension(scenario.world)
+    known = model.interaction_range or model.reach
+    if not known or not size:
+        return ""
+    reach = float(known(scenario.parameters))
+    if not 0.0 < reach < float("inf") or 1.0 / APART <= reach / (2.0 * size) <= APART:
+        return ""
+    return (
+        f"agents of {model.name} interact within {reach:.3g} m in an arena {2.0 * size:.3g} m across, a factor of "
+        f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are hardly meant"
+    )

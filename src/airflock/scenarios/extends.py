@@ -1,0 +1,68 @@
+"""Scenario files that begin from another: `extends = "vasarhelyi_2018/real_6ms"`."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from airflock.doors import is_file
+from airflock.errors import ScenarioError
+
+LONGEST = 10  # files in a chain of extends
+KINDS = ("model", "body", "scene", "goals", "start")  # sections in which another kind means other keys
+Read = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
+
+
+def extended(document: Mapping[str, Any], where: str, folder: Path | None, read: Read) -> tuple[dict[str, Any], str]:
+    """A document with everything of the file that it extends, and which file that was ("" for none).
+
+    Keys of the document go before those of the file. Where it names another kind of model, body, scene, goals or
+    start, that section's other keys are not taken over. What a paper published of the file is not either.
+
+    where  : name of the document, for faults
+    folder : where the names of files are looked for
+    read   : name of a preset or file, folder → its document and its folder; raises ScenarioError
+    """
+    return _extended(document, where, folder, read, (where,))
+
+
+def _extended(
+    document: Mapping[str, Any], where: str, folder: Path | None, read: Read, chain: tuple[str, ...]
+) -> tuple[dict[str, Any], str]:
+    own = dict(document)
+    name = own.pop("extends", None)
+    if name is None:
+        return own, ""
+    if not isinstance(name, str):
+        raise ScenarioError([f"{where}: extends = {name!r} is not a name; give a preset or a scenario file"])
+    if name in chain or len(chain) > LONGEST:
+        raise ScenarioError([f"{where}: extends = {name!r} comes back to itself: {' → '.join((*chain, name))}"])
+    try:
+        base, place = read(name, folder)
+    except ScenarioError as fault:
+        raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in fault.faults]) from fault
+    base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
+    base.pop("published", None)
+    return {**base, **{key: _section(key, base.get(key), value) for key, value in own.items()}}, name
+
+
+def _section(key: str, base: Any, own: Any) -> Any:
+    """One section: the document's keys over the file's, unless they are of different kinds."""
+    if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
+        return own
+    other = key in KINDS and "kind" in own and _plain(own["kind"]) != _plain(base.get("kind"))
+    return dict(own) if other else {**base, **own}
+
+
+def _plain(value: Any) -> Any:
+    return value.get("value") if isinstance(value, Mapping) else value
+
+
+def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A document whose own files (a law, a body, order parameters, a mesh) are named from anywhere."""
+    result = dict(document)
+    for section, key in (("model", "kind"), ("body", "kind"), ("metrics", "kind"), ("scene", "file")):
+        table = result.get(section)
+        name = _plain(table.get(key)) if isinstance(table, Mapping) else None
+        if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):
+            result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
+    return result

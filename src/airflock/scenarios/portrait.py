@@ -1,0 +1,56 @@
+"""A scenario for a person to read: one sentence, and a table for notebooks."""
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from airflock.core.parameters import Quantity, declarations, with_unit
+from airflock.scenarios.sections import SECTIONS
+
+if TYPE_CHECKING:
+    from airflock.scenarios.scenario import Scenario
+
+SHOWN = 8  # lists of points longer than this are counted, not printed
+
+
+def sentence(scenario: "Scenario") -> str:
+    """Name, size, law, body and arena in one line."""
+    world = scenario.world
+    size = {"square": f" of {world.side:g} m", "circle": f" of radius {world.radius:g} m"}.get(world.arena, "")
+    arena = "no arena" if world.arena == "none" else f"{world.arena} arena{size}"
+    return (
+        f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, model {scenario.model.name}, "
+        f"{scenario.vehicle.name}, {arena}"
+    )
+
+
+def changed(record: object) -> list[tuple[str, str, str]]:
+    """Key, value with unit, and meaning of what differs from its default."""
+    rows = []
+    for name, declared, default in declarations(record):
+        value = getattr(record, name)
+        if value == default:
+            continue
+        if isinstance(declared, Quantity):
+            text = with_unit(f"{value:g}", declared.unit)
+        elif isinstance(value, tuple):
+            text = str(value) if len(value) <= SHOWN else f"{len(value)} entries"
+        else:
+            text = str(value)
+        rows.append((name, text, declared.meaning))
+    return rows
+
+
+def html(scenario: "Scenario") -> str:
+    """A table with everything that differs from the defaults, section by section, and the notes."""
+    records = {"top": scenario.flight, "model": scenario.parameters, "body": scenario.body}
+    records |= {name: getattr(scenario, name) for name in SECTIONS if name != "body"}
+    rows = [
+        f"<tr><td>{escape(name if section == 'top' else f'{section}.{name}')}</td><td>{escape(value)}</td>"
+        f"<td>{escape(meaning)}</td></tr>"
+        for section, record in records.items()
+        for name, value, meaning in changed(record)
+    ]
+    notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
+    heads = "<tr><th>changed key</th><th>value</th><th>meaning</th></tr>"
+    table = f"<table><thead>{heads}</thead><tbody>{''.join(rows)}</tbody></table>"
+    return f"<p><b>{escape(sentence(scenario))}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}"

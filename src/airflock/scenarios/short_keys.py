@@ -1,0 +1,48 @@
+"""Settings by a key's last word: `delay` stands for `radio.delay` where only one section has a delay."""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from airflock.core.parameters import Quantity, declarations
+
+
+def places(records: Mapping[str, type]) -> dict[str, list[str]]:
+    """Last word → whole keys of all sections that have it.
+
+    A key of `metrics` that is taken from the scenario by default (such as metrics.v_flock) gives way to one of the
+    model's of the same name.
+    """
+    found: dict[str, list[str]] = {}
+    for section, record in records.items():
+        for name, declared, _ in declarations(record):
+            if section:
+                derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional
+                if not (derived and name in found):
+                    found.setdefault(name, []).append(f"{section}.{name}")
+    return found
+
+
+def whole_keys(
+    settings: Mapping[str, Any], records: Mapping[str, type], top: tuple[str, ...]
+) -> tuple[dict[str, Any], list[str], list[str]]:
+    """Settings with whole keys, notes of what was found, and faults of keys that are several or none.
+
+    settings : keys that are neither whole ("radio.delay") nor at the top of a file ("agents")
+    records  : section → record of its parameters, "model" first
+    """
+    known = places(records)
+    result: dict[str, Any] = {}
+    notes, faults = [], []
+    for key, value in settings.items():
+        where = known.get(key, [])
+        if len(where) == 1:
+            result[where[0]] = value
+            notes.append(f"{key} is read as {where[0]}")
+        elif where:
+            faults.append(f"{key} is several keys; write {' or '.join(where)}")
+        else:
+            near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
+            full = known.get(near[0], near) if near else []
+            faults.append(f"{key} is no key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
+    return result, notes, faults

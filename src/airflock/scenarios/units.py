@@ -1,0 +1,126 @@
+"""Units that people write, turned into the declared SI units; each conversion is told in a note.
+
+A value may carry its unit as text, `delay = "400 ms"`, or as a table, `delay = { value = 400, unit = "ms" }`.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from airflock.core.parameters import Declaration, Points, Quantity, declarations, with_unit
+
+DEGREE = math.pi / 180.0
+FOOT, MILE, NAUTICAL_MILE = 0.3048, 1609.344, 1852.0
+
+# declared unit → what else may be written → factor to the declared one; feet, miles, pounds and knots are the
+# international ones of 1959, g is the standard gravity of 1901
+UNITS: dict[str, dict[str, float]] = {
+    "m": {
+        "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "ft": FOOT, "yd": 3.0 * FOOT, "mi": MILE,
+        "nmi": NAUTICAL_MILE,
+    },
+    "s": {"us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+    "m/s": {
+        "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6, "ft/s": FOOT, "ft/min": FOOT / 60.0, "mph": MILE / 3600.0,
+        "kn": NAUTICAL_MILE / 3600.0,
+    },
+    "m/s^2": {"cm/s^2": 1e-2, "ft/s^2": FOOT, "g": 9.80665},
+    "1/s": {"Hz": 1.0, "kHz": 1e3, "1/ms": 1e3, "1/min": 1.0 / 60.0},
+    "rad": {"deg": DEGREE, "mrad": 1e-3, "turn": 2.0 * math.pi},
+    "deg": {"rad": 1.0 / DEGREE, "mrad": 1e-3 / DEGREE, "turn": 360.0},
+    "rad/s": {"deg/s": DEGREE, "rpm": 2.0 * math.pi / 60.0},
+    "m^2": {"cm^2": 1e-4, "ft^2": FOOT**2},
+    "m^2/s^2": {"cm^2/s^2": 1e-4, "ft^2/s^2": FOOT**2},
+    "kg": {"g": 1e-3, "lb": 0.45359237},
+    "N": {"mN": 1e-3, "kN": 1e3, "lbf": 4.4482216152605},
+    "kg/m^3": {"g/cm^3": 1e3, "g/L": 1.0},
+    "1": {"%": 1e-2},
+}  # fmt: skip
+SPELLINGS = {
+    "sec": "s", "second": "s", "seconds": "s", "metre": "m", "metres": "m", "meter": "m", "meters": "m",
+    "feet": "ft", "foot": "ft", "kph": "km/h", "kmh": "km/h", "knots": "kn", "kt": "kn", "kts": "kn", "°": "deg",
+    "degrees": "deg", "hz": "Hz", "minutes": "min", "hours": "h", "mps": "m/s", "percent": "%", "μs": "us", "µs": "us",
+}  # fmt: skip
+NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+
+
+def factor(unit: str, declared: str) -> float | None:
+    """Declared units in one of `unit`, for instance 0.001 for ms where s is declared; None if it is no such unit."""
+    name = unit.strip().replace("²", "^2").replace("³", "^3").replace("**", "^").replace("m/s/s", "m/s^2")
+    name = SPELLINGS.get(name, name)
+    return 1.0 if name == declared else UNITS.get(declared, {}).get(name)
+
+
+def converted(document: Mapping[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str], list[str]]:
+    """A document in declared units, notes of what was converted, and faults of units that cannot be.
+
+    document : nested dict of a scenario; records : section → record of its parameters, "" for the keys at the top
+    A key with a faulty unit is left out of the document, so that it is told once.
+    """
+    notes: list[str] = []
+    faults: list[str] = []
+    result = dict(document)
+    for section, record in records.items():
+        known = {name: declared for name, declared, _ in declarations(record)}
+        given = document if not section else document.get(section)
+        if not isinstance(given, Mapping):
+            continue
+        changed = {}
+        for key in known.keys() & given.keys():
+            name = f"{section}.{key}".lstrip(".")
+            changed[key], note, fault = _converted(name, given[key], known[key])
+            notes += [note] if note else []
+            faults += [fault] if fault else []
+        wrong = {key for key in changed if changed[key] is None}
+        table = {key: changed.get(key, value) for key, value in given.items() if key not in wrong}
+        if section:
+            result[section] = table
+        else:
+            result = table | {key: value for key, value in result.items() if key not in known}
+    return result, notes, faults
+
+
+def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, str]:
+    """A value in its declared unit, a note and a fault; the value is None where its unit is none for this key."""
+    if not isinstance(declared, (Quantity, Points)):
+        return given, "", ""
+    long = isinstance(given, Mapping) and "value" in given
+    value, unit = (given["value"], given.get("unit", "")) if long else (given, "")
+    if isinstance(value, str) and not unit:
+        match = NUMBER.fullmatch(value)
+        if match is None:
+            return given, "", ""  # no number at all: told with the allowed range by the check of the section
+        value, unit = float(match[1]), match[2]
+    if not isinstance(unit, str) or unit in ("", declared.unit):
+        if not long and unit == declared.unit and unit:
+            return value, "", ""
+        return given, "", ""
+    times = factor(unit, declared.unit)
+    if times is None:
+        others = ", ".join(UNITS.get(declared.unit, ()))
+        asked = "no unit" if declared.unit in ("", "1") else declared.unit
+        return None, "", f"{name} = {value} {unit}: the unit is {asked}{f', or one of {others}' if others else ''}"
+    scaled = _times(value, times)
+    if scaled is None:
+        return given, "", ""
+    note = f"{name} = {_short(value)} {unit} is {with_unit(_short(scaled), declared.unit)}"
+    if isinstance(scaled, list):
+        note = f"{name} is converted from {unit} to {declared.unit}"
+    return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""
+
+
+def _times(value: Any, times: float) -> Any:
+    """A number, or nested lists of numbers, times a factor; None where something else is in it."""
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, (int, float)):
+        return float(f"{value * times:.12g}") if times != 1.0 else value
+    if isinstance(value, (list, tuple)):
+        scaled = [_times(entry, times) for entry in value]
+        return None if any(entry is None for entry in scaled) else scaled
+    return None
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, (int, float)) else str(value)

@@ -1,0 +1,68 @@
+"""The documentation: words are those of the glossary, sentences short, every model and order parameter has its page."""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from airflock.metrics import registry
+from airflock.scenarios.files import MODELS
+
+DOCS = Path(__file__).parents[2] / "docs"
+sys.path.insert(0, str(DOCS))
+import words  # noqa: E402
+
+LONG = " ".join(["word"] * 36) + "."
+
+
+def test_no_page_breaks_the_rules_of_words():
+    assert [fault for path in words.pages() for fault in words.faults_of(path)] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "fault"),
+    [
+        ("a.md", f"Short.\n\n{LONG}\n", "a.md:3: a sentence of 36 words"),
+        ("a.md", "The neighbor flies.\n", "a.md:1: 'neighbor': write neighbour"),
+        ("a.md", "| head | more |\n|---|---|\n| a | latency |\n", "a.md:3: 'latency': write delay"),
+        ("a.py", f'"""\nTitle\n=====\n\n{LONG}\n"""\n', "a.py:5: a sentence of 36 words"),
+        ("a.py", '"""Title"""\nx = 1\n# %%\n# Our behavior.\n', "a.py:4: 'behavior': write behaviour"),
+    ],
+)
+def test_the_check_of_words_finds_what_is_wrong(tmp_path, monkeypatch, name, text, fault):
+    monkeypatch.setattr(words, "DOCS", tmp_path)
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    (told,) = words.faults_of(path)
+    assert told.startswith(fault)
+
+
+def test_code_and_equations_are_no_words(tmp_path, monkeypatch):
+    monkeypatch.setattr(words, "DOCS", tmp_path)
+    path = tmp_path / "a.md"
+    path.write_text(f"```python\nneighbor = 1  # {LONG}\n```\n\nSee `color` and $latency$.\n", encoding="utf-8")
+    assert list(words.faults_of(path)) == []
+
+
+def test_every_model_has_its_equations_beside_functions_that_exist():
+    for name in MODELS:
+        written = re.findall(r"^## (\w+)$", (DOCS / "equations" / f"{name}.md").read_text(encoding="utf-8"), re.M)
+        source = (DOCS.parent / "src/airflock/models" / f"{name}.py").read_text(encoding="utf-8")
+        functions = {node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
+        assert "decide" in written and set(written) <= functions
+
+
+def test_every_order_parameter_has_formula_and_range():
+    known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
+    assert set(known) == {name for kind in registry.SETS for name in registry.reports(kind)}
+    assert all(entry["formula"] and entry["range"] for entry in known.values())
+
+
+def test_a_tour_takes_less_than_thirty_lines_of_the_user_s_own():
+    for path in (DOCS / "tours").glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        lines = {line for node in tree.body[1:] for line in range(node.lineno, node.end_lineno + 1)}
+        assert len(lines) <= 30, path.name

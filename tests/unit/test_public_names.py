@@ -1,0 +1,119 @@
+"""Public names: typed, each with a docstring of its own and an example that runs; commands and functions match."""
+
+import doctest
+import inspect
+from importlib import import_module
+
+import pytest
+import typer.main
+
+import airflock
+from airflock.cli.counterparts import COUNTERPARTS, LIBRARY
+from airflock.cli.main import app
+
+PACKAGES = {"plots"}
+FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__", "AirflockError", "Scenario", "Parameters"})
+DOCUMENTED = [*FUNCTIONS, "AirflockError", "Scenario", "Parameters"]
+
+
+def the(name):
+    """What stands behind a public name: of a package that can be called, its function."""
+    found = getattr(airflock, name)
+    if inspect.ismodule(found):
+        homes = {"evolve": "airflock.evolve.run", "display": "airflock.display.displays"}
+        found = getattr(import_module(homes[name]), name)
+    return found
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_argument_and_result_has_a_type(name):
+    signature = inspect.signature(the(name))
+    assert signature.return_annotation is not signature.empty
+    untyped = [p.name for p in signature.parameters.values() if p.annotation is p.empty]
+    assert not untyped
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_function_tells_its_arguments_and_its_result(name):
+    function = the(name)
+    text = inspect.getdoc(function) or ""
+    assert "Returns\n-------" in text and "Examples\n--------" in text
+    told = {word.strip(" *") for line in text.splitlines() for word in line.partition(" :")[0].split(",")}
+    missing = set(inspect.signature(function).parameters) - told
+    assert not missing
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_the_example_of_every_public_name_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (test,) = [
+        found for found in doctest.DocTestFinder(recurse=False).find(the(name), name, globs={}) if found.examples
+    ]
+    told = []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL, verbose=False)
+    assert runner.run(test, out=told.append).failed == 0, "".join(told)
+
+
+def test_no_two_docstrings_are_equal():
+    texts = [inspect.getdoc(the(name)) for name in DOCUMENTED]
+    assert len(set(texts)) == len(texts)
+
+
+def test_packages_that_can_be_called_show_the_signature_of_their_function():
+    for name in ("evolve", "display"):
+        assert inspect.signature(getattr(airflock, name)) == inspect.signature(the(name))
+
+
+COMMANDS = typer.main.get_command(app).commands
+
+
+def test_every_command_has_a_function_and_every_function_a_command():
+    assert set(COUNTERPARTS) == set(COMMANDS)
+    assert {found.function for found in COUNTERPARTS.values()} | set(LIBRARY) == set(FUNCTIONS)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_option_has_its_argument(name):
+    found = COUNTERPARTS[name]
+    assert set(found.options) == {option.name for option in COMMANDS[name].params}
+    arguments = inspect.signature(the(found.function)).parameters
+    for option, argument in found.options.items():
+        if argument.isidentifier():
+            assert argument in arguments, f"{name} {option}: airflock.{found.function} has no {argument}"
+        elif argument.startswith("airflock."):
+            home, _, last = argument.partition("(")[0].rpartition(".")
+            assert hasattr(airflock if home == "airflock" else import_module(home), last), argument
+
+
+def test_scores_carry_units_and_meanings_and_a_scenario_shows_itself():
+    short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0, "delay": "400 ms"})
+    table = airflock.score(short)
+    assert set(table.attrs["units"]) == set(table.attrs["meanings"]) == set(table.columns)
+    page = short._repr_html_()
+    assert "0.4 s" in page and "age of neighbours" in page and "delay is read as radio.delay" in page
+    assert "range" not in page  # has its default
+
+
+def test_a_sweep_of_one_point_is_a_score():
+    short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    swept = airflock.sweep(short, {"radio.delay": [0.4]}, seeds=2)
+    scored = airflock.score(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0, "delay": 0.4}), 2)
+    assert swept["phi_vel"].tolist() == scored["phi_vel"].tolist()
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_help_of_every_command_shows_a_call_of_it(name):
+    assert f"Example: airflock {name}" in COMMANDS[name].help
+
+
+def test_keys_are_printed_for_people_and_for_machines():
+    from json import loads
+
+    from typer.testing import CliRunner
+
+    run = CliRunner().invoke
+    (key,) = loads(run(app, ["keys", "delay", "--json"]).stdout)
+    assert key["name"] == "radio.delay" and key["unit"] == "s" and (key["low"], key["high"]) == (0.0, 30.0)
+    text = run(app, ["keys", "radio"]).stdout
+    assert "radio.delay" in text and "age of neighbours' data on arrival" in text and "[0 … 30 s]" in text
+    assert "radio" in run(app, ["keys"]).stdout

@@ -1,0 +1,127 @@
+"""Short scenario files: extends, keys by their last word, notes on what is hardly meant, and the list of all keys."""
+
+import pytest
+
+from airflock.core.parameters import Quantity, declarations
+from airflock.errors import ScenarioError
+from airflock.scenarios import keys
+from airflock.scenarios.files import load, presets
+
+NAME = "vasarhelyi_2018/real_6ms"
+
+
+def written(tmp_path, text, name="mine.toml"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_file_that_only_extends_flies_what_it_extends(tmp_path):
+    mine, base = load(written(tmp_path, f'extends = "{NAME}"\n')), load(NAME)
+    for section in ("parameters", "body", "sensors", "radio", "wind", "world", "start", "metrics", "flight", "scene"):
+        assert getattr(mine, section) == getattr(base, section), section
+    assert not mine.published and "extends" not in mine.document
+    assert mine.notes[0].startswith(f"extends {NAME}")
+
+
+def test_given_keys_go_before_those_of_the_file_and_others_stay(tmp_path):
+    mine = load(written(tmp_path, f'extends = "{NAME}"\nagents = 12\n[radio]\ndelay = "400 ms"\n'))
+    base = load(NAME)
+    assert (mine.agents, mine.radio.delay, mine.radio.range) == (12, 0.4, base.radio.range)
+
+
+def test_files_extend_files_beside_them_and_their_own_files_are_found(tmp_path):
+    (tmp_path / "base").mkdir()
+    law = "base/law.py"
+    written(
+        tmp_path,
+        "import airflock\nfrom dataclasses import dataclass\nCOMMAND = 'velocity'\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Parameters(airflock.Parameters):\n    v: float = airflock.quantity(1.0, 'm/s', low=0.0, high=9.0, "
+        "meaning='speed')\ndef decide(own, p):\n    return p.v * own.hx, p.v * own.hy, p.v * own.hz\n",
+        law,
+    )
+    written(tmp_path, 'agents = 7\n[model]\nkind = "law.py"\nv = 2.0\n', "base/first.toml")
+    written(tmp_path, 'extends = "base/first.toml"\n[model]\nv = 3.0\n', "second.toml")
+    third = load(written(tmp_path, 'extends = "second.toml"\nduration = 5.0\n', "third.toml"))
+    assert (third.agents, third.parameters.v, third.model.name, third.flight.duration) == (7, 3.0, "law", 5.0)
+
+
+def test_another_kind_of_law_keeps_none_of_the_other_law_s_keys(tmp_path):
+    mine = load(written(tmp_path, f'extends = "{NAME}"\n[model]\nkind = "viragh_2014"\n'))
+    assert mine.parameters == type(mine.parameters)()
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ('extends = "vasarhelyi_2018/real_6m"', "did you mean vasarhelyi_2018/real_6ms?"),
+        ("extends = 4", "extends = 4 is not a name"),
+        ('extends = "mine.toml"', "comes back to itself"),
+        (f'extends = "{NAME}"\n[radio]\ndelai = 1.0', "radio.delai is no key; did you mean radio.delay?"),
+    ],
+)
+def test_what_cannot_be_extended_is_told_with_the_file_s_name(tmp_path, monkeypatch, text, fault):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, text)
+    with pytest.raises(ScenarioError) as caught:
+        load("mine.toml")
+    assert len(caught.value.faults) == 1 and "mine.toml" in caught.value.faults[0] and fault in caught.value.faults[0]
+
+
+def test_a_last_word_that_one_section_has_is_that_key():
+    mine = load(NAME, {"delay": 0.4, "v_flock": 5.0})
+    assert mine.radio.delay == 0.4 and mine.parameters.v_flock == 5.0 and mine.metrics.v_flock is None
+    assert {"delay is read as radio.delay", "v_flock is read as model.v_flock"} <= set(mine.notes)
+
+
+@pytest.mark.parametrize(
+    ("key", "fault"),
+    [
+        ("noise", "noise is several keys; write body.noise or sensors.noise"),
+        ("delai", "delai is no key; did you mean radio.delay?"),
+        ("agnets", "agnets is no key; did you mean agents?"),
+    ],
+)
+def test_a_last_word_of_several_sections_or_none_is_refused(key, fault):
+    with pytest.raises(ScenarioError, match=fault.replace("?", r"\?")):
+        load(NAME, {key: 1.0})
+
+
+def test_a_key_may_not_be_given_whole_and_by_its_last_word():
+    with pytest.raises(ScenarioError, match="radio.delay is given twice"):
+        load(NAME, {"radio.delay": 1.0, "delay": 0.4})
+
+
+def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path):
+    fast = load(written(tmp_path, '[model]\nkind = "vasarhelyi_2018"\nv_flock = 6.0\n'))
+    assert any("other 12 numbers of vasarhelyi_2018 are its set for 4 m/s" in note for note in fast.notes)
+    plain = {"body": {}, "sensors": {}, "radio": {}}
+    blind = load("vasarhelyi_2018/4ms", plain, law="vicsek_1995")
+    assert any("has no rule for walls" in note for note in blind.notes)
+    assert any("a factor of 354" in note for note in blind.notes)
+    held = load("vasarhelyi_2018/4ms", {**plain, "world.edges": "periodic", "world.side": 10.0}, law="vicsek_1995")
+    assert not any("walls" in note or "factor" in note for note in held.notes)
+    words = ("no rule for walls", "hardly meant", "are its set")
+    for name in presets():
+        assert not any(word in note for note in load(name).notes for word in words), name
+
+
+def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario():
+    declared = {(of, name) for of, record in keys.records().items() for name, _, _ in declarations(record)}
+    assert len(keys.keys()) == len(declared)
+    for name in ("vasarhelyi_2018/4ms", "couzin_2002/torus", "kidger/city"):
+        scenario = load(name)
+        for record, section in ((scenario.parameters, "model"), (scenario.body, "body"), (scenario.radio, "radio")):
+            for key, how, _ in declarations(record):
+                (found,) = [
+                    k for k in keys.keys(f"{section}.{key}") if k.of in ("", scenario.model.name, scenario.vehicle.name)
+                ]
+                value = getattr(record, key)
+                inside = found.low <= value <= found.high if isinstance(how, Quantity) else value in found.options
+                assert inside and found.meaning == how.meaning
+
+
+def test_an_unknown_section_of_keys_is_told_with_the_nearest():
+    with pytest.raises(ScenarioError, match="did you mean radio.delay"):
+        keys.keys("dely")

@@ -1,0 +1,96 @@
+"""Units that people write: compound units agree with their parts, scenarios with and without them are the same."""
+
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airflock.errors import ScenarioError
+from airflock.scenarios.files import load
+from airflock.scenarios.units import SPELLINGS, UNITS, factor
+
+NAME = "vasarhelyi_2018/4ms"
+BASE = {
+    "m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "ft": 12 * 0.0254, "yd": 36 * 0.0254,
+    "mi": 5280 * 12 * 0.0254, "nmi": 1852.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "kg": 1.0,
+    "rad": 1.0, "deg": math.pi / 180.0, "turn": 2.0 * math.pi, "mrad": 1e-3, "1": 1.0, "N": 1.0, "%": 0.01,
+}  # fmt: skip
+NAMED = {
+    "mph": "mi/h", "kn": "nmi/h", "Hz": "1/s", "rpm": "turn/min", "kHz": "1/ms",
+}  # fmt: skip
+
+
+def measure(unit: str) -> float:
+    """Size of a unit in SI, from the definitions of its parts."""
+    over, _, under = NAMED.get(unit, unit).partition("/")
+    size = 1.0
+    for part, sign in ((over, 1.0), (under or "1", -1.0)):
+        word, _, power = part.partition("^")
+        size *= BASE[word] ** (sign * float(power or 1))
+    return size
+
+
+COMPOUND = [(u, d) for d, known in UNITS.items() for u in known if d not in ("N", "kg", "kg/m^3") and u != "g"]
+
+
+@pytest.mark.parametrize(("unit", "declared"), COMPOUND)
+def test_a_compound_unit_is_made_of_its_parts(unit, declared):
+    assert factor(unit, declared) == pytest.approx(measure(unit) / measure(declared), rel=1e-12)
+
+
+def test_units_without_such_parts_are_those_of_their_definitions():
+    assert factor("lb", "kg") * factor("g", "m/s^2") == pytest.approx(factor("lbf", "N"), rel=1e-12)
+    assert factor("g/cm^3", "kg/m^3") == pytest.approx(factor("g", "kg") / factor("cm", "m") ** 3)
+    assert sum(len(known) for known in UNITS.values()) >= 30
+
+
+def test_every_spelling_stands_for_a_known_unit():
+    every = {*UNITS, *(unit for known in UNITS.values() for unit in known)}
+    assert set(SPELLINGS.values()) <= every
+
+
+@given(st.floats(1e-3, 20.0), st.sampled_from(["us", "ms", "min", "h", "s"]))
+def test_a_value_with_a_unit_is_the_value_in_seconds(seconds, unit):
+    text = f"{seconds / factor(unit, 's'):.15g} {unit}"
+    scenario = load(NAME, {"radio.delay": text, "sensors.period": 0.0})
+    assert scenario.radio.delay == pytest.approx(seconds, rel=1e-11)
+    told = [note for note in scenario.notes if note.startswith("radio.delay = ") and " is " in note and unit in note]
+    assert unit == "s" or told
+
+
+def test_units_in_files_are_converted_and_what_is_flown_is_in_si(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'duration = "10 min"\n[model]\nkind = "vasarhelyi_2018"\nv_flock = "20 km/h"\n[radio]\n'
+        'delay = { value = 400, unit = "ms", source = "measured" }\nrange = "300ft"\n[world]\n'
+        'obstacles = { value = [[[0, 0], [10, 0], [0, 10]]], unit = "yd" }\n'
+    )
+    scenario = load(path)
+    assert scenario.flight.duration == 600.0 and scenario.radio.delay == 0.4
+    assert scenario.radio.range == pytest.approx(91.44) and scenario.parameters.v_flock == pytest.approx(20 / 3.6)
+    assert scenario.world.obstacles == (((0.0, 0.0), (9.144, 0.0), (0.0, 9.144)),)
+    assert scenario.document["radio"]["delay"] == {"value": 0.4, "unit": "s", "source": "measured"}
+    assert {"duration = 10 min is 600 s", "radio.range = 300 ft is 91.44 m"} <= set(scenario.notes)
+    assert "world.obstacles is converted from yd to m" in scenario.notes
+
+
+def test_a_converted_value_is_checked_against_the_declared_range():
+    with pytest.raises(ScenarioError, match=re.escape("radio.delay = 3600 s lies outside [0, 30] s")):
+        load(NAME, {"radio.delay": "1 h"})
+
+
+@pytest.mark.parametrize(
+    ("settings", "fault"),
+    [
+        ({"radio.delay": "4 parsec"}, "radio.delay = 4.0 parsec: the unit is s, or one of us, ms, min, h"),
+        ({"radio.delay": "4 m"}, "radio.delay = 4.0 m: the unit is s"),
+        ({"radio.delay": "soon"}, "radio.delay = 'soon' is not a number; give [0, 30] s"),
+        ({"model.c_frict": "5 m"}, "model.c_frict = 5.0 m: the unit is no unit, or one of %"),
+    ],
+)
+def test_a_unit_of_something_else_is_refused_once(settings, fault):
+    with pytest.raises(ScenarioError) as caught:
+        load(NAME, settings)
+    assert len(caught.value.faults) == 1 and fault in caught.value.faults[0]
