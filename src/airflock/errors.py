@@ -39,3 +39,7 @@ class DeviceError(AirflockError):
 
 class StudyError(AirflockError):
     """A study's folder cannot be used: another study's, another version's, or in use; or an executor is missing."""
+
+
+class StudioError(AirflockError):
+    """A page cannot be opened: its port is in use, or there is nothing to show."""

@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock import __version__
-from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep
+from airflock.cli import display, evolve, harden, inspect, look, paper, run, sweep, watch
 from airflock.errors import AirflockError
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -39,6 +39,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("score")(run.score)
+app.command("watch")(watch.watch)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
