@@ -19,6 +19,7 @@ _WHERE = {
     "recording_of": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
     "evolve": "airflock.evolve",
+    "replay": "airflock.replays",
     "save": "airflock.recordings.files",
     "load_recording": "airflock.recordings.files",
 }

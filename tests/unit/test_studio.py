@@ -12,12 +12,13 @@ import airflock
 from airflock.errors import ScenarioError, StudioError
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
-from airflock.studio import colours, door, measures
+from airflock.stage import colours
+from airflock.stage.scene import dart, stage_of, turned
+from airflock.studio import door, measures
 from airflock.studio.controls import controls_of, span
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.player import Player, value_of
-from airflock.studio.scene import dart, stage_of, turned
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}

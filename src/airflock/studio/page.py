@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import AirflockError
-from airflock.studio import colours, measures
+from airflock.stage import colours
+from airflock.stage.scene import stage_of, turned
+from airflock.studio import measures
 from airflock.studio.controls import Control, controls_of
 from airflock.studio.player import Player, value_of
-from airflock.studio.scene import stage_of, turned
 from airflock.studio.view import View
 
 PIECE = 6  # frames of one piece of a trail

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from airflock.errors import StudioError
-from airflock.studio import colours
+from airflock.stage import colours
+from airflock.stage.scene import Lines, Solid, dart
 from airflock.studio.controls import Control
 from airflock.studio.door import guarded
-from airflock.studio.scene import Lines, Solid, dart
 
 TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
