@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from airflock import atomic
 from airflock.endings import PAGES, ending_fault
 from airflock.errors import RecordingError
+from airflock.metrics.registry import numbers_of
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
 from airflock.replays.pack import pack
@@ -27,6 +28,7 @@ from airflock.stage.scene import Stage, stage_of
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
+COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,8 @@ def _page(name: str, about: dict[str, Any], data: bytes) -> str:
 
 def _near(position: NDArray[Any], period: float, scenario: Any) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
     """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
-    limit = float(scenario.measured_by().r_coll) if scenario else 0.0
+    measured = scenario.measured_by() if scenario else None
+    limit = float(measured.r_coll) if measured and COUNTED & set(numbers_of(measured)) else 0.0
     nearest, found = np.full(len(position), np.nan), []
     touching: set[tuple[int, int]] = set()
     for number, frame in enumerate(position):

@@ -58,7 +58,9 @@ renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
 $("view").prepend(renderer.domElement);
 const scene = new THREE.Scene();
 scene.background = new THREE.Color(0xffffff);
-scene.add(new THREE.HemisphereLight(0xffffff, 0x9a9aa4, 2.4));
+const sky = new THREE.HemisphereLight(0xffffff, 0x9a9aa4, 2.4);
+sky.position.set(0, 0, 1);
+scene.add(sky);
 const sun = new THREE.DirectionalLight(0xffffff, 1.2);
 sun.position.set(-1, -2, 3);
 scene.add(sun);
@@ -129,8 +131,8 @@ function dart() {
 
 const size = 0.055 * span * Math.min(1, (100 / agents) ** 0.25);
 const darts = new THREE.InstancedMesh(dart(), new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }), agents);
-const tones = new Float32Array(3 * agents);
-darts.instanceColor = new THREE.BufferAttribute(tones, 3);
+darts.setColorAt(0, new THREE.Color());  // makes the colours, one for each dart
+const tones = darts.instanceColor.array;
 darts.instanceColor.setUsage(THREE.DynamicDrawUsage);
 darts.frustumCulled = false;
 scene.add(darts);

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import AirflockError
+from airflock.metrics.registry import numbers_of
 from airflock.stage import colours
 from airflock.stage.scene import stage_of, turned
 from airflock.studio import measures
@@ -19,6 +20,7 @@ from airflock.studio.controls import Control, controls_of
 from airflock.studio.player import Player, value_of
 from airflock.studio.view import View
 
+OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
 PIECE = 6  # frames of one piece of a trail
 FRAMES = 30  # per second of real time
 CHARTS = 5  # per second
@@ -38,10 +40,10 @@ class Page:
         self._touching: set[tuple[int, int]] = set()
         self._handles: dict[str, tuple[Any, Control]] = {}
         self._before: NDArray[Any] | None = None
-        self._middle: NDArray[Any] | None = None
         self._pieces = 0
         self._running = True
         self._shown: Any = None
+        self.stage = stage_of(player.scenario, player.motion[0])
         self._build()
         self._stand()
         view.on_click(lambda origin, way: player.ask(lambda: self._choose(origin, way)))
@@ -72,9 +74,12 @@ class Page:
         self.stage = stage_of(scenario, position)
         self._period = measures.period_of(scenario)
         measured = scenario.measured_by()
-        self._near = float(measured.r_coll)
+        counts = {"n_coll", "phi_coll", "collisions"} & set(numbers_of(measured))
+        self._near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
         speed = float(np.sqrt((velocity**2).sum(1)).max())
         self.top = 1.5 * max(float(measured.v_flock or 0.0), 0.5 * speed, 1e-3)
+        if scenario.world.arena == "none" and not self.stage.solids:
+            self.stage = self.stage._replace(span=max(self.stage.span, OPEN * self.top / 1.5))
         flat = scenario.dimensions == 2
         with view.atomic():
             view.clear()
@@ -88,7 +93,7 @@ class Page:
             view.agents(len(position), self.size)
         beside = np.array([0.3 * self.stage.span if flat else 0.0, 0.0, 0.0])  # of the panel
         view.look_at(self.stage.centre + beside, self.stage.span, flat)
-        self.chosen, self._before, self._middle, self._pieces = None, None, None, 0
+        self.chosen, self._before, self._pieces = None, None, 0
         self._touching.clear()
         self.measures.clear()
         self._shown = self.player.preset
@@ -122,7 +127,9 @@ class Page:
             self.key = view.text()
             self.trails = view.checkbox("trails", True)
             self.links = view.checkbox("nearest neighbours", False, "lines from each agent to its three nearest")
-            self.follow = view.checkbox("follow the flock", player.scenario.world.arena == "none")
+            self.follow = view.checkbox(
+                "follow the flock", player.scenario.world.arena == "none" and not self.stage.solids
+            )
             with view.folder("Selected agent"):
                 self.about = view.text(_note("click an agent"))
                 view.row(
@@ -287,20 +294,13 @@ class Page:
                 anew = self._pieces % PIECE == 0
                 self.view.trail(self._from(position), position, trail, anew)
             if self.follow.value:
-                self._follow(position)
+                self.view.follow(position.mean(axis=0).astype(float))
             self.view.extra("links", pairs.neighbours() if self.links.value else np.zeros((0, 2, 3)))
             if chart:
                 self._chart(velocity, pairs)
                 self._look()
         if self._before is None or anew:
             self._before = position
-
-    def _follow(self, position: NDArray[Any]) -> None:
-        """Keep the cameras over the middle of the flock."""
-        middle = position.mean(axis=0).astype(float)
-        if self._middle is not None:
-            self.view.shift(middle - self._middle)
-        self._middle = middle
 
     def _from(self, position: NDArray[Any]) -> NDArray[Any]:
         """Where a piece of trail begins: where the agent was, or here if it went through a periodic face."""

@@ -98,10 +98,13 @@ class View:
             )
         )  # fmt: skip
 
-    def shift(self, by: NDArray[Any]) -> None:
-        """Move the camera of every open page along, m."""
+    def follow(self, target: NDArray[Any]) -> None:
+        """Let the camera of every open page look at a place, m, from where it looks now."""
         for client in self.server.get_clients().values():
-            client.camera.position = tuple(np.asarray(client.camera.position) + by)  # viser moves look_at with it
+            camera = client.camera  # what it says of itself is late, so only the difference is taken from it
+            offset = np.asarray(camera.position) - np.asarray(camera.look_at)
+            camera.position = tuple(target + offset)
+            camera.look_at = tuple(target)
 
     def solid(self, given: Solid, opacity: float | None = None) -> None:
         """Something that stands."""
