@@ -129,19 +129,19 @@ def test_a_refused_change_is_told_and_changes_nothing(player):
 def test_a_law_that_stops_flying_stops_the_flight_and_the_moment_before_is_there(tmp_path):
     law = tmp_path / "wild.py"
     law.write_text(
-        "from dataclasses import dataclass\nfrom airflock import Parameters, quantity\n\n"
-        "COMMAND = 'velocity'\n\n@dataclass(frozen=True, kw_only=True)\nclass WildParameters(Parameters):\n"
-        "    gain: float = quantity(0.0, '1', low=0.0, high=10.0, meaning='gain')\n\n"
-        "def command(own, p):\n    return own.vx / (1.0 - p.gain), own.vy, own.vz\n"
+        "from dataclasses import dataclass\nfrom airflock import Parameters as Record\n"
+        "from airflock import quantity\n\n"
+        "COMMAND = 'velocity'\n\n"
+        "@dataclass(frozen=True, kw_only=True)\nclass Parameters(Record):\n"
+        "    push: float = "
+        "quantity(1.0, 'm/s', low=0.0, high=3e38, meaning='push')\n\n"
+        "def decide(own, p):\n    return p.push * (own.hx + 1.0), own.hy, own.hz\n"
     )
     text = "agents = 3\nduration = 10.0\n[model]\nkind = 'wild.py'\n[world]\nside = 100.0\n"
     (tmp_path / "wild.toml").write_text(text)
-    try:
-        player = Player(str(tmp_path / "wild.toml"))
-    except airflock.AirflockError as fault:
-        pytest.skip(f"the toy law is refused: {fault}")
+    player = Player(str(tmp_path / "wild.toml"))
     player.fly(500)
-    player.change("model.gain", 1.0)
+    player.change("model.push", 3e38)
     player.fly(500)
     assert "agent" in player.failure and "finite" in player.failure
     player.back(player.flight.time)
@@ -232,3 +232,22 @@ def test_another_number_of_agents_that_cannot_be_leaves_the_flight_as_it_was(pla
     with pytest.raises(ScenarioError):
         player.reset(settings={"agents": 10**8})
     assert player.flight.step == 10 and player.given == FEW
+
+
+def test_a_recording_is_flown_again_with_its_events(player, tmp_path):
+    player.fly(150)
+    player.change("model.p_rep", 0.2)
+    player.fly(150)
+    again = Player(str(player.save_recording(tmp_path / "tuned.nc")))
+    again.fly(300)
+    np.testing.assert_array_equal(again.flight.state, player.flight.state)
+    assert again.seed == 3 and value_of(again.scenario, "model.p_rep") == 0.2
+    assert airflock.load(again.save_toml(tmp_path / "again.toml")).agents == 12
+
+
+def test_a_flight_log_is_refused_in_one_line(tmp_path):
+    log = airflock.simulate(airflock.load(PRESET, {**FEW, "duration": 1.0}), 1)
+    log.attrs = {}
+    airflock.save(log, tmp_path / "log.nc")
+    with pytest.raises(airflock.AirflockError, match="airflock replay"):
+        Player(str(tmp_path / "log.nc"))

@@ -8,7 +8,9 @@ from airflock.cli import options, tables
 
 
 def watch(
-    scenario: options.Where,
+    scenario: Annotated[
+        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc), flown again.")
+    ],
     changes: options.Set = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the flight.")] = 0,
     agents: options.Agents = None,

@@ -77,7 +77,7 @@ class Page:
         counts = {"n_coll", "phi_coll", "collisions"} & set(numbers_of(measured))
         self._near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
         speed = float(np.sqrt((velocity**2).sum(1)).max())
-        self.top = 1.5 * max(float(measured.v_flock or 0.0), 0.5 * speed, 1e-3)
+        self.top = max(1.5 * float(measured.v_flock or 0.0), 1.1 * speed, 1e-3)
         if scenario.world.arena == "none" and not self.stage.solids:
             self.stage = self.stage._replace(span=max(self.stage.span, OPEN * self.top / 1.5))
         flat = scenario.dimensions == 2

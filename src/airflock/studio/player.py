@@ -1,5 +1,6 @@
 """Player: an open flight that is played, tuned, pushed and taken back; it knows no page."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -8,12 +9,14 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from airflock import atomic
 from airflock.engine.flight import Flight
-from airflock.errors import AirflockError
-from airflock.recordings.files import save
+from airflock.errors import AirflockError, RecordingError
+from airflock.recordings.files import load_recording, save
+from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
@@ -30,11 +33,16 @@ class Player:
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
 
-    where    : preset or scenario file; settings : keys changed from outside; seed : of the first flight
+    where    : preset, scenario file or recording, which is flown again with its events
+    settings : keys changed from outside
+    seed     : of the first flight; a recording brings its own
     """
 
     def __init__(self, where: str, settings: Mapping[str, Any] | None = None, seed: int = 0):
         self.where, self.given, self.seed = where, dict(settings or {}), seed
+        self.source = recorded(where) if where.lower().endswith(".nc") else None
+        if self.source is not None:
+            self.seed = int(self.source.attrs["airflock_seed"])
         self.paused, self.note, self.failure = False, "", ""
         self._rate = 1e4  # motion steps per second, as measured
         self.fault: Callable[[str], None] = lambda line: None  # is told of everything that was refused
@@ -42,8 +50,15 @@ class Player:
         self._open()
 
     def _open(self) -> None:
-        self.preset = endless(load(self.where, self.given))
-        self.flight = Flight(self.preset, self.seed)
+        if self.source is None:
+            self.preset = endless(load(self.where, self.given))
+            self.flight = Flight(self.preset, self.seed)
+        else:
+            self.preset = endless(scenario_of(self.source, self.given))
+            same = not self.given and self.seed == int(self.source.attrs["airflock_seed"])
+            events = json.loads(self.source.attrs.get("airflock_events", "[]")) if same else []
+            precision = int(self.source.attrs["airflock_precision"])
+            self.flight = Flight(self.preset, self.seed, precision=precision, events=events)
         self.pace = Pace(self.preset.flight.dt, getattr(self, "pace", Pace(1.0)).speed)
         self.moments, self.failure = Moments(), ""
         self.changed: dict[str, Any] = {}
@@ -198,12 +213,21 @@ class Player:
 
     def save_toml(self, path: Path) -> Path:
         """Write the preset's file with the keys changed here, its comments and sources kept."""
-        atomic.write(path, toml_of(self.where, {**self.given, **self.changed}))
+        document = None if self.source is None else json.loads(self.source.attrs["airflock_scenario"])
+        atomic.write(path, toml_of(self.where, {**self.given, **self.changed}, document))
         return path
 
     def save_recording(self, path: Path) -> Path:
         """Fly the flight again from its start with all that was done to it, and save it. Raises where bits differ."""
         return save(flown_again(self.flight), path)
+
+
+def recorded(where: str) -> xr.Dataset:
+    """A recording that can be flown again. Raises RecordingError for any other, and says what shows it."""
+    found = load_recording(where)
+    if "airflock_scenario" not in found.attrs or not int(found.attrs.get("random_start", 1)):
+        raise RecordingError(f"{where}: was not flown from a scenario and a seed; airflock replay {where} shows it")
+    return found
 
 
 def endless(scenario: Scenario) -> Scenario:

@@ -15,10 +15,14 @@ from airflock.recordings.flights import simulate
 from airflock.scenarios.files import presets
 
 
-def toml_of(where: str, settings: Mapping[str, Any]) -> str:
-    """Text of a preset or scenario file with keys set anew; comments, units and sources of the others stay."""
+def toml_of(where: str, settings: Mapping[str, Any], given: Mapping[str, Any] | None = None) -> str:
+    """Text of a preset or scenario file with keys set anew; comments, units and sources of the others stay.
+
+    given : the scenario of a recording, instead of a file
+    """
     path = presets().get(where) or Path(where)
-    document: Any = tomlkit.parse(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8") if given is None else tomlkit.dumps(given)
+    document: Any = tomlkit.parse(text)
     for key, value in settings.items():
         section, _, name = key.partition(".")
         if not name:

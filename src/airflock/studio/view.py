@@ -2,6 +2,7 @@
 
 import secrets
 import socket
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from airflock.studio.door import guarded
 TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 WIDE = 0.8
+SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
 EMPTY = np.zeros((1, 2, 3), np.float32)
 STILL = (1.0, 0.0, 0.0, 0.0)
 
@@ -51,6 +53,9 @@ class View:
         scene.configure_default_lights(True, cast_shadow=False)
         scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=1.0)
         self._drawn: list[Any] = []
+        self._aim: dict[str, Any] = {}
+        self._met: dict[int, float] = {}
+        self.server.on_client_connect(self._welcome)
         self._turn = 0
 
     @property
@@ -80,12 +85,21 @@ class View:
         far = 1.15 * span / np.tan(0.5 * field)
         offset = np.array([0.0, -0.001, 1.0]) if flat else np.array([0.25, -0.8, 0.55])
         place = centre + offset / np.linalg.norm(offset) * far
-        cameras: list[Any] = [self.server.initial_camera, *(c.camera for c in self.server.get_clients().values())]
-        for camera in cameras:
-            camera.position = tuple(place)
-            camera.look_at = tuple(centre)
-            camera.fov = field
-            camera.near, camera.far = 0.01 * far, 20.0 * far
+        self._aim = {
+            "position": tuple(place), "look_at": tuple(centre), "fov": field, "near": 0.01 * far, "far": 20.0 * far,
+        }  # fmt: skip
+        self._point(self.server.initial_camera)
+        for client in self.server.get_clients().values():
+            self._welcome(client)
+
+    def _point(self, camera: Any) -> None:
+        for name, value in self._aim.items():  # the position first: it takes look_at along
+            setattr(camera, name, value)
+
+    def _welcome(self, client: Any) -> None:
+        """Point the camera of one page; until the page has answered, what it says of its camera is old."""
+        self._met[client.client_id] = time.monotonic()
+        self._point(client.camera)
 
     def ground(self, span: float, height: float, centre: NDArray[Any]) -> None:
         """A grid of 20 by 20 squares."""
@@ -101,6 +115,8 @@ class View:
     def follow(self, target: NDArray[Any]) -> None:
         """Let the camera of every open page look at a place, m, from where it looks now."""
         for client in self.server.get_clients().values():
+            if time.monotonic() - self._met.get(client.client_id, 0.0) < SETTLING:
+                continue
             camera = client.camera  # what it says of itself is late, so only the difference is taken from it
             offset = np.asarray(camera.position) - np.asarray(camera.look_at)
             camera.position = tuple(target + offset)
@@ -149,10 +165,10 @@ class View:
         self._agents.batched_wxyzs = turn
         self._agents.batched_colors = _linear(colour)
 
-    def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], anew: bool) -> None:
-        """The newest piece of every agent's trail, again or anew; the oldest goes."""
-        self._turn += anew
+    def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], done: bool) -> None:
+        """The newest piece of every agent's trail, again; where it is done, the next one takes the oldest's place."""
         node = self._trails[self._turn % TRAILS]
+        self._turn += done
         node.points = np.stack([begin, end], 1)
         pale = (0.5 * colour + 0.5 * 235).astype(np.uint8)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
