@@ -148,7 +148,13 @@ class Page:
                     "Back to preset": ask(lambda: self._put(player.to_preset())),
                 }
             )
-            view.row({"Save scenario (.toml)": ask(self._save_toml), "Save flight (.nc)": ask(self._save_recording)})
+            view.row(
+                {
+                    "Save scenario (.toml)": ask(self._save_toml),
+                    "Save flight (.nc)": ask(self._save_recording),
+                    "Save replay (.html)": ask(self._save_replay),
+                }
+            )
             self.command = view.text()
             for section, controls in controls_of(player.preset).items():
                 with view.folder(section, section == "model"):
@@ -222,6 +228,9 @@ class Page:
     def _save_recording(self) -> None:
         path = self.player.save_recording(_free(Path(f"{_stem(self.player)}_seed{self.player.seed}.nc")))
         self._saved(path)
+
+    def _save_replay(self) -> None:
+        self._saved(self.player.save_replay(_free(Path(f"{_stem(self.player)}_seed{self.player.seed}.html"))))
 
     def _saved(self, path: Path) -> None:
         self.player.note = f"saved {path.absolute()}"

@@ -17,6 +17,7 @@ from airflock.engine.flight import Flight
 from airflock.errors import AirflockError, RecordingError
 from airflock.recordings.files import load_recording, save
 from airflock.recordings.scores import scenario_of
+from airflock.replays import replay
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
@@ -220,6 +221,10 @@ class Player:
     def save_recording(self, path: Path) -> Path:
         """Fly the flight again from its start with all that was done to it, and save it. Raises where bits differ."""
         return save(flown_again(self.flight), path)
+
+    def save_replay(self, path: Path) -> Path:
+        """Write the flight up to now as one HTML file that plays it."""
+        return replay(flown_again(self.flight)).save(path)
 
 
 def recorded(where: str) -> xr.Dataset:
