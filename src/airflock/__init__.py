@@ -35,11 +35,13 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.recordings.scores import over_time as over_time
     from airflock.recordings.scores import score as score
     from airflock.recordings.sweeps import sweep as sweep
+    from airflock.replays import replay as replay
     from airflock.scenarios.files import load as load
     from airflock.scenarios.files import presets as presets
     from airflock.scenarios.keys import keys as keys
     from airflock.scenarios.scaling import starting_set as starting_set
     from airflock.scenarios.scenario import Scenario as Scenario
+    from airflock.studio.watch import watch as watch
 
 __version__ = "0.1.0"
 
@@ -73,6 +75,8 @@ _WHERE = {
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",
     "video": "airflock.plots.video",
+    "replay": "airflock.replays",
+    "watch": "airflock.studio.watch",
     "save": "airflock.recordings.files",
     "identify": "airflock.identify",
     "load_tracks": "airflock.recordings.imports.load",

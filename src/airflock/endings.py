@@ -7,6 +7,7 @@ PICTURES = (".png", ".pdf", ".svg")
 VIDEOS = (".mp4", ".gif")
 RECORDINGS = (".nc",)
 TABLES = (".csv",)
+PAGES = (".html",)
 SCENARIOS = (".toml",)
 
 

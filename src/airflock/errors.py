@@ -83,3 +83,7 @@ class CardError(AirflockError):
     def __init__(self, faults: list[str]):
         self.faults = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in fault) for fault in faults]
         super().__init__("\n".join(self.faults))
+
+
+class StudioError(AirflockError):
+    """A page cannot be opened: its port is in use, or there is nothing to show."""

@@ -413,3 +413,15 @@ def test_lines_differ_for_colour_blind_readers_too():
     ramp = [luminance(style.SPEED(v)) for v in np.linspace(0.0, 1.0, 20)]
     assert np.all(np.diff(ramp) > 0.0)  # speed can be read in grey
     assert len({to_hex(c) for c in style.LINES}) == len(style.LINES)
+
+
+def test_no_line_is_drawn_across_a_periodic_world():
+    scenario = airflock.load("vicsek_1995/ordered", {"agents": 20})
+    recording = airflock.simulate(scenario, 1)
+    path = recording["position"].values[:, :, 0]
+    half = 0.5 * scenario.world.side
+    assert (np.abs(np.diff(path, axis=0)) > half).any(), "nobody went through a face; the test says nothing"
+    axes = trajectories(recording, start=0.0).axes[0]
+    drawn = [c.get_segments() for c in axes.collections if hasattr(c, "get_segments")]
+    lines = np.concatenate([segments for segments in drawn if len(segments)])
+    assert len(lines) and np.abs(lines[:, 1] - lines[:, 0]).max() <= half

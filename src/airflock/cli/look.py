@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PICTURES, VIDEOS
+from airflock.endings import PAGES, PICTURES, VIDEOS
 
 
 class Kind(StrEnum):
@@ -87,3 +87,30 @@ def video(
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, **choice)
     tables.say(f"saved {out}")
+
+
+def replay(
+    what: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc).")],
+    page: Annotated[Path, typer.Option("--html", "--out", "-o", metavar="FILE.html", help="File to write.")] = Path(
+        "flight.html"
+    ),
+    seed: Seed = 0,
+    rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Frames per second that are kept at most.")] = 10.0,
+    changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+) -> None:
+    """Write a flight as one HTML file that plays in any browser, from disk and without network.
+
+    Example: airflock replay flight.nc --html show.html
+    """
+    options.writable((page, PAGES))
+    from airflock.plots.picture import flight_of
+    from airflock.replays import replay as make_replay
+
+    recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
+    made = make_replay(recording, rate=rate)
+    made.save(page)
+    tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

@@ -26,6 +26,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    watch,
 )
 from airflock.errors import AirflockError, bounded, bounded_lines, printable
 
@@ -58,6 +59,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("score")(run.score)
+app.command("watch")(watch.watch)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
@@ -66,6 +68,7 @@ app.command("export")(imports.export)
 app.command("identify")(identify.identify)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
+app.command("replay")(look.replay)
 app.command("display")(display.display)
 app.command("fleet")(fleet.fleet)
 app.add_typer(fly.app, name="fly")

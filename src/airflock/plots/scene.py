@@ -141,6 +141,14 @@ def _raised(corners: Array, z: float) -> Array:
     return np.column_stack([corners, np.full(len(corners), z)])
 
 
+def through_face(segments: Array, world: arena.Parameters) -> Array:
+    """Which segments (segment, end, axis), m, lead through a face of a periodic world to the opposite one."""
+    if world.edges != "periodic":
+        return np.zeros(len(segments), bool)
+    halves = np.array([0.5 * world.side, 0.5 * world.side, 0.5 * world.height])[: segments.shape[2]]
+    return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
+
+
 class View(NamedTuple):
     """Parallel projection onto the picture: `right` and `up` are unit vectors (axis,)."""
 

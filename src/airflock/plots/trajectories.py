@@ -18,6 +18,7 @@ from airflock.plots.scene import (
     name_of,
     paths_of,
     speed_range,
+    through_face,
     view_of,
     walls,
     world_of,
@@ -49,7 +50,7 @@ def trajectories(
     space = shown.position.shape[1] == 3
     figure = style.Picture(6.8, 4.6) if space else style.Picture(6.4, 5.6)
     axes: Any = figure.add_subplot(projection="3d") if space else figure.add_subplot()
-    pieces = _pieces(shown)
+    pieces = _pieces(shown, world)
     scale = Normalize(*speed_range(shown))
     for number in [*(i for i in range(shown.agents) if i != chosen), *([chosen] if chosen >= 0 else [])]:
         segments, speed = pieces[number]
@@ -78,8 +79,8 @@ def _chosen(recording: xr.Dataset, agents: int, agent: int | None) -> int:
     return agent
 
 
-def _pieces(shown: Paths) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Of each agent: segments (segment, end, axis) in m and their mean speeds, m/s."""
+def _pieces(shown: Paths, world: arena.Parameters) -> list[tuple[NDArray[Any], NDArray[Any]]]:
+    """Of each agent: segments (segment, end, axis) in m and their mean speeds, m/s; none through a periodic face."""
     count = len(shown.times)
     stride = max(1, -(-(count - 1) * shown.agents // MOST))
     kept = np.unique(np.append(np.arange(0, count, stride), count - 1))
@@ -87,7 +88,9 @@ def _pieces(shown: Paths) -> list[tuple[NDArray[Any], NDArray[Any]]]:
     found = []
     for number in range(shown.agents):
         line = where[:, :, number]
-        found.append((np.stack([line[:-1], line[1:]], axis=1), 0.5 * (speed[:-1, number] + speed[1:, number])))
+        segments, mean = np.stack([line[:-1], line[1:]], axis=1), 0.5 * (speed[:-1, number] + speed[1:, number])
+        inside = ~through_face(segments, world)
+        found.append((segments[inside], mean[inside]))
     return found
 
 

@@ -1,0 +1,166 @@
+"""The page of a replay: a recording, what stands in its world, and the JavaScript that plays it, in one HTML file."""
+
+import base64
+import html
+import json
+import math
+import os
+import re
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from airflock import atomic
+from airflock.endings import PAGES, ending_fault
+from airflock.errors import RecordingError
+from airflock.metrics.registry import numbers_of
+from airflock.recordings.layout import frames_of
+from airflock.recordings.scores import scenario_of
+from airflock.replays.pack import pack
+from airflock.stage import colours
+from airflock.stage.scene import Stage, stage_of
+
+RATE = 10.0  # frames per second that are kept at most; the page draws between them
+MOST_EVENTS = 500
+COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A recording as a page; a notebook shows it in place. `text` is the whole HTML."""
+
+    text: str
+    name: str
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page as .html."""
+        target = Path(path)
+        wrong = ending_fault(target, PAGES)
+        if wrong:
+            raise RecordingError(wrong)
+        atomic.write(target, self.text)
+        return target
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.text, quote=True)}" title="{html.escape(self.name)}" '
+            'style="width:100%;height:520px;border:1px solid #ddd"></iframe>'
+        )
+
+
+def replay(recording: xr.Dataset, *, rate: float = RATE) -> Replay:
+    """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
+
+    rate : frames per second that are kept at most
+    Raises RecordingError for a recording with gaps.
+    """
+    frames, period, present = frames_of(recording)
+    if not present.all():
+        raise RecordingError(f"recording: {1.0 - present.mean():.1%} of the positions are missing; a replay needs all")
+    axes = frames.shape[1] // 2
+    stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))
+    kept, every = frames[::stride], period * stride
+    packed = pack(kept[:, :axes])
+    scenario = scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
+    flat = np.zeros((kept.shape[2], 3))
+    flat[:, :axes] = kept[0, :axes].T
+    first = float(recording["time"].values[0])
+    name = str(recording.attrs.get("airflock_name", "flight log"))
+    speed = np.sqrt((kept[:, axes:] ** 2).sum(1))
+    nearest, collisions = _near(frames[:, :axes], period, scenario)
+    about = {
+        "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
+        "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.quantum,
+        "top": _nice(float(np.quantile(speed, 0.995))), "ramp": colours.RAMP.astype(int).tolist(),
+        "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
+        "events": _events(recording, scenario), "stage": _stage(scenario, kept[:, :axes], flat),
+        "charts": [["mean speed (m/s)", _short(speed.mean(1))], ["nearest pair (m)", _short(nearest[::stride])]],
+    }  # fmt: skip
+    return Replay(_page(name, about, packed.data), name)
+
+
+def _page(name: str, about: dict[str, Any], data: bytes) -> str:
+    """The template with everything in its place."""
+    root = resources.files("airflock.replays")
+    text = (root / "replay.html").read_text(encoding="utf-8")
+    parts = {
+        "TITLE": html.escape(name),
+        "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
+        "DATA": base64.b64encode(data).decode(),
+        "THREE": (root / "three.min.js").read_text(encoding="utf-8"),
+        "SCRIPT": (root / "replay.js").read_text(encoding="utf-8"),
+    }
+    return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], text)
+
+
+def _near(position: NDArray[Any], period: float, scenario: Any) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
+    """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
+    measured = scenario.measured_by() if scenario else None
+    limit = float(measured.r_coll) if measured and COUNTED & set(numbers_of(scenario.measures, measured)) else 0.0
+    nearest, found = np.full(len(position), np.nan), []
+    touching: set[tuple[int, int]] = set()
+    for number, frame in enumerate(position):
+        points = frame.T.astype(float)
+        if len(points) < 2:
+            continue
+        box = None
+        if scenario and scenario.world.edges == "periodic":
+            world = scenario.world
+            box = np.array([world.side, world.side, world.height][: points.shape[1]])
+            points = np.mod(points + 0.5 * box, box)
+        tree = cKDTree(points, boxsize=box)
+        nearest[number] = tree.query(points, k=2)[0][:, 1].min()
+        now = set(tree.query_pairs(limit)) if limit > 0.0 and nearest[number] < limit else set()
+        found += [(number * period, int(i), int(j)) for i, j in sorted(now - touching)]
+        touching = now
+    return nearest, found[:MOST_EVENTS]
+
+
+def _events(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
+    """What was done to the flight: when, s, and what."""
+    if scenario is None or "airflock_events" not in recording.attrs:
+        return []
+    found = json.loads(recording.attrs["airflock_events"])[:MOST_EVENTS]
+    return [[event["step"] * scenario.flight.dt, _told(event)] for event in found]
+
+
+def _told(event: dict[str, Any]) -> str:
+    return f"{event['kind']} " + ", ".join(f"{key} = {value}" for key, value in event["data"].items())
+
+
+def _stage(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:
+    """What stands in the world, as plain lists."""
+    axes = position.shape[1]
+    low, high = position.min(axis=(0, 2)), position.max(axis=(0, 2))
+    centre, span = [*(0.5 * (low + high)), *[0.0] * (3 - axes)], 0.55 * float(max(np.ptp([low, high], axis=0)))
+    solids: list[Any] = []
+    lines: list[Any] = []
+    if scenario is not None:
+        stage: Stage = stage_of(scenario, first)
+        if scenario.world.arena != "none":
+            centre, span = stage.centre.tolist(), max(stage.span, 1e-6)
+        solids = [[_short(s.vertices.ravel()), s.faces.ravel().tolist(), s.colour] for s in stage.solids]
+        lines = [[_short(line.points.ravel()), line.colour] for line in stage.lines]
+    plain = [float(c) for c in centre]
+    return {"centre": plain, "span": max(span, 1e-3), "space": axes == 3, "solids": solids, "lines": lines}
+
+
+def _leap(scenario: Any) -> float | None:
+    """Longest way between two frames that is flown, not a way through a periodic face, m; None without one."""
+    return 0.5 * float(scenario.world.side) if scenario and scenario.world.edges == "periodic" else None
+
+
+def _short(values: NDArray[Any]) -> list[float | None]:
+    """Numbers of five digits, for JSON; null for what is not finite."""
+    return [float(f"{v:.5g}") if np.isfinite(v) else None for v in np.asarray(values, float).tolist()]
+
+
+def _nice(value: float) -> float:
+    """A little more than a value, of two digits."""
+    return float(f"{max(value, 1e-6) * 1.1:.2g}")

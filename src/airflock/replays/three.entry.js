@@ -1,0 +1,2 @@
+export { AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DynamicDrawUsage, DoubleSide, EdgesGeometry, InstancedMesh, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, OrthographicCamera, PerspectiveCamera, Quaternion, Scene, Vector3, WebGLRenderer, HemisphereLight, GridHelper } from "three";
+export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";

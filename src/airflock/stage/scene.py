@@ -1,0 +1,173 @@
+"""What stands in a world, as triangles and lines for any renderer."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.scenarios.geometry import ground_plan
+from airflock.scenarios.scenario import Scenario
+from airflock.world.shapes import BOX, CYLINDER, SEGMENT, TRIANGLE
+
+BLOCK = (176, 182, 190)
+TREE = (110, 150, 110)
+OBSTACLE = (213, 94, 0)
+ARENA = (0, 114, 178)
+GOAL = (0, 158, 115)
+SIDES = 12  # of a drawn cylinder
+BROAD = 1e5  # m; what is larger has no drawn end
+
+
+class Solid(NamedTuple):
+    """Triangles of one colour: vertices (vertex, 3) in m, faces (face, 3)."""
+
+    name: str
+    vertices: NDArray[Any]
+    faces: NDArray[Any]
+    colour: tuple[int, int, int]
+
+
+class Lines(NamedTuple):
+    """Line segments of one colour: points (segment, 2, 3) in m."""
+
+    name: str
+    points: NDArray[Any]
+    colour: tuple[int, int, int]
+
+
+class Stage(NamedTuple):
+    """Everything that stands still.
+
+    span   : half the width of what should be seen, m
+    centre : of it (3,), m
+    height : lowest and highest place, m
+    """
+
+    solids: list[Solid]
+    lines: list[Lines]
+    span: float
+    centre: NDArray[Any]
+    height: tuple[float, float]
+
+
+def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
+    """What stands in the world of a scenario; position (agent, 3) in m says where the flock is, for an open world."""
+    world, flat = scenario.world, scenario.dimensions == 2
+    half = 0.5 * world.height
+    solids, lines = [], []
+    plan = ground_plan(world)
+    if plan is not None:
+        corners = np.array(plan.exterior.coords)
+        lines.append(Lines("arena", _frame(corners, 0.0, 0.0) if flat else _frame(corners, -half, half), ARENA))
+    shapes = _shapes(scenario)
+    points = [np.array(plan.exterior.coords)] if plan is not None else []
+    points += [rows[:, c : c + 2] for rows in shapes.values() for c in (0, 3) if len(rows)]
+    points += [np.asarray(position)[:, :2]] if not points or world.arena != "square" else []
+    every = np.vstack(points)
+    low, high = np.quantile(every, (0.0, 1.0), axis=0)
+    span = max(0.55 * float(np.max(high - low)), 1e-3)
+    tall = 0.12 * span
+    for number, outline in enumerate(world.obstacles):
+        flatly = (0.0, tall) if flat else (-half, half)
+        solids.append(prism(f"obstacle_{number}", np.array(outline)[:, :2], *flatly, OBSTACLE))
+    solids += _scenery(shapes, tall if flat else None)
+    goals = scenario.waypoints()
+    if len(goals):
+        size = 0.015 * span
+        cross = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 3]]], float) * size
+        lines.append(Lines("goals", (goals[:, None, None] + cross).reshape(-1, 2, 3), GOAL))
+    tops = [0.0, *(float(rows[:, 5].max()) for rows in shapes.values() if len(rows))]
+    span_z = (-half, half) if plan is not None else (min(0.0, float(position[:, 2].min())), max(*tops, 1.0, 1.0))
+    middle = np.array([*(0.5 * (low + high)), 0.0 if flat else 0.5 * (span_z[0] + span_z[1])])
+    return Stage(solids, lines, span, middle, (0.0, 0.0) if flat else span_z)
+
+
+def _shapes(scenario: Scenario) -> dict[float, NDArray[Any]]:
+    """Rows of the drawn shapes of a scene by their kind; without those that have no end."""
+    rows = scenario.stands().shapes
+    small = np.abs(rows[:, [0, 1, 3, 4]]).max(axis=1, initial=0.0) < BROAD if len(rows) else np.zeros(0, bool)
+    return {kind: rows[small & (rows[:, 6] == kind)] for kind in (BOX, CYLINDER, TRIANGLE, SEGMENT)}
+
+
+def _scenery(shapes: dict[float, NDArray[Any]], tall: float | None) -> list[Solid]:
+    """Boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
+    found = []
+    boxes = [_box(*_heights(row, tall)) for row in shapes[BOX]]
+    trunks = []
+    for row in shapes[CYLINDER]:
+        turn = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+        ring = row[7:9] + row[9] * np.stack([np.cos(turn), np.sin(turn)], 1)
+        bounds = _heights(row, tall)
+        trunks.append(_raised(ring, bounds[2], bounds[5]))
+    walls = []
+    for row in shapes[SEGMENT]:
+        a, b = row[7:9], row[9:11]
+        walls.append(_raised(np.array([a, b]), 0.0, tall or 10.0))
+    for name, parts, colour in (("blocks", boxes, BLOCK), ("trees", trunks, TREE), ("walls", walls, OBSTACLE)):
+        if parts:
+            found.append(Solid(name, *_together(parts), colour))
+    triangles = shapes[TRIANGLE][:, 7:16].reshape(-1, 3)
+    if len(triangles):
+        found.append(Solid("mesh", triangles, np.arange(len(triangles)).reshape(-1, 3), BLOCK))
+    return found
+
+
+def _heights(row: NDArray[Any], tall: float | None) -> NDArray[Any]:
+    bounds = np.array(row[:6])
+    if tall is not None:
+        bounds[2], bounds[5] = 0.0, tall
+    return bounds
+
+
+def _box(x0: float, y0: float, z0: float, x1: float, y1: float, z1: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    return _raised(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), z0, z1)
+
+
+def prism(name: str, corners: NDArray[Any], low: float, high: float, colour: tuple[int, int, int]) -> Solid:
+    """Upright prism over a convex ground plan (corner, 2), m."""
+    return Solid(name, *_raised(corners, low, high), colour)
+
+
+def _raised(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Sides and roof of a ground plan."""
+    n = len(corners)
+    vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
+    faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
+    faces += [(n, n + i, n + i + 1) for i in range(1, n - 1)]
+    return vertices, np.array(faces, np.uint32)
+
+
+def _together(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Many solids as one."""
+    offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    faces = np.vstack([part[1] + offset for part, offset in zip(parts, offsets, strict=True)])
+    return np.vstack([part[0] for part in parts]), faces.astype(np.uint32)
+
+
+def _frame(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
+    """Edges of an upright prism over a closed outline (corner, 2), as segments."""
+    found = []
+    for z in {low, high}:
+        ring = np.column_stack([corners, np.full(len(corners), z)])
+        found.append(np.stack([ring[:-1], ring[1:]], 1))
+    if low < high:
+        some = corners[: -1 : max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1]
+        found.append(np.array([[[x, y, low], [x, y, high]] for x, y in some]))
+    return np.vstack(found)
+
+
+def dart(size: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """A dart along +x, `size` m long: nose, ring of the tail, notch."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    ring = np.stack([np.full(8, -0.4), 0.3 * np.cos(turn), 0.18 * np.sin(turn)], 1)
+    vertices = np.vstack([[[0.6, 0.0, 0.0]], ring, [[-0.2, 0.0, 0.0]]]) * size
+    faces = [(0, 1 + i, 1 + (i + 1) % 8) for i in range(8)] + [(9, 1 + (i + 1) % 8, 1 + i) for i in range(8)]
+    return vertices.astype(np.float32), np.array(faces, np.uint32)
+
+
+def turned(velocity: NDArray[Any]) -> NDArray[Any]:
+    """Quaternions (agent, 4), w first, that turn +x along velocities (agent, 3): yaw, then pitch."""
+    yaw = np.arctan2(velocity[:, 1], velocity[:, 0])
+    pitch = -np.arctan2(velocity[:, 2], np.hypot(velocity[:, 0], velocity[:, 1]))
+    cy, sy, cp, sp = np.cos(yaw / 2), np.sin(yaw / 2), np.cos(pitch / 2), np.sin(pitch / 2)
+    return np.stack([cy * cp, -sy * sp, cy * sp, sy * cp], 1).astype(np.float32)

@@ -1,0 +1,94 @@
+"""Controls: what a page needs to know of each parameter to make a slider or a menu of it, from the declarations."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from airflock.core.parameters import Choice, Quantity, declarations, with_unit
+from airflock.scenarios.scenario import Scenario
+
+SECTIONS = ("model", "body", "sensors", "radio", "wind", "goals", "wing", "metrics")
+USUAL = 4.0  # a slider ends at so many times the preset's value
+STEPS = 400  # of a slider
+
+
+class Control(NamedTuple):
+    """One control: a number with a span, or a choice with options.
+
+    key   : as in a scenario file, such as model.p_rep
+    label : name and unit
+    hint  : meaning, allowed range and source
+    value : of the scenario at hand
+    low, high, step : of the slider; nan for a choice
+    """
+
+    key: str
+    label: str
+    hint: str
+    value: Any
+    low: float = math.nan
+    high: float = math.nan
+    step: float = math.nan
+    options: tuple[str, ...] = ()
+
+    @property
+    def is_choice(self) -> bool:
+        """Whether this is a menu, not a slider."""
+        return bool(self.options)
+
+
+def controls_of(scenario: Scenario) -> dict[str, list[Control]]:
+    """Controls by section, in the order in which the paper's parameters are declared; empty sections are left out.
+
+    A number that is derived from the rest of the scenario (None) gets no control, nor do lists and texts.
+    """
+    found = {}
+    for section in SECTIONS:
+        record = scenario.parameters if section == "model" else getattr(scenario, section)
+        made = []
+        for name, declared, _ in declarations(record):
+            value = getattr(record, name)
+            if isinstance(declared, Quantity) and value is not None:
+                made.append(slider(f"{section}.{name}", declared, value))
+            elif isinstance(declared, Choice):
+                hint = _hint(declared.meaning, "", declared.source)
+                made.append(Control(f"{section}.{name}", name, hint, value, options=declared.options))
+        if made:
+            found[section] = made
+    return found
+
+
+def slider(key: str, declared: Quantity, value: float) -> Control:
+    """Slider of a number: from 0 to 4 times the value, or as far on both sides of 0, within the declared range."""
+    low, high = span(declared.low, declared.high, value)
+    label = with_unit(key.partition(".")[2], f"({declared.unit})" if declared.unit not in ("", "1") else "")
+    hint = _hint(declared.meaning, declared.span, declared.source)
+    return Control(key, label, hint, value, low, high, _round_step((high - low) / STEPS))
+
+
+def span(low: float, high: float, value: float) -> tuple[float, float]:
+    """Ends of a slider: inside [low, high], around the value, and not so wide that it cannot be set by hand."""
+    reach = USUAL * abs(value) if value else min(1.0, max(abs(low), abs(high)))
+    begin, end = max(low, -reach if low < 0.0 else 0.0), min(high, reach)
+    return min(begin, value), max(end, value)
+
+
+def fields(settings: Mapping[str, Any]) -> str:
+    """Keys and values as options of the command: --set model.p_rep=0.2 ..."""
+    return " ".join(f"--set {key}={_word(value)}" for key, value in settings.items())
+
+
+def _word(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _round_step(step: float) -> float:
+    """A step of 1, 2 or 5 times a power of ten, at most as large."""
+    if step <= 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(step))
+    return max(digit * power for digit in (1.0, 2.0, 5.0) if digit * power <= step * (1.0 + 1e-9))
+
+
+def _hint(meaning: str, allowed: str, source: str) -> str:
+    return "; ".join(part for part in (meaning, allowed and f"allowed {allowed}", source) if part)

@@ -1,0 +1,82 @@
+"""Door: who may open a page. A token in the address, then a cookie; everything else is turned away.
+
+The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
+starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders have
+names for screen readers).
+"""
+
+import hmac
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from unittest.mock import patch
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server
+from websockets.datastructures import Headers
+from websockets.http11 import Response
+
+REFUSED = b"airflock: this page needs the whole address that the terminal shows, with its token\n"
+OWN = b"""<script>
+addEventListener("DOMContentLoaded", () => {
+  const field = '[role=slider], input, textarea, [role=combobox]';
+  for (const kind of ["keydown", "keyup"])
+    document.body.addEventListener(kind, e => { if (e.target.closest?.(field)) e.stopPropagation(); });
+  const name = () => {
+    for (const slider of document.querySelectorAll("[role=slider]:not([aria-label]), [role=slider][aria-label='']")) {
+      let at = slider;
+      while ((at = at.parentElement) && at !== document.body) {
+        const label = at.querySelector("label");
+        if (label) { slider.setAttribute("aria-label", label.textContent); break; }
+      }
+    }
+  };
+  new MutationObserver(name).observe(document.body, { childList: true, subtree: true });
+});
+</script>"""
+
+
+def admitted(path: str, cookies: str, name: str, token: str) -> tuple[bool, bool]:
+    """Whether a request may pass, and whether it came with the token in its address.
+
+    path : with its query; cookies : the header; name : of the cookie that holds the token
+    """
+    given = parse_qs(urlsplit(path).query).get("token", [""])[0]
+    if hmac.compare_digest(given.encode(), token.encode()):
+        return True, True
+    try:
+        kept = SimpleCookie(cookies)
+    except CookieError:
+        return False, False
+    value = kept[name].value if name in kept else ""
+    return hmac.compare_digest(value.encode(), token.encode()), False
+
+
+@contextmanager
+def guarded(token: str, port: int) -> Iterator[None]:
+    """Servers of websockets started meanwhile ask for the token."""
+    serve, name = websockets.asyncio.server.serve, f"airflock_{port}"
+
+    def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
+        def check(connection: Any, request: Any) -> Any:
+            passes, anew = admitted(request.path, request.headers.get("Cookie", ""), name, token)
+            if not passes:
+                return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSED)
+            page = urlsplit(request.path).path in ("", "/", "/index.html")
+            if page and "Accept-Encoding" in request.headers:
+                del request.headers["Accept-Encoding"]
+            answer = process_request(connection, request)
+            if page and answer is not None and answer.body is not None:
+                answer.body = answer.body.replace(b"<head>", b"<head>" + OWN, 1)
+                del answer.headers["Content-Length"]
+                answer.headers["Content-Length"] = str(len(answer.body))
+            if anew and answer is not None:
+                answer.headers["Set-Cookie"] = f"{name}={token}; HttpOnly; SameSite=Strict; Path=/"
+            return answer
+
+        return serve(handler, *where, process_request=check, **rest)
+
+    with patch.object(websockets.asyncio.server, "serve", with_check):
+        yield

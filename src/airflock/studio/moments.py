@@ -1,0 +1,47 @@
+"""Moments kept while a flight goes on, to go back to: every few seconds at first, thinner the longer it lasts."""
+
+from bisect import bisect_right
+
+from airflock.engine.moments import Snapshot
+
+MOST = 256 * 2**20  # bytes of all moments together
+COUNT = 400  # moments at most
+
+
+class Moments:
+    """Snapshots of one flight in the order of their time; where there are too many, every second one is dropped.
+
+    every : flight seconds between two of them; doubles whenever they are thinned
+    """
+
+    def __init__(self, every: float = 2.0):
+        self.every = every
+        self._kept: list[Snapshot] = []
+        self._times: list[float] = []
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def due(self, time: float) -> bool:
+        """Whether the next moment should be kept at this time, s."""
+        return not self._times or time >= self._times[-1] + self.every - 1e-9
+
+    def keep(self, time: float, snapshot: Snapshot) -> None:
+        """Keep a moment, s; those after it belong to a past that is given up."""
+        self.forget_after(time)
+        self._kept.append(snapshot)
+        self._times.append(time)
+        if len(self._kept) > COUNT or sum(len(s.bytes) for s in self._kept) > MOST:
+            self._kept, self._times = self._kept[::2], self._times[::2]
+            self.every *= 2.0
+
+    def forget_after(self, time: float) -> None:
+        """Drop all moments at or after a time, s."""
+        count = bisect_right(self._times, time - 1e-9)
+        del self._kept[count:], self._times[count:]
+
+    def at(self, time: float) -> Snapshot | None:
+        """The last moment up to a time, s; the first of all if there is none before."""
+        if not self._kept:
+            return None
+        return self._kept[max(bisect_right(self._times, time + 1e-9) - 1, 0)]

@@ -1,0 +1,313 @@
+"""View: the only file that knows viser. Solids, lines, agents, charts and controls, in the words of the studio."""
+
+import secrets
+import socket
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import rich
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from airflock.errors import StudioError
+from airflock.stage import colours
+from airflock.stage.scene import Lines, Solid, dart
+from airflock.studio.controls import Control
+from airflock.studio.door import guarded
+
+TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
+NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
+WIDE = 0.8
+SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
+EMPTY = np.zeros((1, 2, 3), np.float32)
+STILL = (1.0, 0.0, 0.0, 0.0)
+
+
+class View:
+    """A page at an address of its own.
+
+    host : localhost, unless the page is to be seen from elsewhere; port : the one asked for, 0 for any free one
+    Raises StudioError where the port is in use.
+    """
+
+    def __init__(self, host: str, port: int, title: str):
+        port = port or _free_port(host)
+        _refuse_used(host, port)
+        token = secrets.token_urlsafe(12)
+        console = rich.get_console()
+        console.quiet = True  # viser prints panels of its own
+        with guarded(token, port):
+            self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        if self.server.get_port() != port:
+            self.server.stop()
+            raise StudioError(f"port {port} is in use; give another one with --port, or --port 0 for any free one")
+        shown = "localhost" if host in ("127.0.0.1", "0.0.0.0", "::", "") else host
+        self.address = f"http://{shown}:{port}/?token={token}"
+        gui, scene = self.server.gui, self.server.scene
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178), control_width="medium")
+        scene.set_up_direction("+z")
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(True, cast_shadow=False)
+        scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=1.0)
+        self._drawn: list[Any] = []
+        self._aim: dict[str, Any] = {}
+        self._met: dict[int, float] = {}
+        self.server.on_client_connect(self._welcome)
+        self._turn = 0
+
+    @property
+    def clients(self) -> int:
+        """Pages that are open."""
+        return len(self.server.get_clients())
+
+    def atomic(self) -> Any:
+        """All that is sent inside appears at once."""
+        return self.server.atomic()
+
+    def stop(self) -> None:
+        """Close the page at once."""
+        self.server.stop()
+
+    # ------------------------------------------------------------------------------------------------ standing
+
+    def clear(self) -> None:
+        """Take everything that was drawn away."""
+        for node in self._drawn:
+            node.remove()
+        self._drawn = []
+
+    def look_at(self, centre: NDArray[Any], span: float, flat: bool) -> None:
+        """Put every camera where `span` m around a centre fill it: straight above, or from the south."""
+        field = NARROW if flat else WIDE
+        far = 1.15 * span / np.tan(0.5 * field)
+        offset = np.array([0.0, -0.001, 1.0]) if flat else np.array([0.25, -0.8, 0.55])
+        place = centre + offset / np.linalg.norm(offset) * far
+        self._aim = {
+            "position": tuple(place), "look_at": tuple(centre), "fov": field, "near": 0.01 * far, "far": 20.0 * far,
+        }  # fmt: skip
+        self._point(self.server.initial_camera)
+        for client in self.server.get_clients().values():
+            self._welcome(client)
+
+    def _point(self, camera: Any) -> None:
+        for name, value in self._aim.items():  # the position first: it takes look_at along
+            setattr(camera, name, value)
+
+    def _welcome(self, client: Any) -> None:
+        """Point the camera of one page; until the page has answered, what it says of its camera is old."""
+        self._met[client.client_id] = time.monotonic()
+        self._point(client.camera)
+
+    def ground(self, span: float, height: float, centre: NDArray[Any]) -> None:
+        """A grid of 20 by 20 squares."""
+        cell = _round(span / 5.0)
+        self._drawn.append(
+            self.server.scene.add_grid(
+                "/ground", 40.0 * cell, 40.0 * cell, plane="xy", cell_size=cell, section_size=5.0 * cell,
+                cell_color=(225, 228, 232), section_color=(200, 205, 212), fade_distance=1e6, fade_strength=0.0,
+                position=(float(centre[0]), float(centre[1]), height - 0.01 * span),
+            )
+        )  # fmt: skip
+
+    def follow(self, target: NDArray[Any]) -> None:
+        """Let the camera of every open page look at a place, m, from where it looks now."""
+        for client in self.server.get_clients().values():
+            if time.monotonic() - self._met.get(client.client_id, 0.0) < SETTLING:
+                continue
+            camera = client.camera  # what it says of itself is late, so only the difference is taken from it
+            offset = np.asarray(camera.position) - np.asarray(camera.look_at)
+            camera.position = tuple(target + offset)
+            camera.look_at = tuple(target)
+
+    def solid(self, given: Solid, opacity: float | None = None) -> None:
+        """Something that stands."""
+        self._drawn.append(
+            self.server.scene.add_mesh_simple(
+                f"/world/{given.name}", given.vertices.astype(np.float32), given.faces, color=given.colour,
+                flat_shading=True, side="double", opacity=opacity, cast_shadow=False,
+            )
+        )  # fmt: skip
+
+    def lines(self, given: Lines, width: float = 2.0) -> None:
+        """Lines that stay."""
+        self._drawn.append(self._segments(f"/world/{given.name}", given.points, given.colour, width))
+
+    def _segments(self, name: str, points: NDArray[Any], colour: Any, width: float) -> Any:
+        return self.server.scene.add_line_segments(
+            name, points.astype(np.float32), colour, thickness=width, thickness_units="screen"
+        )
+
+    # ------------------------------------------------------------------------------------------------- moving
+
+    def agents(self, count: int, size: float) -> None:
+        """So many darts of a size, m; their trails, links and arrows."""
+        vertices, faces = dart(size)
+        at = np.zeros((count, 3), np.float32)
+        self._agents = self.server.scene.add_batched_meshes_simple(
+            "/agents", vertices, faces, batched_wxyzs=np.tile(np.array(STILL, np.float32), (count, 1)),
+            batched_positions=at, batched_colors=np.full((count, 3), 128, np.uint8), flat_shading=True, lod="off",
+            cast_shadow=False,
+        )  # fmt: skip
+        blank = np.zeros((count, 2, 3), np.float32)
+        tones = np.zeros((count, 2, 3), np.uint8)
+        self._trails = [self._segments(f"/trails/{t}", blank, tones, 1.5) for t in range(TRAILS)]
+        self._extra = {
+            name: self._segments(f"/{name}", EMPTY, colour, width) for name, (colour, width) in colours.LINES.items()
+        }
+        self._drawn += [self._agents, *self._trails, *self._extra.values()]
+
+    def move(self, position: NDArray[Any], turn: NDArray[Any], colour: NDArray[Any]) -> None:
+        """Put all agents somewhere: positions (agent, 3) m, quaternions (agent, 4), colours (agent, 3)."""
+        self._agents.batched_positions = position
+        self._agents.batched_wxyzs = turn
+        self._agents.batched_colors = _linear(colour)
+
+    def trail(self, begin: NDArray[Any], end: NDArray[Any], colour: NDArray[Any], done: bool) -> None:
+        """The newest piece of every agent's trail, again; where it is done, the next one takes the oldest's place."""
+        node = self._trails[self._turn % TRAILS]
+        self._turn += done
+        node.points = np.stack([begin, end], 1)
+        pale = (0.5 * colour + 0.5 * 235).astype(np.uint8)
+        node.colors = np.repeat(pale[:, None], 2, axis=1)
+
+    def no_trails(self) -> None:
+        """Forget all trails."""
+        blank = np.zeros((self._trails[0].points.shape[0], 2, 3), np.float32)
+        for node in self._trails:
+            node.points = blank
+
+    def extra(self, name: str, points: NDArray[Any]) -> None:
+        """Lines of a kind named in `colours.LINES`: (segment, 2, 3) m; none clears them."""
+        self._extra[name].points = points.astype(np.float32) if len(points) else EMPTY
+
+    def on_click(self, told: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
+        """Tell of a click into the scene: origin and direction of its ray."""
+
+        @self.server.scene.on_click()
+        def _(event: Any) -> None:
+            told(np.array(event.ray_origin), np.array(event.ray_direction))
+
+    # ------------------------------------------------------------------------------------------------ controls
+
+    def tabs(self, *names: str) -> list[Any]:
+        """Tabs; each is a context in which controls are made."""
+        group = self.server.gui.add_tab_group()
+        return [group.add_tab(name) for name in names]
+
+    def folder(self, name: str, is_open: bool = True) -> Any:
+        """A folder; a context in which controls are made."""
+        return self.server.gui.add_folder(name, expand_by_default=is_open)
+
+    def text(self, content: str = "") -> Any:
+        """HTML that can be rewritten: `.content`."""
+        return self.server.gui.add_html(content)
+
+    def button(self, label: str, told: Callable[[], None], hint: str = "", icon: str = "") -> Any:
+        """A button; `.label` can be rewritten."""
+        made = self.server.gui.add_button(
+            label, hint=hint or None, icon=getattr(viser.Icon, icon, None) if icon else None
+        )
+        made.on_click(lambda _: told())
+        return made
+
+    def row(self, actions: dict[str, Callable[[], None]]) -> None:
+        """Small buttons side by side."""
+        self.server.gui.add_button_group("", tuple(actions)).on_click(lambda event: actions[event.target.value]())
+
+    def command(self, label: str, key: Any, told: Callable[[], None]) -> None:
+        """A key that does something."""
+        self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: told())
+
+    def checkbox(self, label: str, value: bool, hint: str = "") -> Any:
+        """A switch; its state is `.value`."""
+        return self.server.gui.add_checkbox(label, value, hint=hint or None)
+
+    def menu(self, label: str, options: Sequence[str], value: str, told: Callable[[str], None], hint: str = "") -> Any:
+        """A menu; what is chosen is `.value`."""
+        made = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
+        made.on_update(lambda event: told(event.target.value) if event.client is not None else None)
+        return made
+
+    def number(self, label: str, value: int, low: int, high: int, told: Callable[[int], None], hint: str = "") -> Any:
+        """A field for a whole number."""
+        made = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
+        made.on_update(lambda event: told(int(event.target.value)) if event.client is not None else None)
+        return made
+
+    def slide(
+        self, label: str, low: float, high: float, step: float, value: float, told: Callable[[float], None],
+        hint: str = "",
+    ) -> Any:  # fmt: skip
+        """A slider; `told` hears of a hand on it, not of a value that is set from here."""
+        made = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
+        made.on_update(lambda event: told(float(event.target.value)) if event.client is not None else None)
+        return made
+
+    def control(self, given: Control, told: Callable[[str, Any], None]) -> Any:
+        """A slider or a menu for a parameter."""
+        if given.is_choice:
+            return self.menu(given.label, given.options, given.value, lambda v: told(given.key, v), given.hint)
+        return self.slide(
+            given.label, given.low, given.high, given.step, given.value, lambda v: told(given.key, v), given.hint
+        )
+
+    def chart(self, title: str, names: Sequence[str], band: bool = False) -> Any:
+        """A chart over time: `.data` is (time, *values). With a band, the last two are its ends, shaded."""
+        tones = ("#0072B2", "#D55E00", "#009E73")
+        series: list[Any] = [uplot.Series(label="t (s)")]
+        for number, name in enumerate(names):
+            edge = band and number >= len(names) - 2
+            stroke, width = ("#E69F00", 0.7) if edge else (tones[number], 2.0)
+            points = uplot.Series_Points(show=False)
+            series.append(uplot.Series(label=name, points=points, stroke=stroke, width=width))
+        shade = (uplot.Band(series=(len(names), len(names) - 1), fill="rgba(230,159,0,0.2)"),) if band else None
+        zero = np.zeros(2)
+        return self.server.gui.add_uplot(
+            (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade,
+            scales={"x": uplot.Scale(time=False)}, legend=uplot.Legend(show=True),
+            axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
+        )  # fmt: skip
+
+    def download(self, name: str, content: bytes) -> None:
+        """Send a file to every open page."""
+        for client in self.server.get_clients().values():
+            client.send_file_download(name, content)
+
+    def say(self, title: str, body: str, bad: bool = False) -> None:
+        """A notice on every open page."""
+        for client in self.server.get_clients().values():
+            client.add_notification(title, body, color="red" if bad else "blue", auto_close_seconds=8.0)
+
+
+def _linear(colour: NDArray[Any]) -> NDArray[np.uint8]:
+    """Colours of batched meshes, which viser takes as linear light: sRGB (IEC 61966-2-1) decoded."""
+    share = np.asarray(colour, float) / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.asarray(np.round(255.0 * light), np.uint8)
+
+
+def _free_port(host: str) -> int:
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])
+
+
+def _refuse_used(host: str, port: int) -> None:
+    """Raise StudioError where nothing can listen at a port; viser would take the next one without a word."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as fault:
+            raise StudioError(
+                f"{host}:{port}: {fault.strerror or fault}; give another port with --port, or --port 0 for any free one"
+            ) from fault
+
+
+def _round(length: float) -> float:
+    """1, 2 or 5 times a power of ten near a length, m."""
+    power = 10.0 ** np.floor(np.log10(max(length, 1e-9)))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda digit: abs(digit * power - length)) * power)

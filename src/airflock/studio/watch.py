@@ -1,0 +1,50 @@
+"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured."""
+
+import os
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from airflock.studio.player import Player
+
+
+def watch(
+    scenario: str | os.PathLike[str],
+    settings: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    say: Callable[[str], None] = print,
+) -> None:
+    """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, select agents, save what is found.
+
+    scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again
+    settings : keys like "model.p_rep" with the values that replace the file's
+    seed     : seed of the flight
+    host     : address to listen at; 0.0.0.0 lets other machines in
+    port     : port to listen at; 0 takes any free one
+    say      : is told each line: notes, the address of the page, faults
+
+    Raises ScenarioError for a scenario that cannot be flown, and StudioError for a port in use, one line each.
+
+    >>> import airflock
+    >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
+    """
+    player = Player(str(scenario), dict(settings or {}), seed)
+    for note in player.scenario.notes:
+        say(f"note: {note}")
+    from airflock.studio.page import Page
+    from airflock.studio.view import View
+
+    player.fault = say
+    say("compiling ...")
+    player.start()
+    view = View(host, port, player.where)
+    try:
+        page = Page(player, view)
+        say(f"watch at {view.address}  (Ctrl-C ends)")
+        page.run()
+    except KeyboardInterrupt:
+        say(f"ended at t = {player.flight.time:.1f} s")
+    finally:
+        view.stop()

@@ -1,0 +1,56 @@
+"""A replay from disk in a real browser."""
+
+import time
+
+import numpy as np
+import pytest
+from pixels import coloured, places, shot
+
+import airflock
+
+pytestmark = pytest.mark.browser
+PATIENCE = 120_000  # ms
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return airflock.simulate(airflock.load("vasarhelyi_2018/obstacles", {"agents": 20, "duration": 30.0}), 2)
+
+
+def opened(tab, recording, folder):
+    path = airflock.replay(recording).save(folder / "show.html")
+    asked = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(path.as_uri(), timeout=PATIENCE)
+    tab.wait_for_function("window.replay && window.replay.time > 0", timeout=PATIENCE)
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+
+
+def test_a_replay_plays_from_disk_and_shows_the_recorded_places(recording, tab, tmp_path):
+    opened(tab, recording, tmp_path)
+    kept = recording["position"].values[:, :, 0]
+    span = np.ptp(kept, axis=(0, 2))
+    shown = np.array(tab.evaluate("[0, 7, 19].map(a => [0, 10, 100].map(f => replay.position(a, f)))"))
+    stride = round(0.1 / float(recording["time"][1] - recording["time"][0])) or 1
+    for row, agent in zip(shown, (0, 7, 19), strict=True):
+        for place, frame in zip(row, (0, 10, 100), strict=True):
+            assert (np.abs(place - kept[frame * stride, :, agent]) <= 0.51 * span / 65535 + 1e-4).all()
+    assert places(coloured(shot(tab), right=740)) >= 15
+    assert not tab.faults
+
+
+def test_pause_seek_and_space(recording, tab, tmp_path):
+    opened(tab, recording, tmp_path)
+    tab.get_by_role("button", name="play or pause").click()
+    assert tab.evaluate("replay.playing") is False
+    then = tab.evaluate("replay.time")
+    first = shot(tab)
+    time.sleep(1.0)
+    assert tab.evaluate("replay.time") == then
+    tab.evaluate("replay.seek(25)")
+    tab.wait_for_function("document.getElementById('clock').textContent === '25.0 s'", timeout=PATIENCE)
+    assert (np.abs(shot(tab) - first).max(axis=2) > 60).mean() > 1e-3
+    tab.get_by_role("button", name="3-D").click()
+    time.sleep(1.0)
+    assert places(coloured(shot(tab), right=740)) >= 10
+    assert not tab.faults

@@ -1,0 +1,92 @@
+"""Replays: positions packed and unpacked, and a page that holds everything that it needs."""
+
+import hashlib
+import html
+import json
+import re
+from importlib import resources
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import airflock
+from airflock.errors import RecordingError
+from airflock.replays.pack import pack, unpack
+
+FRAMES = st.tuples(st.integers(1, 9), st.integers(2, 3), st.integers(1, 4))
+
+
+@given(FRAMES.flatmap(lambda shape: arrays(float, shape, elements=st.floats(-1e4, 1e4, width=32))))
+def test_unpacked_positions_lie_within_half_a_quantum(position):
+    packed = pack(position)
+    away = np.abs(unpack(packed) - position).max(axis=(0, 2))
+    assert (away <= 0.5 * np.array(packed.quantum) + 1e-9 * np.abs(position).max()).all()
+    assert (np.array(packed.quantum) <= np.maximum(np.ptp(position, axis=(0, 2)) / 65535, 1e-12)).all()
+
+
+@pytest.fixture(scope="module")
+def recording():
+    scenario = airflock.load("vasarhelyi_2018/4ms", {"agents": 12, "duration": 20.0})
+    return airflock.simulate(scenario, 1, events=[{"step": 500, "kind": "change", "data": {"model.p_rep": 0.3}}])
+
+
+def about(page):
+    return json.loads(re.search(r'id="about">(.*?)</script>', page.text, re.S)[1])
+
+
+def test_a_page_names_its_flight_its_events_and_loads_nothing(recording):
+    page = airflock.replay(recording)
+    told = about(page)
+    assert told["events"] == [[5.0, "change model.p_rep = 0.3"]]
+    assert told["shape"][1:] == [2, 12] and told["seed"] == 1
+    assert not re.search(r'(src|href)="?(https?:|//)', page.text.replace(three(), ""))
+    assert html.escape(page.text, quote=True) in page._repr_html_()
+
+
+def test_a_minute_of_a_thousand_drones_takes_less_than_five_megabytes():
+    rng = np.random.default_rng(3)
+    speed = 4.0 * np.exp(1j * np.cumsum(rng.normal(0.0, 0.1, (600, 1000)), axis=0))
+    path = np.cumsum(0.1 * speed + rng.normal(0.0, 0.01, (600, 1000)), axis=0)
+    size = len(pack(np.stack([path.real, path.imag], axis=1)).data) * 4 / 3 + len(three())
+    assert size < 5e6
+
+
+def test_frames_are_thinned_to_the_rate(recording):
+    assert about(airflock.replay(recording, rate=2.0))["period"] == pytest.approx(0.6)  # frames are 0.2 s apart
+
+
+def test_close_pairs_become_collisions_once(recording):
+    near = recording.copy(deep=True)
+    near["position"][50:60, :, 0, 1] = near["position"].values[50:60, :, 0, 0] + 0.1
+    period = float(recording["time"][1] - recording["time"][0])
+    collisions = [entry for entry in about(airflock.replay(near))["collisions"] if entry[1:] == [0, 1]]
+    assert len(collisions) == 1 and collisions[0][0] == pytest.approx(50 * period)
+
+
+def test_names_cannot_break_out_of_the_page(recording):
+    odd = recording.assign_attrs(airflock_name="</script><b>@DATA@ & co")
+    page = airflock.replay(odd)
+    assert about(page)["name"] == "</script><b>@DATA@ & co" and "</script><b>" not in page.text
+
+
+def test_gaps_and_wrong_endings_are_one_line(recording, tmp_path):
+    holes = recording.copy(deep=True)
+    holes["position"][3, 0, 0, 0] = np.nan
+    with pytest.raises(RecordingError, match="missing, first agent_0"):
+        airflock.replay(holes)
+    with pytest.raises(RecordingError, match="the only format written here"):
+        airflock.replay(recording).save(tmp_path / "show.pdf")
+
+
+def three():
+    return (resources.files("airflock.replays") / "three.min.js").read_text(encoding="utf-8")
+
+
+def test_the_library_is_the_one_that_is_named():
+    root = resources.files("airflock.replays")
+    stored = (root / "three.min.js").read_bytes()
+    assert len(stored) < 1_000_000
+    assert hashlib.sha256(stored).hexdigest() in (root / "three.md").read_text(encoding="utf-8")
