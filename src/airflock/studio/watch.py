@@ -16,7 +16,7 @@ def watch(
     port: int = 8080,
     say: Callable[[str], None] = print,
 ) -> None:
-    """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, select agents, save what is found.
+    """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, save what is found.
 
     scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again
     settings : keys like "model.p_rep" with the values that replace the file's
