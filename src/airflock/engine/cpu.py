@@ -108,16 +108,47 @@ def compiling(model: str) -> Iterator[None]:
 
 
 def measure_frames(
-    plan: Plan, tables: Tables, frames: NDArray[Any], period: float = 0.0, device: str = "cpu"
+    plan: Plan,
+    tables: Tables,
+    frames: NDArray[Any],
+    period: float = 0.0,
+    device: str = "cpu",
+    present: NDArray[np.bool_] | None = None,
 ) -> tuple[dict[str, Any], NDArray[np.float64]]:
-    """Score frames (time, component, agent), period s apart: combined values, and the values of every instant."""
+    """Score frames (time, component, agent), period s apart: combined values, and the values of every instant.
+
+    present : (time, agent), whether an agent is there at all; by default all are. An instant counts with those who are
+              there, one with fewer than two of several does not (nan); what a metric remembers of an agent waits for it
+    """
     driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
     real = tables.row.dtype
     state = State(plan, tables, driver)
     own = state.arrays
     series = np.full((frames.shape[0], len(own["values"])), np.nan)
-    driver.measure_frames(
-        tables.row, tables.whole, tables.edges, tables.spans, state.scene, own["work"], own["memory"], own["labels"],
-        own["values"], own["sums"], np.ascontiguousarray(frames, real), series, real.type(period), *state.scratch,
-    )  # fmt: skip
+
+    def measured(first: int, part: NDArray[Any]) -> None:
+        driver.measure_frames(
+            first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
+            own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
+            *state.scratch,
+        )  # fmt: skip
+
+    if present is None or present.all():
+        measured(0, frames)
+        return state.values(), series
+    remembered = own["memory"][:, : frames.shape[2]].copy()
+    for first, last in _runs(present):
+        there = np.flatnonzero(present[first])
+        if len(there) >= min(2, frames.shape[2]):
+            state.set_whole("agents", len(there))
+            own["memory"][:, : len(there)] = remembered[:, there]
+            measured(first, frames[first:last][:, :, there])
+            remembered[:, there] = own["memory"][:, : len(there)]
     return state.values(), series
+
+
+def _runs(present: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last instant (exclusive) of each stretch in which the same agents are there."""
+    changes = np.flatnonzero((present[1:] != present[:-1]).any(axis=1)) + 1
+    borders = [0, *changes.tolist(), len(present)]
+    return list(zip(borders[:-1], borders[1:], strict=True))

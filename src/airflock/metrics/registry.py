@@ -202,7 +202,10 @@ def numbers_of(found: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]
     return tuple(dict.fromkeys((*own, *found.reports)))
 
 
+PRESENCE = {"present": ("", "share of individuals and instants that a recording holds")}
+
+
 def reports(found: MetricSet) -> dict[str, tuple[str, str]]:
     """Unit and meaning of every order parameter that flights scored by a set report."""
     own = {name: about for each in found.metrics for name, about in each.reports.items()}
-    return own | dict(found.reports) | GOALS
+    return own | dict(found.reports) | GOALS | PRESENCE

@@ -79,10 +79,11 @@ def check(found: xr.Dataset, where: str = "recording") -> None:
         raise RecordingError("\n".join(f"{where}: {fault}" for fault in faults))
 
 
-def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float]:
-    """Frames (time, component, agent) of position and velocity, and the time between frames, s.
+def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any], float, NDArray[np.bool_]]:
+    """Frames (time, component, agent) of position and velocity, the time between frames (s), and who is there.
 
-    Velocity is differentiated from position where it is not recorded. Missing values are an error that names the first.
+    An agent of which a number is missing (nan) at an instant is not there then: (time, agent). Velocity is
+    differentiated from position, within stretches in which the agent is there, where it is not recorded.
     """
     check(found, where)
     order = ("time", "space", "keypoint", "individual")
@@ -99,17 +100,31 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     if "velocity" in found:
         velocity = found["velocity"].transpose(*order).isel(keypoint=0).values
     elif len(times) > 1:
-        velocity = np.gradient(position, times, axis=0)
+        velocity = _differentiated(position, times)
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
-    bad = np.argwhere(~np.isfinite(frames))
-    if bad.size:
-        time, _, agent = bad[0]
-        name = str(found["individual"].values[agent])
-        share = len({(t, a) for t, _, a in bad.tolist()}) / (frames.shape[0] * frames.shape[2])
-        raise RecordingError(
-            f"{where}: {share:.1%} of the positions are missing, first {name} at t = {times[time]:g} s; "
-            "interpolate or drop them before scoring"
-        )
-    return frames, period
+    endless = np.argwhere(np.isinf(frames))
+    if len(endless):
+        time, component, agent = endless[0]
+        what, name = "position" if component < position.shape[1] else "velocity", found["individual"].values[agent]
+        raise RecordingError(f"{where}: the {what} of {name} at t = {times[time]:g} s is infinite")
+    present = ~np.isnan(frames).any(axis=1)
+    if not present.any():
+        raise RecordingError(f"{where}: nobody is there at any instant: a position or velocity is always missing")
+    return frames, period, present
+
+
+def _differentiated(position: NDArray[Any], times: NDArray[np.float64]) -> NDArray[Any]:
+    """Velocity (time, axis, agent) from positions, agent by agent within the stretches in which it is there."""
+    there = ~np.isnan(position).any(axis=1)
+    if there.all():
+        return np.asarray(np.gradient(position, times, axis=0))
+    velocity = np.full_like(position, np.nan)
+    for agent in range(position.shape[2]):
+        borders = np.flatnonzero(np.diff(there[:, agent], prepend=False, append=False))
+        for first, last in zip(borders[::2].tolist(), borders[1::2].tolist(), strict=True):
+            if last - first > 1:
+                stretch = slice(first, last)
+                velocity[stretch, :, agent] = np.gradient(position[stretch, :, agent], times[stretch], axis=0)
+    return velocity

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from airflock.aero import descent
 from airflock.body.registry import BODIES
@@ -17,6 +18,7 @@ from airflock.core.vocabulary import Own, asks
 from airflock.doors import from_outside
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
+from airflock.engine.plan import Plan
 from airflock.engine.simulate import finish, plan_of, score_flights
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
@@ -139,9 +141,11 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     """Order parameters of a recording, and their course over time.
 
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
-    metrics.collision_period.
+    metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
+    who are, means over time are means over instants at which at least two are, and the value `present` tells the share
+    of individuals and instants that is there.
     """
-    frames, period = frames_of(recording)
+    frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
     plan = plan_of(scenario, precision=precision)
@@ -149,13 +153,25 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
     steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
     numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
-    values, series = cpu.measure_frames(plan, numbers, frames, period)
+    _refuse_gaps(plan, present)
+    values, series = cpu.measure_frames(plan, numbers, frames, period, present=present)
     names = [name for name, _, _ in columns(plan.metrics)]
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times, columns=names)
     if frames.shape[2] == 1:  # no pair, no distance
         course[[name for name in nearest.PAIRED if name in names]] = np.nan
-    return finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values), course
+    scores = finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values)
+    return scores | ({} if present.all() else {"present": float(present.mean())}), course
+
+
+def _refuse_gaps(plan: Plan, present: NDArray[np.bool_]) -> None:
+    """Contacts with the scene are found on the way from frame to frame, which a gap cuts."""
+    sweeps = any(metric.agent is not None and "touches" in asks(metric.agent, "agent") for metric in plan.metrics)
+    if plan.scene and sweeps and not present.all():
+        raise RecordingError(
+            f"recording: {1.0 - present.mean():.1%} of the positions are missing, and contacts with the scene are found"
+            " on the way from frame to frame; score it with --set metrics.kind=vasarhelyi, or fill the gaps"
+        )
 
 
 class _Nothing(Parameters):
@@ -195,9 +211,9 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
     if document is not None:
         with from_outside(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
             return _flown(document, recording, dict(settings or {}))
-    frames, period = frames_of(recording)
+    frames, period, _ = frames_of(recording)
     dims = frames.shape[1] // 2
-    speed = float(np.linalg.norm(frames[:, dims:], axis=1).mean())
+    speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
     document = {
         "agents": 1,
         "dt": period,

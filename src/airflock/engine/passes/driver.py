@@ -188,7 +188,10 @@ def replay(plan: Plan) -> str:
 
 
 def replay_stages(plan: Plan) -> Builder:
-    """Stages of the driver that measures a recording; the last one is `measure_frames`."""
+    """Stages of the driver that measures a recording; the last one is `measure_frames`.
+
+    It measures frames of which the first one has the number `first`, so that a recording may come in parts.
+    """
     build = Builder(plan)
     axes = plan.axes
     names = [*axes, *(f"v{a}" for a in axes)]
@@ -197,7 +200,7 @@ def replay_stages(plan: Plan) -> Builder:
     lines = build.whole("agents", "sample_every", "collide_every") + ["n = agents", SPAN]
     lines += build.bind(names)
     frame = ["time = real(step) * frame_period"]
-    frame += loop("i in range(n)", [f"{name}[i] = frames[step, {c}, i]" for c, name in enumerate(names)])
+    frame += loop("i in range(n)", [f"{name}[i] = frames[step - first, {c}, i]" for c, name in enumerate(names)])
     frame += _world(build, "frame_period")
     for clock, every in (("collision", "collide_every"), ("sample", "sample_every")):
         if clock in _clocks(plan):
@@ -205,9 +208,9 @@ def replay_stages(plan: Plan) -> Builder:
             look += measure.accumulate(build, clock)
             frame += branch(f"step % {every} == 0", look)
     frame += loop("c in range(len(values))", ["series[step, c] = values[c]"])
-    lines += loop("step in range(frames.shape[0])", frame)
+    lines += loop("step in range(first, first + frames.shape[0])", frame)
     build.function(
-        "measure_frames(row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
+        "measure_frames(first, row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
         " frame_period" + (", scratch)" if flock.owners(plan) else ")"),
         lines,
         "return 0",
