@@ -38,8 +38,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
         {
-            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **FLOWN, **TABLE, "table": "the table returned",
-            "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
+            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **FLOWN, **TABLE,
+            "table": "the table returned", "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
         },
     ),
     "evolve": Counterpart(
