@@ -118,9 +118,9 @@ def order_parameters() -> None:
     units: dict[str, tuple[str, str]] = {}
     sets: dict[str, list[str]] = {}
     for kind, found in registry.SETS.items():
-        for metric in found:
+        for metric in found.metrics:
             homes |= {name: metric.sample for name in metric.reports if name not in homes}
-        for name, about in registry.reports(kind).items():
+        for name, about in registry.reports(found).items():
             units.setdefault(name, about)
             sets.setdefault(name, []).append(kind)
     for module in (fitness_kidger, fitness_dimock, fitness_vasarhelyi):
@@ -133,7 +133,10 @@ def order_parameters() -> None:
     pieces = [
         "# Order parameters\n\nWhat a flight is scored with. The key `metrics.kind` picks a set; "
         "`airflock keys metrics` lists what they can be told.\n\n",
-        table(("metrics.kind", "order parameters"), ((f"`{k}`", _names(registry.reports(k))) for k in registry.SETS)),
+        table(
+            ("metrics.kind", "order parameters"),
+            ((f"`{k}`", _names(registry.reports(found))) for k, found in registry.SETS.items()),
+        ),
         "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
         "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
         "$\\Theta$ is 1 above zero, else 0.\n",
@@ -206,6 +209,8 @@ def vocabulary() -> None:
         "sample": "of an order parameter: the values of one instant",
         "survey": "of an order parameter: asked once for the whole flock",
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
+        "fitness": "of a metric set: named values of a whole flight, from its order parameters",
+        "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
     }
     wrong = sorted(set(told) ^ set(VOCABULARY))
     if wrong:
@@ -261,13 +266,18 @@ def commands() -> None:
         "function's arguments.\n\n",
         table(("command", "in Python"), ((f"[`airflock {n}`](#{n})", f"`{c.call}`") for n, c in COUNTERPARTS.items())),
     ]
-    for name, command in sorted(group.commands.items()):  # type: ignore[attr-defined]
-        pieces.append(f"\n({name})=\n## {name}\n\n{plain(_help(command.help or ''))}\n\n")
+    listed = dict(group.commands)  # type: ignore[attr-defined]
+    for name, command in group.commands.items():  # type: ignore[attr-defined]
+        inner = {key: found for key, found in getattr(command, "commands", {}).items() if not found.hidden}
+        listed |= {f"{name} {key}": found for key, found in inner.items()}
+    for name, command in sorted(listed.items()):
+        options = COUNTERPARTS[name].options if name in COUNTERPARTS else {}
+        pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{plain(_help(command.help or ''))}\n\n")
         rows = []
         for option in command.params:
             named = option.opts[0].startswith("-")
             flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
-            about = COUNTERPARTS[name].options.get(option.name, "")
+            about = options.get(option.name, "")
             argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
             rows.append((flag, plain(getattr(option, "help", "") or ""), argument))
         pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")

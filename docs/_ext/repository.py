@@ -26,7 +26,10 @@ def repository() -> None:
         copy(folder / "README.md", f"papers/{folder.name}/index.md", after)
         for path in extra:
             copy(path, f"papers/{folder.name}/{path.stem.lower()}.md")
-    listed = "\n".join(f"{path.name}/index" for path in papers)
+    alone = sorted((ROOT / "papers").glob("*.md"))
+    for path in alone:
+        copy(path, f"papers/{path.stem.lower()}.md")
+    listed = "\n".join([f"{path.name}/index" for path in papers] + [path.stem.lower() for path in alone])
     head = (
         "# Papers\n\nEvery publication that is recomputed: each number that was compared, what was flown for it, and "
         "whether it was met. `airflock paper NAME` flies it again.\n\n"
@@ -63,6 +66,8 @@ def _page_of(file: Path) -> str | None:
     if not file.is_relative_to(ROOT):
         return None
     parts = file.relative_to(ROOT).parts
+    if parts[0] == "papers" and len(parts) == 2 and file.suffix == ".md":
+        return f"papers/{file.stem.lower()}.md"
     if parts[0] == "papers" and len(parts) in (2, 3) and (len(parts) == 2 or file.suffix == ".md"):
         rest = "index" if len(parts) == 2 or parts[2] == "README.md" else file.stem.lower()
         return f"papers/{parts[1]}/{rest}.md"

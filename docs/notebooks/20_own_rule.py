@@ -114,4 +114,4 @@ except airflock.AirflockError as fault:
     print(fault)
 
 # %%
-# In a file of its own, `mine.py`, the same law flies by `model.kind = "mine.py"` in a scenario file.
+# In a file of its own, `mine.py`, the same law flies by `model.kind = "mine.py"` in a scenario file, with `--trust`.

@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.papers.recompute import paper as paper
     from airflock.plots.picture import plot as plot
     from airflock.plots.video import video as video
+    from airflock.recordings.exports.export import export as export
     from airflock.recordings.files import load_recording as load_recording
     from airflock.recordings.files import save as save
     from airflock.recordings.flights import recording_of as recording_of
@@ -77,6 +78,7 @@ _WHERE = {
     "video": "airflock.plots.video",
     "replay": "airflock.replays",
     "watch": "airflock.studio.watch",
+    "export": "airflock.recordings.exports.export",
     "save": "airflock.recordings.files",
     "identify": "airflock.identify",
     "load_tracks": "airflock.recordings.imports.load",

@@ -43,7 +43,10 @@ def test_files_extend_files_beside_them_and_their_own_files_are_found(tmp_path):
     )
     written(tmp_path, 'agents = 7\n[model]\nkind = "law.py"\nv = 2.0\n', "base/first.toml")
     written(tmp_path, 'extends = "base/first.toml"\n[model]\nv = 3.0\n', "second.toml")
-    third = load(written(tmp_path, 'extends = "second.toml"\nduration = 5.0\n', "third.toml"))
+    name = written(tmp_path, 'extends = "second.toml"\nduration = 5.0\n', "third.toml")
+    with pytest.raises(ScenarioError, match=r"third.toml: model.kind = .*law.py': would run the code in .*--trust"):
+        load(name)  # consent to the code of an extended file is asked for, too
+    third = load(name, trust=True)
     assert (third.agents, third.parameters.v, third.model.name, third.flight.duration) == (7, 3.0, "law", 5.0)
 
 

@@ -27,13 +27,34 @@ Motion = dict[str, NDArray[np.float64]]
 def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
     """Run the standing list of truths on a body and return a report with one line a truth.
 
-    what       : a Body, a module, a class, a mapping such as globals(), a name of ours, or a file that ends in .py
-    parameters : values that differ from the defaults, by name; seed: of the random motions, in every fault
-
     A motion that is turned or seen in a mirror turns or mirrors its result; at rest the result is finite; a halved time
     step halves the error; in other units it is the same motion; the rule stays in single precision. A body that
-    rightly breaks one of them says which and why: VIOLATES = {"mirror": "a propeller turns one way"}. Raises CheckError
-    for any other.
+    rightly breaks one of them says which and why: VIOLATES = {"mirror": "a propeller turns one way"}.
+
+    Parameters
+    ----------
+    what : Body, module, class, mapping or str
+        A body: a Body, a namespace such as globals(), a name of ours, or a file that ends in .py.
+    parameters : mapping, optional
+        Values that differ from the defaults, by name.
+    seed : int
+        Of the random motions; it stands in every fault.
+
+    Returns
+    -------
+    Report
+        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
+
+    Raises
+    ------
+    CheckError
+        If a truth does not hold that the body does not declare.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.check_body("multirotor").broken
+    ()
     """
     found = _named(what) if isinstance(what, str) else what if isinstance(what, Body) else body(what)
     b = found.Parameters(**dict(parameters or {}))

@@ -32,13 +32,34 @@ Flock = NDArray[np.float64]  # (instant, agent, component): position (m) and vel
 def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     """Run the standing list of truths on an order parameter and return a report with one line a truth.
 
-    what       : a Metric, a MetricSet, its name or file (.py), a list of metrics, or a namespace such as globals()
-    dimensions : 2 or 3; seed: of the random flocks, in every fault
-
     A flock that is turned, shifted, renumbered or seen in a mirror keeps its order parameters; one agent alone and two
     in one place give numbers (or nan); in other units each value changes as its unit in REPORTS says. An order
     parameter that rightly breaks one of them says which and why: VIOLATES = {"mirror": "the sense of rotation"}.
-    Raises CheckError for any other.
+
+    Parameters
+    ----------
+    what : Metric, MetricSet, list, namespace or str
+        Order parameters: a metric, a set, its name or file (.py), a list of metrics, or a namespace such as globals().
+    dimensions : int
+        2 or 3.
+    seed : int
+        Of the random flocks; it stands in every fault.
+
+    Returns
+    -------
+    Report
+        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
+
+    Raises
+    ------
+    CheckError
+        If a truth does not hold that the order parameter does not declare.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> airflock.check_metric("order").broken
+    ()
     """
     found = _named(what) if isinstance(what, str) else as_set(what)
     scenario = _scenario(found, dimensions)

@@ -46,15 +46,40 @@ def check_model(
 ) -> Report:
     """Run the standing list of truths on a flocking law and return a report with one line a truth.
 
-    law        : a Model, a module, a class, a mapping such as globals(), a name of ours, or a file that ends in .py
-    parameters : values that differ from the defaults, by name
-    dimensions : 2 or 3; seed: of the random scenes, in every fault
-    compiled   : also fly the law compiled, which takes some seconds, and compare
-
     Turned, shifted, renumbered and mirrored scenes must turn, shift, renumber and mirror the command; a lone agent
     flies straight on; two agents at any distance get finite commands; a halved time step halves the error; a flight in
     other units is the same flight; no rule leaves single precision. A law that rightly breaks one of them says which
-    and why: VIOLATES = {"mirror": "neighbours are passed on the right"}. Raises CheckError for any other.
+    and why: VIOLATES = {"mirror": "neighbours are passed on the right"}.
+
+    Parameters
+    ----------
+    law : Model, module, class, mapping or str
+        A flocking law: a Model, a namespace such as globals(), a name of ours, or a file that ends in .py.
+    parameters : mapping, optional
+        Values that differ from the defaults, by name.
+    dimensions : int
+        2 or 3.
+    seed : int
+        Of the random scenes; it stands in every fault.
+    compiled : bool
+        Also fly the law compiled, which takes some seconds, and compare.
+
+    Returns
+    -------
+    Report
+        Printed, one line a truth; `broken` are the names of those that do not hold, declared or not.
+
+    Raises
+    ------
+    CheckError
+        If a truth does not hold that the law does not declare.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> report = airflock.check_model("vicsek_1995", dimensions=2)
+    >>> report.broken
+    ()
     """
     found = law if isinstance(law, Model) else find_model(law, trust=True) if isinstance(law, str) else model(law)
     made = law_of(found, dict(parameters or {}), dimensions)

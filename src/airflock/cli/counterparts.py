@@ -8,7 +8,10 @@ from typing import NamedTuple
 
 
 class Counterpart(NamedTuple):
-    """One command: how it is called in Python, the public function, and option → argument (or what stands for it)."""
+    """One command: how it is called in Python, the function, and option → argument (or what stands for it).
+
+    A function without a dot is a public name of `airflock`; the others, with their module, take more preparation.
+    """
 
     call: str
     function: str
@@ -16,7 +19,9 @@ class Counterpart(NamedTuple):
 
 
 SETTINGS = {"changes": "settings", "agents": 'settings["agents"]', "duration": 'settings["duration"]'}
+CODE = {"law": "law", "trust": "trust"}
 LOADED = {"changes": "airflock.load(name, settings)", "agents": "airflock.load", "duration": "airflock.load"}
+LOADED |= {"law": "airflock.load", "trust": "airflock.load"}
 TABLE = {"as_json": "the value returned"}
 SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
 FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
@@ -33,8 +38,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
         {
-            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **FLOWN, **TABLE, "table": "the table returned",
-            "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
+            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **FLOWN, **TABLE,
+            "table": "the table returned", "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
         },
     ),
     "evolve": Counterpart(
@@ -42,7 +47,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
-            "quiet": "watch",
+            "quiet": "watch", "trust": "trust",
             **dict.fromkeys(("algorithm", "population", "generations", "seeds", "seed", "restarts"), "search_keys"),
         },
     ),
@@ -50,14 +55,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
             "scenario": "scenario", **SEEDS, "threads": "threads", **TABLE, "changes": LOADED["changes"],
-            "duration": "airflock.load", "out": "airflock.evolve.harden.document",
+            "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
             **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.harden.evolved_again"),
         },
     ),
     "plot": Counterpart(
         'airflock.plot("flight.nc", "series")', "plot",
         {
-            "what": "what", "kind": "kind", "seed": "seed", "begin": "start", "end": "stop", **SETTINGS,
+            "what": "what", "kind": "kind", "seed": "seed", "begin": "start", "end": "stop", **SETTINGS, **CODE,
             "out": "airflock.plots.save_figure",
         },
     ),
@@ -76,6 +81,45 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "save": "airflock.display.show.recording_of", "plot": "airflock.plots.stood",
         },
     ),
+    "import": Counterpart(
+        'airflock.load_tracks("fish.csv", unit="mm")', "load_tracks",
+        {
+            "files": "what", "save": "airflock.save", **TABLE,
+            **{
+                name: name
+                for name in (
+                    "map", "unit", "scale", "time_unit", "fps", "keypoint", "axes", "origin", "rate", "bridge",
+                    "begin", "end", "same_clock", "accept", "decimal", "delimiter", "precision",
+                )
+            },
+        },
+    ),
+    "export": Counterpart(
+        'airflock.export(recording, "flight.csv")', "export",
+        {"recording": "recording", "out": "path", "layout": "layout"},
+    ),
+    "identify": Counterpart(
+        'airflock.identify(files, "vasarhelyi_2018/real_6ms")', "identify",
+        {
+            "files": "what", "like": "like", "heard": "heard", "standing": "standing", "same_clock": "same_clock",
+            "accept": "accept", "changes": "airflock.load", **TABLE,
+            "out": "airflock.identify.run.Identified.document",
+            **dict.fromkeys(("conservative", "uncertain"), "airflock.identify.run.Identified.document"),
+            "plot": "airflock.plots.identified.identified", "plan": "airflock.identify.plan.flight_card",
+            "flights": "airflock.identify.check.posterior",
+            **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
+        },
+    ),
+    "fleet": Counterpart(
+        "airflock.fleet.compare.fly(scenario, card, seed)", "airflock.fleet.compare.fly",
+        {
+            "scenario": "scenario", "seeds": "seed", "first_seed": "seed", "faults": "faults", "ground": "ground",
+            **{name: LOADED[name] for name in SETTINGS}, **TABLE,
+            **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
+            "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
+        },
+    ),
+    "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
         {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads", **TABLE},
@@ -86,9 +130,12 @@ COUNTERPARTS: dict[str, Counterpart] = {
     ),
     "keys": Counterpart('airflock.keys("radio")', "keys", {"section": "section", **TABLE}),
     "validate": Counterpart(
-        'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings"}
+        'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
     ),
-    "doctor": Counterpart("airflock.doctor()", "doctor", TABLE),
+    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.engine.store.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
-LIBRARY = ("load", "simulate", "save", "load_recording", "over_time", "starting_set", "model", "quantity", "choice")
+LIBRARY = (
+    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body",
+    "metric", "metric_set", "check_model", "check_body", "check_metric", "quantity", "choice",
+)  # fmt: skip

@@ -31,8 +31,8 @@ app = typer.Typer(
     cls=Fly, no_args_is_help=True, rich_markup_mode="rich",
     help="""Fly the same law on real drones: a card for all, a node beside each autopilot, orders of one operator.
 
-    Example: [bold]airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10[/bold],
-    then on each drone [bold]airflock fly mission.json --member 3 --autopilot udp:127.0.0.1:14540 --radio ...[/bold]
+    Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10,
+    then on each drone airflock fly mission.json --member 3 --autopilot udp:127.0.0.1:14540 --radio ...
     """,
 )  # fmt: skip
 

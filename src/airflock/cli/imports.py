@@ -168,14 +168,10 @@ def export(
 
     Example: airflock export flight.nc --out flight.csv
     """
-    from airflock.recordings.exports import movement
-    from airflock.recordings.exports import tables as long
+    from airflock.recordings.exports.export import ENDINGS
+    from airflock.recordings.exports.export import export as write
     from airflock.recordings.files import load_recording
 
-    options.writable((out, (".csv", ".parquet", ".nc")))
-    found = load_recording(recording)
-    if out.suffix.lower() == ".nc":
-        movement.write_movement(found, out, old=layout is Layout.OLD)
-    else:
-        (long.write_csv if out.suffix.lower() == ".csv" else long.write_parquet)(found, out)
+    options.writable((out, ENDINGS))
+    write(load_recording(recording), out, layout=layout.value)
     tables.say(f"saved {out}")

@@ -8,9 +8,6 @@ from airflock.cli import options, tables
 from airflock.doors import from_outside, is_file, read_text
 from airflock.errors import AirflockError
 
-PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
-EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
-
 
 def presets(
     name: Annotated[

@@ -159,7 +159,38 @@ class Body:
 
 
 def body(namespace: Any, name: str = "") -> Body:
-    """Gather a body from a module, a class or a mapping of names; refuse what the contract does not know."""
+    """Gather a body from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds Parameters, ACCEPTS (the command that it takes: velocity, acceleration or heading), INTEGRATION (whether
+        positions move with the "old" or the "new" velocity) and the rule move.
+    name : str, optional
+        How the body is called; by default the namespace's.
+
+    Returns
+    -------
+    Body
+        To be given to `airflock.load(..., body=...)`.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or the rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Obedient:
+    ...     ACCEPTS, INTEGRATION = "velocity", "new"
+    ...     class Parameters(airflock.Parameters):
+    ...         pass
+    ...     def move(cx, cy, cz):
+    ...         return cx, cy, cz
+    >>> airflock.body(Obedient).accepts
+    'velocity'
+    """
     found, name = names_of(namespace, name)
     for needed in ("Parameters", "ACCEPTS", "INTEGRATION", "move"):
         if needed not in found:
@@ -220,7 +251,41 @@ RULES_AND_RECORDS = (
 
 
 def metric(namespace: Any, name: str = "") -> Metric:
-    """Gather an order parameter from a module, a class or a mapping; refuse what the contract does not know."""
+    """Gather an order parameter from a module, a class or a mapping; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds sample and Sample, and any of pair, agent, linked, member, cluster, survey, their records and REPORTS, as
+        `Metric` lists them. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+    name : str, optional
+        How it is called; by default the namespace's.
+
+    Returns
+    -------
+    Metric
+        To be given to `airflock.load(..., metrics=...)`, alone or in a list.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from typing import NamedTuple
+    >>> class Height:
+    ...     REPORTS = {"height": ("m", "mean height of the flock")}
+    ...     Agent = NamedTuple("Agent", [("z", float)])
+    ...     Sample = NamedTuple("Sample", [("height", float)])
+    ...     def agent(z):
+    ...         return Agent(z)
+    ...     def sample(agents, n):
+    ...         return Sample(agents.z / n)
+    >>> airflock.metric(Height).reports["height"]
+    ('m', 'mean height of the flock')
+    """
     found, name = names_of(namespace, name)
     if "sample" not in found:
         raise RuleError(f"metric {name} lacks sample")

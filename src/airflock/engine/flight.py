@@ -43,6 +43,8 @@ class Flight:
 
     Raises ScenarioError and FlightError, one line per fault.
 
+    Examples
+    --------
     >>> import airflock
     >>> flight = airflock.open("vasarhelyi_2018/4ms", seed=1)
     >>> flight.advance(0.5).change({"model.p_rep": 0.2}).advance(0.5).time

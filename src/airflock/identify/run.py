@@ -121,11 +121,44 @@ def identify(
 ) -> Identified:
     """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
 
-    what     : files (as in `load_tracks`), a recording, or Logs
-    like     : scenario or preset that is flown by the same law; what is not identified stays as it is there
-    heard    : packets: receiver, sender, t (receiver's clock, s), stamp (sender's clock, s), and for reception distance
-               (m) and got (0 or 1; one row per decision and pair)
-    standing : first and last time on the ground, s after each log begins, unless the logs tell it
+    Parameters
+    ----------
+    what : path, list of paths, xarray.Dataset or Logs
+        Files (as in `load_tracks`), a recording, or Logs.
+    like : Scenario or str
+        Scenario or preset that is flown by the same law; what is not identified stays as it is there.
+    heard : pandas.DataFrame, optional
+        Packets: receiver, sender, t (receiver's clock, s), stamp (sender's clock, s), and for reception distance (m)
+        and got (0 or 1; one row per decision and pair).
+    standing : tuple of float, optional
+        First and last time on the ground, s after each log begins, unless the logs tell it.
+    same_clock : bool
+        The clocks of all files agree.
+    options : Options, optional
+        How files are read (`airflock.recordings.imports.track.Options`), as in `load_tracks`.
+    accept : iterable of str
+        Kinds of faults that are meant so, as in `load_tracks`.
+
+    Returns
+    -------
+    Identified
+        `numbers`: key → value, interval, origin, or the reason why the logs cannot tell; `scenario()` has them in it.
+
+    Raises
+    ------
+    AirflockError
+        If the body is not the multirotor that this knows, or the logs lack what it needs.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> scenario = airflock.load("vasarhelyi_2018/real_6ms", {"agents": 3, "duration": 30.0})
+    >>> found = airflock.identify(airflock.simulate(scenario, seed=1), scenario)
+    >>> tau = found.numbers["body.tau"]
+    >>> tau.low < 1.0 < tau.high
+    True
+    >>> found.numbers["radio.delay"].told
+    False
     """
     scenario = loaded(like)
     if not isinstance(scenario.body, motion.Parameters):

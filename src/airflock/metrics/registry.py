@@ -108,9 +108,34 @@ GOALS = {
 def metric_set(namespace: Any, name: str = "") -> MetricSet:
     """Gather a metric set from a module, a class or a mapping of names such as globals().
 
-    It holds METRICS, a list of metrics (names of ours, or what `airflock.metric` gives), or the rules of one metric,
-    or both; if it likes, Parameters (keys of its own beside ours), `fitness` with REPORTS of what it gives, and BEST,
-    the order parameter that is larger in a better flight.
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds METRICS, a list of metrics (names of ours, or what `airflock.metric` gives), or the rules of one metric,
+        or both; if it likes, Parameters (keys of its own beside ours), `fitness` with REPORTS of what it gives, and
+        BEST, the order parameter that is larger in a better flight.
+    name : str, optional
+        How the set is called; by default the namespace's.
+
+    Returns
+    -------
+    MetricSet
+        To be given to `airflock.load(..., metrics=...)`.
+
+    Raises
+    ------
+    RuleError
+        If it measures nothing, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Fast:
+    ...     METRICS = ["speed", "polarisation"]
+    ...     def fitness(values):
+    ...         return {"fitness": values["phi_vel"]}
+    >>> airflock.metric_set(Fast).best
+    'fitness'
     """
     found, name = names_of(namespace, name)
     metrics = [_metric(item, name) for item in found.get("METRICS", ())]

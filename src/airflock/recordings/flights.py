@@ -95,10 +95,26 @@ def simulate(
 
 
 def recording_of(flight: Flight) -> xr.Dataset:
-    """Recording of what an open flight has flown so far; it must have been opened with record=True.
+    """Recording of what an open flight has flown so far.
 
-    Its attribute airflock_events holds what was done to the flight (`recordings.attributes.events` reads it); with
-    scenario and seed it gives the same bits.
+    Parameters
+    ----------
+    flight : Flight
+        It must have been opened with record=True.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `airflock.simulate` returns it. Its attribute airflock_events holds what was done to the flight; with
+        scenario and seed it gives the same bits.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> flight = airflock.open(short, seed=1, record=True).advance(0.5)
+    >>> airflock.recording_of(flight).sizes["time"]
+    3
     """
     scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}

@@ -35,7 +35,7 @@ def starting_set(v_flock: float) -> str:
     Examples
     --------
     >>> import airflock
-    >>> print(airflock.starting_set(6.0).splitlines()[7])
+    >>> print(airflock.starting_set(6.0).splitlines()[8])
     v_flock = { value = 6, unit = "m/s", source = "asked for" }
     """
     columns = {

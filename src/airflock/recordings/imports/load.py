@@ -60,25 +60,67 @@ def load_tracks(
 ) -> xr.Dataset:
     """Recording made of tracks of others: flight logs and animals.
 
-    what       : a file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a pandas DataFrame, an xarray
-                 Dataset of `movement`, or an array (frame, individual, 2 or 3)
-    map        : target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are
-                 t, x, y, z (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m),
-                 utc (s since 1970), air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`
-    unit, scale : of lengths that bring none: m, cm, mm, km, ft, or px with `scale` metres per pixel
-    time_unit, fps : s, ms, us, ns, min, or frames with `fps` frames per second
-    keypoint   : which one, where there are several
-    axes       : enu, or ned where x is north and z down
-    origin     : latitude, longitude (degrees), height (m) of the local frame; by default the first fix
-    rate       : frames per second of the recording; by default the tracks' own
-    bridge     : longest gap that is bridged, s (confidence 0.5); where a gap is longer, an individual is absent (nan)
-    begin, end : window of time, s
-    same_clock : the clocks of several files agree
-    accept     : kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time
-    precision  : 32 or 64 bits per number
-    say, done  : called with each note, and with the share that has been read
-    Returns a Dataset (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated
-    where it is not logged), command (m/s) where logged, confidence. Raises RecordingError, one line per fault.
+    Parameters
+    ----------
+    what : path, list of paths, pandas.DataFrame, xarray.Dataset or array
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a table, a Dataset of `movement`, or an
+        array (frame, individual, 2 or 3).
+    map : mapping, optional
+        Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
+        (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
+        air (1 in flight) and id. Headers with units need none: `x [mm]`, `time_us`.
+    unit : str
+        Of lengths that bring none: m, cm, mm, km, ft or px.
+    scale : float, optional
+        Metres per pixel, with px.
+    time_unit : str
+        Of times that bring none: s, ms, us, ns, min or frames.
+    fps : float, optional
+        Frames per second, with frames.
+    keypoint : str
+        Which one, where there are several.
+    axes : str
+        enu, or ned where x is north and z down.
+    origin : tuple of float, optional
+        Latitude, longitude (degrees) and height (m) of the local frame; by default the first fix.
+    rate : float, optional
+        Frames per second of the recording; by default the tracks' own.
+    bridge : float
+        Longest gap that is bridged, s (confidence 0.5); where a gap is longer, an individual is absent (nan).
+    begin, end : float, optional
+        Window of time, s.
+    same_clock : bool
+        The clocks of several files agree.
+    accept : iterable of str
+        Kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time.
+    decimal, delimiter : str
+        Of a text file: its decimal point, and what stands between columns, which is found out by default.
+    precision : int
+        Bits per number, 32 or 64.
+    say, done : callable, optional
+        Called with each note, and with the share that has been read.
+
+    Returns
+    -------
+    xarray.Dataset
+        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is not
+        logged), command (m/s) where logged, confidence.
+
+    Raises
+    ------
+    RecordingError
+        With one line per fault: file, column, first row, and what to write instead.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> import numpy as np
+    >>> tracks = np.zeros((20, 2, 2))  # two individuals in a plane, both going east at 1 m/s
+    >>> tracks[:, :, 0] = 0.1 * np.arange(20)[:, None]
+    >>> tracks[:, 1, 1] = 2.0
+    >>> recording = airflock.load_tracks(tracks, fps=10.0, unit="m")
+    >>> dict(recording.position.sizes)
+    {'time': 20, 'space': 2, 'keypoint': 1, 'individual': 2}
     """
     options = Options(
         map=dict(map or {}), unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint, axes=axes,

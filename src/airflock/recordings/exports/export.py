@@ -1,0 +1,54 @@
+"""Recordings as files of other tools, by the ending of the name."""
+
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from airflock.endings import ending_fault
+from airflock.errors import RecordingError
+from airflock.recordings.exports.movement import write_movement
+from airflock.recordings.exports.tables import write_csv, write_parquet
+
+ENDINGS = (".csv", ".parquet", ".nc")
+LAYOUTS = ("movement", "movement-0.16")
+
+
+def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str = "movement") -> Path:
+    """Write a recording for other tools: a long table with units in its headers, or a dataset of `movement`.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Simulated, flown, imported or loaded.
+    path : str or path
+        File to write; its ending decides: .csv, .parquet or .nc.
+    layout : str
+        Names of the dimensions of .nc: movement, or movement-0.16 for releases up to 0.16.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    RecordingError
+        If the ending or the layout is none of these, or the recording lacks positions; then nothing is written.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.export(airflock.simulate(short), "flight.csv").name
+    'flight.csv'
+    """
+    target = Path(path)
+    wrong = ending_fault(target, ENDINGS)
+    if wrong:
+        raise RecordingError(wrong)
+    if layout not in LAYOUTS:
+        raise RecordingError(f"layout = {layout!r} is none of {', '.join(LAYOUTS)}")
+    if target.suffix.lower() == ".nc":
+        return write_movement(recording, target, old=layout == "movement-0.16")
+    return (write_csv if target.suffix.lower() == ".csv" else write_parquet)(recording, target)
