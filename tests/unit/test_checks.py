@@ -60,7 +60,7 @@ def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
         (check_model, "vasarhely", "did you mean vasarhelyi_2018"),
         (check_body, "multirotr", "did you mean multirotor"),
         (check_metric, "ordr", "did you mean order"),
-        (check_metric, "nowhere.py", "no such Python file"),
+        (check_metric, "nowhere.py", "no such file"),
     ],
 )
 def test_a_wrong_name_is_one_line(check, name, words):

@@ -73,6 +73,20 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "fps": "fps", "speed": "speed", **LOADED,
         },
     ),
+    "watch": Counterpart(
+        'airflock.watch("vasarhelyi_2018/4ms")', "watch",
+        {
+            "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed", "host": "host",
+            "port": "port",
+        },
+    ),
+    "replay": Counterpart(
+        "airflock.replay(recording)", "replay",
+        {
+            "what": "recording", "page": "airflock.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
+            **LOADED,
+        },
+    ),
     "display": Counterpart(
         'airflock.display(["AIR", "heart.png"], 200)', "display",
         {

@@ -21,8 +21,6 @@ from airflock.recordings.opened import Opening
 from airflock.scenarios.files import given_law, make
 from airflock.scenarios.own_code import law_hash
 
-FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
-
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """Write a recording as netCDF: to a temporary name first, then renamed.

@@ -22,6 +22,7 @@ LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # times as long it may take where processors are busy with other things
 PACE = 5e6  # bytes per second that a file of any size is read at
 MOST_ABOUT = 200_000_000  # bytes of names and attributes
+FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", ".h5")  # what airflock import reads
 READER = Path(__file__).with_name("reader.py")
 
 
@@ -36,6 +37,10 @@ class Opening:
         self.path = Path(path)
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
+        if self.path.suffix.lower() in FOREIGN:
+            raise RecordingError(
+                f"{self.path}: holds tracks, but is no recording yet: airflock import {self.path.name} --save FILE.nc"
+            )
         self.limit = LEAST_TIME + self.path.stat().st_size / PACE if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
         asked = {"paths": [p for p in sys.path if os.path.isabs(p)], "file": str(self.path.absolute()), "most": most}

@@ -57,8 +57,21 @@ class Replay:
 def replay(recording: xr.Dataset, *, rate: float = RATE) -> Replay:
     """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
-    rate : frames per second that are kept at most
+    recording : a Dataset with position (m) and velocity (m/s), simulated or flown
+    rate      : frames per second that are kept at most
+
     Raises RecordingError for a recording with gaps.
+
+    Returns
+    -------
+    The page: `save(path)` writes it as one HTML file, `text` holds it, and a notebook shows it.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> airflock.replay(airflock.simulate(short)).name
+    'vasarhelyi_2018/4ms'
     """
     frames, period, present = frames_of(recording)
     if not present.all():

@@ -27,6 +27,12 @@ def watch(
 
     Raises ScenarioError for a scenario that cannot be flown, and StudioError for a port in use, one line each.
 
+    Returns
+    -------
+    Nothing, when the page is ended with Ctrl-C; what was found is saved from the page.
+
+    Examples
+    --------
     >>> import airflock
     >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
     """
