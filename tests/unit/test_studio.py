@@ -139,7 +139,7 @@ def test_a_law_that_stops_flying_stops_the_flight_and_the_moment_before_is_there
     )
     text = "agents = 3\nduration = 10.0\n[model]\nkind = 'wild.py'\n[world]\nside = 100.0\n"
     (tmp_path / "wild.toml").write_text(text)
-    player = Player(str(tmp_path / "wild.toml"))
+    player = Player(str(tmp_path / "wild.toml"), trust=True)
     player.fly(500)
     player.change("model.push", 3e38)
     player.fly(500)

@@ -76,8 +76,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "watch": Counterpart(
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
-            "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed", "host": "host",
-            "port": "port",
+            "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
+            "host": "host", "port": "port", **CODE,
         },
     ),
     "replay": Counterpart(

@@ -13,6 +13,8 @@ def watch(
     ],
     changes: options.Set = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the flight.")] = 0,
+    law: options.Law = None,
+    trust: options.Trust = False,
     agents: options.Agents = None,
     host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes any free one.")] = 8080,
@@ -23,4 +25,6 @@ def watch(
     """
     from airflock.studio.watch import watch as open_page
 
-    open_page(scenario, options.settings(changes, agents), seed, host=host, port=port, say=tables.say)
+    open_page(
+        scenario, options.settings(changes, agents), seed, law=law, trust=trust, host=host, port=port, say=tables.say
+    )

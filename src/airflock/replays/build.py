@@ -18,8 +18,10 @@ from scipy.spatial import cKDTree
 
 from airflock import atomic
 from airflock.endings import PAGES, ending_fault
+from airflock.engine.events import Event, events_of
 from airflock.errors import RecordingError
 from airflock.metrics.registry import numbers_of
+from airflock.recordings import attributes
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
 from airflock.replays.pack import pack
@@ -137,14 +139,12 @@ def _near(position: NDArray[Any], period: float, scenario: Any) -> tuple[NDArray
 
 def _events(recording: xr.Dataset, scenario: Any) -> list[list[Any]]:
     """What was done to the flight: when, s, and what."""
-    if scenario is None or "airflock_events" not in recording.attrs:
-        return []
-    found = json.loads(recording.attrs["airflock_events"])[:MOST_EVENTS]
-    return [[event["step"] * scenario.flight.dt, _told(event)] for event in found]
+    found = [] if scenario is None else events_of(attributes.events(recording))[:MOST_EVENTS]
+    return [[event.step * scenario.flight.dt, _told(event)] for event in found]
 
 
-def _told(event: dict[str, Any]) -> str:
-    return f"{event['kind']} " + ", ".join(f"{key} = {value}" for key, value in event["data"].items())
+def _told(event: Event) -> str:
+    return f"{event.kind} " + ", ".join(f"{key} = {value}" for key, value in event.data.items())
 
 
 def _stage(scenario: Any, position: NDArray[Any], first: NDArray[Any]) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """Player: an open flight that is played, tuned, pushed and taken back; it knows no page."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from airflock import atomic
 from airflock.engine.flight import Flight
 from airflock.errors import AirflockError, RecordingError
+from airflock.recordings import attributes
 from airflock.recordings.files import load_recording, save
 from airflock.recordings.scores import scenario_of
 from airflock.replays import replay
@@ -37,10 +37,20 @@ class Player:
     where    : preset, scenario file or recording, which is flown again with its events
     settings : keys changed from outside
     seed     : of the first flight; a recording brings its own
+    law      : a law that flies instead of the file's; trust : whether code that the file names may run
     """
 
-    def __init__(self, where: str, settings: Mapping[str, Any] | None = None, seed: int = 0):
+    def __init__(
+        self,
+        where: str,
+        settings: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        *,
+        law: Any = None,
+        trust: bool = False,
+    ):
         self.where, self.given, self.seed = where, dict(settings or {}), seed
+        self.law, self.trust = law, trust
         self.source = recorded(where) if where.lower().endswith(".nc") else None
         if self.source is not None:
             self.seed = int(self.source.attrs["airflock_seed"])
@@ -52,12 +62,12 @@ class Player:
 
     def _open(self) -> None:
         if self.source is None:
-            self.preset = endless(load(self.where, self.given))
+            self.preset = endless(load(self.where, self.given, self.law, trust=self.trust))
             self.flight = Flight(self.preset, self.seed)
         else:
             self.preset = endless(scenario_of(self.source, self.given))
             same = not self.given and self.seed == int(self.source.attrs["airflock_seed"])
-            events = json.loads(self.source.attrs.get("airflock_events", "[]")) if same else []
+            events = attributes.events(self.source) if same else []
             precision = int(self.source.attrs["airflock_precision"])
             self.flight = Flight(self.preset, self.seed, precision=precision, events=events)
         self.pace = Pace(self.preset.flight.dt, getattr(self, "pace", Pace(1.0)).speed)

@@ -12,6 +12,8 @@ def watch(
     settings: Mapping[str, Any] | None = None,
     seed: int = 0,
     *,
+    law: Any = None,
+    trust: bool = False,
     host: str = "127.0.0.1",
     port: int = 8080,
     say: Callable[[str], None] = print,
@@ -21,6 +23,8 @@ def watch(
     scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again
     settings : keys like "model.p_rep" with the values that replace the file's
     seed     : seed of the flight
+    law      : a law of your own that flies instead of the file's, as for `airflock.load`
+    trust    : whether code that the file names, such as a law in a Python file, may run
     host     : address to listen at; 0.0.0.0 lets other machines in
     port     : port to listen at; 0 takes any free one
     say      : is told each line: notes, the address of the page, faults
@@ -36,7 +40,7 @@ def watch(
     >>> import airflock
     >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
     """
-    player = Player(str(scenario), dict(settings or {}), seed)
+    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust)
     for note in player.scenario.notes:
         say(f"note: {note}")
     from airflock.studio.page import Page
