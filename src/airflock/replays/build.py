@@ -77,7 +77,11 @@ def replay(recording: xr.Dataset, *, rate: float = RATE) -> Replay:
     """
     frames, period, present = frames_of(recording)
     if not present.all():
-        raise RecordingError(f"recording: {1.0 - present.mean():.1%} of the positions are missing; a replay needs all")
+        time, agent = np.argwhere(~present)[0]
+        raise RecordingError(
+            f"recording: {1.0 - present.mean():.1%} of the positions are missing, first "
+            f"{recording['individual'].values[agent]} at t = {recording['time'].values[time]:g} s; a replay needs all"
+        )
     axes = frames.shape[1] // 2
     stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))
     kept, every = frames[::stride], period * stride

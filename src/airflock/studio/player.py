@@ -224,7 +224,7 @@ class Player:
 
     def save_toml(self, path: Path) -> Path:
         """Write the preset's file with the keys changed here, its comments and sources kept."""
-        document = None if self.source is None else json.loads(self.source.attrs["airflock_scenario"])
+        document = None if self.source is None else attributes.scenario_document(self.source)
         atomic.write(path, toml_of(self.where, {**self.given, **self.changed}, document))
         return path
 
