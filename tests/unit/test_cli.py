@@ -155,11 +155,13 @@ def test_interrupt_ends_with_one_line_and_status_2():
     import signal
     import time
 
-    command = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--seeds", "2000"]
-    options = {"stderr": subprocess.PIPE, "text": True, "cwd": Path.home(), "preexec_fn": hear_interrupts}
-    with subprocess.Popen(command, **options) as running:
+    ready = "import airflock.cli as cli; print('ready', flush=True); cli.main()"  # from there on it hears
+    command = [sys.executable, "-c", ready, "run", "vasarhelyi_2018/4ms", "--seeds", "2000"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes, cwd=Path.home(), preexec_fn=hear_interrupts) as running:
         try:
-            time.sleep(4.0)
+            assert running.stdout.readline() == "ready\n"
+            time.sleep(2.0)
             running.send_signal(signal.SIGINT)
             _, stderr = running.communicate(timeout=120)
         finally:
