@@ -31,6 +31,10 @@ def packed(tmp_path):
     (tmp_path / "set.toml").write_text(
         'scenario = "vasarhelyi_2018/4ms"\n[set]\n"model.kind" = "EVIL"\n'.replace("EVIL", str(tmp_path / "evil.py"))
     )
+    for section in ("body", "metrics"):
+        text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
+        (tmp_path / f"{section}.toml").write_text(text)
+    (tmp_path / "extended.toml").write_text('extends = "evil.toml"\nagents = 4\n')
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "best.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
     return tmp_path
@@ -99,6 +103,13 @@ WAYS = {
         python('airflock.load("vasarhelyi_2018/4ms", {"model.kind": str(Path("evil.py").absolute())})'),
         CONSENT,
     ),
+    "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
+    "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
+    "scenario that extends another": (python('airflock.load("extended.toml")'), CONSENT),
+    "open": (python('airflock.open("evil.toml")'), CONSENT),
+    "watch": (command("watch", "evil.toml", "--port", "0"), ""),
+    "replay": (command("replay", "evil.toml", "--html", "a.html"), ""),
+    "fleet": (command("fleet", "evil.toml"), ""),
     "simulate": (python('airflock.simulate("evil.toml")'), CONSENT),
     "study of own fitness": (python('load_study("own.toml")'), CONSENT),
     "study of a scenario with a law": (python('load_study("study.toml")'), CONSENT),
