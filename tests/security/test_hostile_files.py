@@ -107,6 +107,13 @@ WAYS = {
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "scenario that extends another": (python('airflock.load("extended.toml")'), CONSENT),
     "open": (python('airflock.open("evil.toml")'), CONSENT),
+    "event of a flight": (
+        python(
+            'airflock.open("vasarhelyi_2018/4ms", events=[{"step": 0, "kind": "change", '
+            '"data": {"model.kind": str(Path("evil.py").absolute())}}]).advance(0.1)'
+        ),
+        CONSENT,
+    ),
     "watch": (command("watch", "evil.toml", "--port", "0"), ""),
     "replay": (command("replay", "evil.toml", "--html", "a.html"), ""),
     "fleet": (command("fleet", "evil.toml"), ""),

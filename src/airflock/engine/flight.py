@@ -82,7 +82,7 @@ class Flight:
         if world:
             self._to_world(world)
         while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
-            self._to_world(int(self._planned.pop(0).data["world"]))  # before the start is drawn
+            self._to_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
 
     # ------------------------------------------------------------------------------------------------- time
 
@@ -350,7 +350,7 @@ class Flight:
         if kind == "change":
             return self.change(data)
         if kind == "branch":
-            self._to_world(int(data["world"]))
+            self._to_world(data.get("world"))
             return self
         (event,) = events_of([Event(self.step, kind, data)])
         try:
@@ -414,7 +414,7 @@ class Flight:
             twin._to_world(world)
         return twin
 
-    def _to_world(self, world: int) -> None:
+    def _to_world(self, world: Any) -> None:
         """Draw from another world's random numbers from now on."""
         if isinstance(world, bool) or not isinstance(world, int) or not 0 <= world < 2**32:
             raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
