@@ -11,6 +11,7 @@ import pytest
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
+from airflock.engine.threads import in_threads
 from flocks import flown, interpreted, scenario
 
 PAPER = {
@@ -35,7 +36,7 @@ def test_the_number_of_threads_changes_no_bit(threads, seed):
     found = scenario(**PAPER)
     jobs = [lambda s=s: digest(fly(found, seed + s, record=True).frames) for s in range(8)]
     alone = [job() for job in jobs]
-    assert list(cpu.in_threads(jobs, threads)) == alone
+    assert list(in_threads(jobs, threads)) == alone
     assert len(set(alone)) == len(alone)  # seeds differ
 
 

@@ -334,7 +334,7 @@ def no_flights():
 
     store.load_driver = cpu.load_driver = flown
     simulate.compile_for = show.fly_show = flown
-    cpu.in_threads = flown
+    simulate.in_threads = flown
 
 
 def warm(what):

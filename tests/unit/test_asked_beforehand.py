@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.engine import cpu
+from airflock.engine import cpu, simulate
 from airflock.errors import AirflockError
 
 BEST = "zapotecatl_2016/best"
@@ -20,8 +20,9 @@ def grounded(monkeypatch):
     def flown(*_, **__):
         raise AssertionError("something was flown")
 
-    for name in ("flight_driver", "fly", "in_threads"):
+    for name in ("flight_driver", "fly", "advance"):
         monkeypatch.setattr(cpu, name, flown)
+    monkeypatch.setattr(simulate, "in_threads", flown)
 
 
 def refused(*arguments):
