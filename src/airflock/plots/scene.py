@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings import attributes
 from airflock.recordings.layout import DIMENSIONS, check
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.geometry import ground_plan
@@ -81,19 +82,19 @@ def window(times: Array, start: float | None, stop: float | None, last: float | 
 
 
 def flown_with(recording: xr.Dataset) -> Scenario | None:
-    """Scenario that a recording was flown with; None for a flight log."""
+    """Scenario that a recording was flown with; None for tracks."""
     return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
 
 
 def world_of(recording: xr.Dataset) -> arena.Parameters:
-    """World of a recording; open for a flight log."""
+    """World of a recording; open for tracks."""
     scenario = flown_with(recording)
     return scenario.world if scenario else arena.Parameters(arena="none")
 
 
 def name_of(what: xr.Dataset | Scenario) -> str:
-    """Short name of a scenario or recording: that of the preset or file."""
-    name = what.name if isinstance(what, Scenario) else str(what.attrs.get("airflock_name", "flight log"))
+    """Short name of a scenario or recording: that of the preset or file, or of the file of its tracks."""
+    name = what.name if isinstance(what, Scenario) else attributes.name_of(what)
     return Path(name).stem if name.endswith((".toml", ".nc")) else name
 
 
