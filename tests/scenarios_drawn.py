@@ -28,7 +28,7 @@ SCALES = {
     "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
 }  # fmt: skip
 BODIES = {
-    "velocity": ("multirotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
+    "velocity": ("multirotor", "quadrotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
 }  # fmt: skip
 CUBE = str(Path(__file__).parent / "cube.obj")
 SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python

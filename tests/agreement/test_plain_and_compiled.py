@@ -28,11 +28,13 @@ FLIGHTS = {
         "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5, "sensors.noise": 0.0,
         "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
     }),
-    "circle": ("vasarhelyi_2018", {"agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0}),
+    "circle": ("vasarhelyi_2018", {
+        "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "quadrotor",
+    }),
     "silo": ("viragh_2014", {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
         "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
-        "wind.gust": 1.0, "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0,
+        "wind.gust": 1.0, "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
     }),
     "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
     "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),

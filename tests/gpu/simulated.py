@@ -48,11 +48,13 @@ CASES = {
         "world.arena": "polygon", "world.corners": NOTCHED, "sensors.noise": 0.0, "radio.delay": 0.31,
         "sensors.period": 0.25, "metrics.period": 0.5, "agents": 4,
     }, 1, True),
-    "silo": ("viragh_2014", IDEAL | {
+    "silo": ("viragh_2014", {key: value for key, value in IDEAL.items() if key != "body.noise"} | {
         "world.dimensions": "3", "world.arena": "circle", "world.floor": 5.0, "world.obstacles": ISLANDS[:1],
-        "world.heights": [[0.0, 18.0]],
+        "world.heights": [[0.0, 18.0]], "body.kind": "quadrotor", "dt": 0.04, "duration": 0.6, "wind.east": 3.0,
     }, 1, True),
-    "table": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4}, 1, False),
+    "table": ("vasarhelyi_2018", {
+        "metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4, "body.kind": "quadrotor", "dt": 0.04,
+    }, 1, False),
     "couzin": ("couzin_2002/swarm", {"agents": 5, "duration": 1.0}, 1, True),
     "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 5.0, "world.side": 3.0}, 1, True),
     "groups": ("zapotecatl_2016/best", {
