@@ -35,7 +35,7 @@ def needed(limit: float, alpha: float) -> int:
 def schedule(limit: float, alpha: float) -> Iterator[tuple[int, float, float]]:
     """Looks in their order: flights, and the alpha of the upper bound (0: not looked at) and of the lower one."""
     shows, turn, size = needed(limit, alpha * share(1)), 0, float(EARLY)
-    while size < shows:
+    while math.ceil(size) < shows:
         turn += 1
         yield math.ceil(size), 0.0, alpha * share(turn)
         size *= GROWTH

@@ -12,6 +12,7 @@ and where they disagree with counting, or stem from too few of them, no number i
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from statistics import median
 
 import numpy as np
 from scipy.stats import beta, t
@@ -19,7 +20,7 @@ from scipy.stats import beta, t
 SHARE = 0.3  # of the flights of a level that define the next one
 MOVES = 3  # steps of Metropolis and Hastings at a level
 MOST = 30  # levels
-ANCESTORS = 5  # distinct first flights below which a repetition is not believed
+ANCESTORS = 5  # distinct first flights of a repetition, below which it is not believed
 SURE = 0.99  # confidence of each comparison with counting
 
 Falls = Sequence[Sequence[float]]  # (sample, value) each time that a score fell below all before, of one flight
@@ -165,11 +166,11 @@ def estimate(repetitions: Sequence[Repetition], target: float, values: Sequence[
     found = [r.probability(target) for r in repetitions]
     mean, low, high = _interval(found)
     refused = ""
-    few = min((r.ancestors for r in repetitions), default=0)
+    few = median([r.ancestors for r in repetitions])
     if any(p == 0.0 or math.isnan(p) for p in found):
         refused = f"{sum(p > 0.0 for p in found)} of {len(found)} repetitions came so far"
     elif few < ANCESTORS:
-        refused = f"the flights of one repetition stem from {few} first flights, fewer than {ANCESTORS}"
+        refused = f"half of the repetitions stem from {few:g} first flights or fewer, {ANCESTORS} are needed"
     else:
         refused = _disagreement(repetitions, [*_thresholds(repetitions, values, target), target], values)
     none = math.nan

@@ -72,6 +72,7 @@ def certify(
     duration: options.Duration = None,
     threads: options.Threads = None,
     precision: options.Precision = 32,
+    device: Annotated[str, typer.Option(help="cpu, or python (no compiler, for debuggers).")] = "cpu",
     as_json: options.Json = False,
 ) -> None:
     """Show that an event is rare: exact bounds, seeds fixed beforehand, every look paid for.
@@ -97,10 +98,11 @@ def certify(
         seconds = time_of(budget)
     with options.gathering(faults):
         found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
-        campaign = campaign_of(found, limit or [], confidence, flights, uncertain=uncertain, precision=precision)
+        how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+        campaign = campaign_of(found, limit or [], confidence, flights, **how)
         keys = asked(campaign, tolerance_of or tolerance, split)
     with options.gathering(faults):
-        check_options(seconds, timeout, scheduler, "cpu")
+        check_options(seconds, timeout, scheduler, device)
     if resume and out is None:
         faults.append("--resume: name the certificate whose flights are to be continued with --out")
     options.refuse(faults)
@@ -108,7 +110,7 @@ def certify(
     for text in campaign.scenario.notes:
         tables.say(f"note: {text}")
     if scheduler is None:
-        options.compile_aloud(campaign.flown, precision, "cpu")
+        options.compile_aloud(campaign.flown, precision, device)
     with folder_of(None if out is None else out.parent / f"{out.stem}_flights") as folder:
         executor = executor_for(campaign, scheduler, threads, timeout)
         try:
@@ -116,8 +118,9 @@ def certify(
             open_folder(folder, campaign, resume=resume, kind=FOLDER)
             with counting(as_json) as (watch, note):
                 made = run(
-                    campaign, folder, executor, seconds, watch, keys=keys, split=split, threads=threads, note=note
-                )
+                    campaign, folder, executor, seconds, watch, keys=keys, split=split, threads=threads, note=note,
+                    kept=out is not None,
+                )  # fmt: skip
         finally:
             executor.close()
     _end(made, out, plot, as_json)
@@ -197,18 +200,20 @@ def _print(made: Any) -> None:
     console = Console()
     console.print(table)
     for text in made.statements:
-        console.print(text, highlight=False, markup=False)
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
     for i, found in made.hazards.items():
         if found.events:
             line = (
                 f"{campaign.limits[i].event}: {found.early} of {found.events} first events in the first half of flights"
             )
-            console.print(f"{line}, {100.0 * found.expected:.0f} % if even: {found.verdict}", highlight=False)
+            console.print(
+                f"{line}, {100.0 * found.expected:.0f} % if even: {found.verdict}", highlight=False, soft_wrap=True
+            )
     _worst(console, made)
     _tolerances(console, made.tolerance)
     for text in made.splitting.get("statements", ()):
-        console.print(text, highlight=False, markup=False)
-    console.print(f"Not said: {'; '.join(NOT_SAID)}.", highlight=False, markup=False, style="dim")
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"Not said: {'; '.join(NOT_SAID)}.", highlight=False, markup=False, style="dim", soft_wrap=True)
 
 
 def _worst(console: Any, made: Any) -> None:
@@ -219,7 +224,7 @@ def _worst(console: Any, made: Any) -> None:
         shown.add(entry["limit"])
         line = f"worst for {entry['limit']}: {tables.number(entry['value'])}"
         moment = f" before {entry['first']:.0f} s" if "first" in entry else ""
-        console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False)
+        console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _tolerances(console: Any, found: Any) -> None:
@@ -229,7 +234,7 @@ def _tolerances(console: Any, found: Any) -> None:
     from rich.table import Table
 
     if "reason" in found:
-        console.print(f"tolerance: {found['reason']}", highlight=False, markup=False)
+        console.print(f"tolerance: {found['reason']}", highlight=False, markup=False, soft_wrap=True)
         return
     title = (
         f"safe: fewer than {100.0 * found['level']:g} % of flights with an event ({100.0 * found['confidence']:g} %)"
