@@ -196,6 +196,7 @@ def make(
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
+    document = _with_body(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -224,7 +225,7 @@ def make(
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, measures)
+    faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     published = _published(merged.get("published", {}))
@@ -244,6 +245,14 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
+
+
+def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A document without the numbers of its body, where the settings name a body of another kind."""
+    given = document.get("body", {})
+    if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
+        return document
+    return {**document, "body": {}}
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
