@@ -77,7 +77,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
             "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", **CODE,
+            "host": "host", "port": "port", "against": "against", **CODE,
         },
     ),
     "replay": Counterpart(

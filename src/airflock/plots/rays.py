@@ -1,41 +1,19 @@
 """Rays of one agent at one instant: which were cast, which met something, and which one it flew along."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from airflock.core.agent import Heard, State, decide
-from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
+from airflock.core.agent import Heard, State
+from airflock.engine.place import Course, Place
 from airflock.errors import RecordingError
 from airflock.plots import style
 from airflock.plots.scene import details_of, flown_with, name_of, paths_of
 from airflock.plots.through import ground_plans, nearby
-
-
-class Ray(NamedTuple):
-    """A cast: its direction, how far it was free and how far it looked, m."""
-
-    x: float
-    y: float
-    z: float
-    free: float
-    length: float
-
-
-class Watched(Senses):
-    """Senses that keep every cast."""
-
-    cast_rays: list[Ray]
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance along the unit vector u, m."""
-        free = super().cast(ux, uy, uz, length, radius)
-        self.cast_rays.append(Ray(ux, uy, uz, free, length))
-        return free
+from airflock.stage.rays import Ray, cast_rays
 
 
 def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], tuple[float, float, float]]:
@@ -56,16 +34,8 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
         course.advance(k * elapsed, elapsed, flock(k))
     now = flock(frame)
     place.appear(frame * elapsed, now)
-    senses = Watched.of(place, course, now[agent], frame * elapsed, 0, 0, agent)
-    assert isinstance(senses, Watched)
-    senses.cast_rays = []
     heard = [Heard(j, state, 0.0) for j, state in enumerate(now) if j != agent]
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
-    made = decide(
-        scenario.model, scenario.parameters, now[agent], heard, (), None,
-        time=frame * elapsed, period=period, index=agent, percept=senses,
-    )  # fmt: skip
-    return senses.cast_rays, made.command
+    return cast_rays(scenario, place, course, now[agent], heard, frame * elapsed, agent)
 
 
 def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -> Figure:
