@@ -104,10 +104,10 @@ class Page:
         player = self.player
         state = "paused" if player.paused else "stopped" if player.failure else "flying"
         agents = " and ".join(str(side.flight.agents) for side in player.sides)
-        events = " and ".join(str(len(side.flight.events)) for side in player.sides)
+        done = " and ".join(str(len(side.flight.events)) for side in player.sides)
         self.title.content = (
             f"<div style='padding:0 0.75em'><b>{html.escape(player.where)}</b><br><small>t = {player.time:.1f} s · "
-            f"{agents} agents · seed {player.seed} · {state} · {events} events</small></div>"
+            f"{agents} agents · seed {player.seed} · {state} · events: {done}</small></div>"
         )
         said = player.status
         if player.failure:
