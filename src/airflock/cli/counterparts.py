@@ -70,7 +70,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.video(recording, "flight.mp4")', "video",
         {
             "what": "recording", "out": "path", "seed": "airflock.simulate", "begin": "start", "end": "stop",
-            "fps": "fps", "speed": "speed", **LOADED,
+            "fps": "fps", "speed": "speed", "space": "space", "chart": "chart", **LOADED,
         },
     ),
     "watch": Counterpart(

@@ -1,9 +1,8 @@
 """Rays of one agent at one instant: which were cast, which met something, and which one it flew along."""
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
@@ -38,10 +37,11 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
     return cast_rays(scenario, place, course, now[agent], heard, frame * elapsed, agent)
 
 
-def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -> Figure:
+def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
     """Rays of one agent from above: red where they met something, green the first free one, black what was flown.
 
     start : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
+    ax    : axes to draw into, instead of a new figure
     """
     count = recording.sizes["individual"]
     if not 0 <= agent < count:
@@ -57,8 +57,7 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -
     assert scenario is not None
     x, y = (float(c) for c in shown.position[frame, :2, agent])
     reach = 1.3 * max(ray.length for ray in found)
-    figure = style.Picture(6.0, 5.6)
-    axes: Any = figure.add_subplot()
+    figure, axes = style.place(ax, 6.0, 5.6)
     ground_plans(axes, nearby(scenario, shown))
     lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in found]
     colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in found]
@@ -73,5 +72,5 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -
     axes.set_aspect("equal")
     style.dress(axes, "east (m)", "north (m)", grid=False)
     words = f"agent {agent} at {times[frame]:.4g} s · {len(found)} rays cast"
-    style.overall(figure, name_of(recording), f"{words} · {details_of(recording)}")
+    style.heading(axes, name_of(recording), f"{words} · {details_of(recording)}")
     return figure
