@@ -196,7 +196,7 @@ def make(
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
-    document = _with_body(document, settings or {})
+    document, left_out = _with_body(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -236,7 +236,7 @@ def make(
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    notes = (*notes, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    notes = (*notes, *left_out, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
     return replace(scenario, notes=notes)
 
 
@@ -247,12 +247,15 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
-def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A document without the numbers of its body, where the settings name a body of another kind."""
+def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body, where the settings name a body of another kind; and a note of it."""
     given = document.get("body", {})
     if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
-        return document
-    return {**document, "body": {}}
+        return document, ()
+    known = set(given) - {"kind"}
+    kind = given.get("kind", "multirotor")
+    note = f"body.kind = {settings['body.kind']!r}: the numbers of the file's {kind} are left out"
+    return {**document, "body": {}}, (note,) if known else ()
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
