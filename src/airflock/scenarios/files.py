@@ -16,6 +16,7 @@ from airflock.metrics.registry import as_set
 from airflock.scenarios import checks, formats, geometry, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
+from airflock.scenarios.ground import file_faults, with_ground
 from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -102,6 +103,8 @@ def load(
         document, base = extended(document, where, folder, _read)
         document, own = _given(document, metrics, body)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
+        document, settings, told = with_ground(document, settings or {}, folder)
+        own["notes"] += told
         if law is None:
             return make(document, where, settings, folder=folder, trust=trust, **own)
         flown = given_law(law)
@@ -313,6 +316,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
     if flight is not None and flight.agents != int(flight.agents):
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
+    faults += file_faults(parts["world"])
     if parts["world"] is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and found is not None and parts.get("parameters") is not None:
