@@ -273,10 +273,10 @@ def _shown(value: Any) -> str:
     return "missing" if value is None else str(value) if len(str(value)) < 60 else f"{str(value)[:57]}..."
 
 
-def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str = "study") -> None:
     """Raise StudyError, naming what differs, if a folder holds another study than the one that is asked for."""
     found = differences(old, new)
     if not found:
         return
     shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
-    raise StudyError(f"{folder}: holds another study: {'; '.join(shown)}; give another --out")
+    raise StudyError(f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out")

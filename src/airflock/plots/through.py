@@ -55,7 +55,7 @@ def through(
     """
     scenario, shown = flown_with(recording), paths_of(recording, start, stop)
     if scenario is None:
-        raise RecordingError("recording: a flight log has no scene; plot its trajectories")
+        raise RecordingError("recording: tracks have no scene; plot its trajectories")
     if space and shown.position.shape[1] == 2:
         raise RecordingError("recording: was flown in a plane; look at it from above")
     figure, axes = style.place(ax, 7.4, 5.4 if space else 6.0)
@@ -215,7 +215,7 @@ def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def scenery(recording: xr.Dataset, shown: Paths) -> list[NDArray[np.float64]]:
-    """Outlines of what stands around the paths, as lines (point, axis) in m; none for a flight log."""
+    """Outlines of what stands around the paths, as lines (point, axis) in m; none for tracks."""
     scenario = flown_with(recording)
     if scenario is None or scenario.scene.kind == "none":
         return []
