@@ -186,7 +186,7 @@ def test_annotations_of_a_users_own_stay():
     [
         ("def decide(own:\n", "mine.py:1: '(' was never closed"),
         ("x = 1\n", "holds no rule; a law has decide"),
-        (None, "No such file"),
+        (None, "no such file"),
     ],
 )
 def test_what_is_no_rule_file_is_one_line(tmp_path, text, fault):

@@ -44,7 +44,7 @@ class Cluster:
         try:
             from distributed import Client
         except ModuleNotFoundError as fault:
-            raise StudyError("--scheduler needs the package distributed: pip install 'airflock[cluster]'") from fault
+            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
         self.task, self.timeout = task or Task.of(study), timeout
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)
