@@ -98,7 +98,13 @@ def test_every_word_of_the_vocabulary_has_a_type():
         text = f"def {kind}({', '.join(words)}): pass\n"
         text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
-        text += "" if kind in ("decide", "move", "sample") else "def decide(): pass\ndef sample(): pass\n"
+        text += (
+            ""
+            if kind in ("decide", "move", "sample")
+            else "def move(): pass\n"
+            if kind == "limits"
+            else "def decide(): pass\ndef sample(): pass\n"
+        )
         (rule,) = [
             node
             for node in ast.parse(typed_copy(text).text).body

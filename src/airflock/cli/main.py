@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 from airflock import __version__
 from airflock.cli import (
+    certify,
     display,
     evolve,
     fleet,
@@ -90,6 +91,7 @@ app.command("watch")(watch.watch)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
+app.command("certify")(certify.certify)
 app.command("import")(imports.import_tracks)
 app.command("export")(imports.export)
 app.command("identify")(identify.identify)

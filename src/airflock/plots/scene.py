@@ -116,6 +116,13 @@ class Outline(NamedTuple):
     obstacle: bool
 
 
+def _ends(world: arena.Parameters) -> list[tuple[float, float]]:
+    """Lowest and highest height of each outline of a 3-D arena, m."""
+    whole = arena.heights_of(world)
+    found = [] if world.arena == "none" else [whole]
+    return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
+
+
 def outlines(world: arena.Parameters) -> list[Outline]:
     """Ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons in the plane."""
     plan = ground_plan(world)
@@ -130,11 +137,10 @@ def walls(world: arena.Parameters) -> list[Outline]:
     if world.dimensions == "2":
         return outlines(world)
     found = []
-    half = 0.5 * world.height
-    for corners, obstacle in outlines(world):
-        found += [Outline(_raised(corners, z), obstacle) for z in (-half, half)]
+    for (corners, obstacle), (low, high) in zip(outlines(world), _ends(world), strict=True):
+        found += [Outline(_raised(corners, z), obstacle) for z in (low, high)]
         step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        found += [Outline(np.array([[x, y, -half], [x, y, half]]), obstacle) for x, y in corners[:-1:step]]
+        found += [Outline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
     return found
 
 
