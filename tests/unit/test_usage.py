@@ -41,7 +41,7 @@ def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys
 
 
 def test_the_nearest_choice_is_told():
-    with pytest.raises(AirflockError, match=r"flocked; did you mean series\?$"):
+    with pytest.raises(AirflockError, match=r"wash; did you mean series\?$"):
         app(["plot", "a", "--kind", "serie"])
 
 
