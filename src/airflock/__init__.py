@@ -9,6 +9,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.checking.bodies import check_body as check_body
     from airflock.checking.metrics import check_metric as check_metric
     from airflock.checking.models import check_model as check_model
+    from airflock.checking.types import check_types as check_types
     from airflock.core.contract import body as body
     from airflock.core.contract import metric as metric
     from airflock.core.contract import model as model
@@ -65,6 +66,7 @@ _WHERE = {
     "check_model": "airflock.checking.models",
     "check_metric": "airflock.checking.metrics",
     "check_body": "airflock.checking.bodies",
+    "check_types": "airflock.checking.types",
     "simulate": "airflock.recordings.flights",
     "Flight": "airflock.engine.flight",
     "recording_of": "airflock.recordings.flights",

@@ -87,14 +87,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.video(recording, "flight.mp4")', "video",
         {
             "what": "recording", "out": "path", "seed": "airflock.simulate", "begin": "start", "end": "stop",
-            "fps": "fps", "speed": "speed", **LOADED,
+            "fps": "fps", "speed": "speed", "space": "space", "chart": "chart", **LOADED,
         },
     ),
     "watch": Counterpart(
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
             "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", **CODE,
+            "host": "host", "port": "port", "against": "against", **CODE,
         },
     ),
     "replay": Counterpart(
@@ -163,6 +163,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "validate": Counterpart(
         'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
     ),
+    "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
     "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.engine.store.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them

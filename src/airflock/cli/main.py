@@ -27,6 +27,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    types,
     watch,
 )
 from airflock.errors import AirflockError, bounded, bounded_lines, printable
@@ -78,6 +79,7 @@ app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
 app.command("keys")(keys.keys)
 app.command("validate")(inspect.validate)
+app.command("types")(types.types)
 app.command("doctor")(inspect.doctor)
 
 
