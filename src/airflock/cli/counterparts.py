@@ -54,9 +54,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "threads": "threads", **TABLE, "changes": LOADED["changes"],
+            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
-            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.harden.evolved_again"),
+            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
         },
     ),
     "certify": Counterpart(
