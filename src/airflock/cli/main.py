@@ -20,6 +20,7 @@ from airflock.cli import (
     harden,
     identify,
     imports,
+    infer,
     inspect,
     keys,
     look,
@@ -66,6 +67,7 @@ app.command("harden")(harden.harden)
 app.command("import")(imports.import_tracks)
 app.command("export")(imports.export)
 app.command("identify")(identify.identify)
+app.command("infer")(infer.infer)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("replay")(look.replay)

@@ -179,7 +179,7 @@ def _range(declared: Quantity, default: float, scale: Scale) -> tuple[float, flo
     """Declared range, cut to the lengths, speeds and times that were seen; and whether it is sought by logarithm."""
     by_unit = {
         "m": (0.05 * scale.near, 1.2 * scale.far),
-        "m/s": (0.02 * scale.speed, 2.0 * scale.fastest),
+        "m/s": (0.02 * scale.speed, 5.0 * scale.fastest),  # a law may speak of speeds that nobody flies
         "m/s^2": (0.05 * scale.speed, 20.0 * scale.fastest),
         "1/s": RATES,
         "s": (0.3 * scale.period, 100.0 * scale.period),

@@ -26,6 +26,7 @@ SEARCHES, ROUNDS, POPULATION = 1, 90, 14  # of CMA-ES
 LOOKS = 6  # best places at which is asked what a number does
 FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
 SCAN = 10  # places along the range of one number
+HOP = 0.12  # of a range
 CLIMBS = 8  # Gauss-Newton steps
 SMALL = 360  # frames on which is searched
 APART, WORSE = 0.1, 1.5  # of a range, from the default; loss that a number is worth
@@ -239,6 +240,22 @@ def scan(model: Model, place: Array, free: Sequence[int], spans: Sequence[int] |
             if found < lowest - 1.0:
                 lowest, best, moved = found, u, True
     return best, moved
+
+
+def hop(model: Model, fit: Fit, spans: Sequence[int], count: int, seed: int, say: Callable[[], None]) -> Fit:
+    """The best of some climbs that begin beside a fit: half of its named numbers, drawn anew each time, are moved."""
+    generator = np.random.default_rng(seed)
+    best = fit
+    named = [k for k in fit.free if k < model.named]
+    for _ in range(count):
+        u = best.place.copy()
+        moved = [k for k in named if generator.random() < 0.5]
+        u[moved] = np.clip(u[moved] + generator.normal(0.0, HOP, len(moved)), 0.02, 0.98)
+        found = climb(model, u, fit.free, spans, 5, rough=True)
+        say()
+        if found.loss < best.loss:
+            best = found
+    return best
 
 
 def jacobian(

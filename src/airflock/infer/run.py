@@ -164,10 +164,12 @@ def infer(
     Examples
     --------
     >>> import airflock
-    >>> scenario = airflock.load("vicsek_1995/ordered", {"agents": 3, "duration": 60.0, "dt": 0.5, "body.speed": 0.3})
-    >>> airflock.infer(airflock.simulate(scenario), models=[])
+    >>> airflock.infer("fish.nc", models=[])
     Traceback (most recent call last):
     airflock.errors.AirflockError: infer: no laws to choose from; give models, such as couzin_2002
+    >>> found = airflock.infer("fish.nc")  # doctest: +SKIP
+    >>> found.verdict  # doctest: +SKIP
+    'couzin_2002 explains the tracks best'
     """
     if not models:
         raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
@@ -207,7 +209,7 @@ def infer(
         laws, best, verdict, sum(each.counted for each in followed), (frames, every), scale, individuals
     )
     if best is not None:
-        model, best.fit = select.simpler(fitted[0][1], best.fit, scale, _teller(say, f"{best.name}, simplified"))
+        model, best.fit = select.simpler(fitted[0][1], best.fit, scale, seed, _teller(say, f"{best.name}, simplified"))
         sure = again(model, best.fit.place, best.fit.free, spans, _teller(say, f"{best.name}, flown again"))
         _tell(found_all, model, sure)
         if check:

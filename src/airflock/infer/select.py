@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import Fit, Model, climb, drawn, scan, search, simplify, telling
+from airflock.infer.fit import Fit, Model, climb, drawn, hop, scan, search, simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]
 FOLDS = 4  # parts of the tracks that are held out in turn
 ENOUGH = 24_000  # individual steps, and
 FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
+HOPS, FEW_HOPS = 6, 4  # climbs beside the best law's fit, and beside any
 AGAIN = 3  # steps of a climb without the part that is held out
 WITHIN = 1.959964  # standard deviations that hold 95 %
 
@@ -58,8 +59,10 @@ def fit(
     return model, found
 
 
-def simpler(model: Model, found: Fit, scale: Scale, say: Callable[[], None]) -> tuple[Model, Fit]:
-    """The fit without numbers that the others make up for."""
+def simpler(model: Model, found: Fit, scale: Scale, seed: int, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit after more searching beside it, without numbers that the others make up for."""
+    found = hop(model, found, sample(model), HOPS, seed, say)
+    found = climb(model, found.place, found.free, sample(model))
     gone = simplify(model, found, say)
     if not gone:
         return model, found
@@ -87,6 +90,7 @@ def polish(model: Model, place: Array) -> Fit:
         if not better:
             break
         rough = climb(model, place, free(model), few, rough=True)
+    rough = hop(model, rough, few, FEW_HOPS, 0, lambda: None)
     return climb(model, rough.place, free(model), spans)
 
 
