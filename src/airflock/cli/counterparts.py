@@ -141,6 +141,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
         },
     ),
+    "infer": Counterpart(
+        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
+        {
+            "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
+            "trust": "trust", **TABLE, "out": "airflock.infer.run.Inferred.document",
+            "plot": "airflock.plots.inferred.inferred",
+        },
+    ),
     "fleet": Counterpart(
         "airflock.fleet.compare.fly(scenario, card, seed)", "airflock.fleet.compare.fly",
         {

@@ -22,6 +22,7 @@ from airflock.cli import (
     harden,
     identify,
     imports,
+    infer,
     inspect,
     keys,
     look,
@@ -95,6 +96,7 @@ app.command("certify")(certify.certify)
 app.command("import")(imports.import_tracks)
 app.command("export")(imports.export)
 app.command("identify")(identify.identify)
+app.command("infer")(infer.infer)
 app.command("plot")(look.plot)
 app.command("video")(look.video)
 app.command("replay")(look.replay)
