@@ -221,7 +221,7 @@ def body(namespace: Any, name: str = "") -> Body:
         raise RuleError(f"body {name}: a rule move that asks for memory and a NamedTuple Memory come together")
     if memory is not None and set(getattr(memory, "_field_defaults", {})) != set(getattr(memory, "_fields", "-")):
         raise RuleError(f"body {name}: Memory is a NamedTuple whose fields all have a value for the start")
-    if "limits" in found:
+    if found.get("limits") is not None:
         asks(found["limits"], "limits", name)
     return Body(
         name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"],

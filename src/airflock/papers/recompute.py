@@ -59,6 +59,6 @@ def known(name: str) -> str:
     if name not in PAPERS:
         near = get_close_matches(name, PAPERS, n=1)
         raise AirflockError(
-            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
+            f"{name}: unknown paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
         )
     return name
