@@ -31,8 +31,8 @@ def series(
     """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
     start, stop : window of time, s; by default the whole flight
-    smooth      : means over so many seconds, of the nearest pair the least value; every instant stays faintly visible.
-                  0 draws instants alone; by default a two-hundredth of what is shown. The title states it
+    smooth      : means over so many seconds (of the nearest pair the least value), told in the title; 0 draws instants
+    alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     """
     course = _window(over_time(recording, settings), start, stop)
