@@ -22,6 +22,7 @@ from airflock.cli import (
     harden,
     identify,
     imports,
+    infer,
     inspect,
     keys,
     look,
@@ -92,7 +93,8 @@ PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     },
     "Search and make safe": {"evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify},
     "Recordings of others": {
-        "import": imports.import_tracks, "identify": identify.identify, "export": imports.export,
+        "import": imports.import_tracks, "identify": identify.identify, "infer": infer.infer,
+        "export": imports.export,
     },
     "Towards real drones": {"fleet": fleet.fleet, "fly": fly.app},
     "Look something up": {
