@@ -1,7 +1,8 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -60,7 +61,7 @@ def sweep(
         fixed = options.settings(changes, agents, duration)
     keys, points = _grid(over, plot, faults)
     scenarios, show = _planned(scenario, points, fixed, law, trust, show, faults)
-    for note in dict.fromkeys(note for found in scenarios for note in found.notes):
+    for note in alike(dict.fromkeys(note for found in scenarios for note in found.notes)):
         tables.say(f"note: {note}")
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
     options.compile_aloud(scenarios[0], precision, device)
@@ -119,6 +120,15 @@ def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | No
 
         save_figure(heatmap(tidy, keys, show, scenario=scenario), plot)
         tables.say(f"saved {plot}")
+
+
+def alike(notes: Iterable[str]) -> Iterator[str]:
+    """The first of all notes that differ in numbers alone, and how many are like it."""
+    kinds: dict[str, list[str]] = {}
+    for note in notes:
+        kinds.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "", note), []).append(note)
+    for first, *more in kinds.values():
+        yield f"{first} ({len(more)} more like it)" if more else first
 
 
 def distinct(keys: Sequence[str], plot: Path | None) -> None:
