@@ -54,9 +54,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "threads": "threads", **TABLE, "changes": LOADED["changes"],
+            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
-            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.harden.evolved_again"),
+            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
         },
     ),
     "certify": Counterpart(
@@ -86,14 +87,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.video(recording, "flight.mp4")', "video",
         {
             "what": "recording", "out": "path", "seed": "airflock.simulate", "begin": "start", "end": "stop",
-            "fps": "fps", "speed": "speed", **LOADED,
+            "fps": "fps", "speed": "speed", "space": "space", "chart": "chart", **LOADED,
         },
     ),
     "watch": Counterpart(
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
             "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", **CODE,
+            "host": "host", "port": "port", "against": "against", **CODE,
         },
     ),
     "replay": Counterpart(
@@ -138,6 +139,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "plot": "airflock.plots.identified.identified", "plan": "airflock.identify.plan.flight_card",
             "flights": "airflock.identify.check.posterior",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
+        },
+    ),
+    "infer": Counterpart(
+        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
+        {
+            "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
+            "trust": "trust", **TABLE, "out": "airflock.infer.run.Inferred.document",
+            "plot": "airflock.plots.inferred.inferred",
         },
     ),
     "fleet": Counterpart(
