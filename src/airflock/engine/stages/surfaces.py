@@ -5,7 +5,7 @@ from typing import Any
 
 from airflock.core.contract import Model
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
 from airflock.world import arena, bvh
 
@@ -17,13 +17,13 @@ def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model:
         v[a] = flock.measured_velocity[a][i]
     t = ask(
         model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
-        vx=v[X], vy=v[Y], vz=v[Z], p=numbers.p,
+        vx=v[X], vy=v[Y], vz=v[Z], p=numbers_of(i, "p", flock, numbers, plan=plan),
     )  # fmt: skip
     for c in live(model.Walls, plan.dimensions):
         flock.walls[c][i] += t[c]
 
 
-def boundaries(
+def boundaries(  # noqa: C901 - tests of the plan leave one way through
     agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, edges: Any, spans: Any, scene: Any,
     *, plan: Plan, model: Model,
 ) -> None:  # fmt: skip
@@ -36,7 +36,8 @@ def boundaries(
         shapes = scene[0]
         nodes = scene[1]
         links = scene[2]
-        look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
+        if not plan.varies("p"):
+            look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
     for i in agents:
         for c in live(model.Walls, plan.dimensions):
             flock.walls[c][i] = ZERO
@@ -58,6 +59,9 @@ def boundaries(
     if plan.scene:
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:
             for i in agents:
+                if plan.varies("p"):
+                    own_p = numbers_of(i, "p", flock, numbers, plan=plan)
+                    look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=own_p), LIMIT)
                 f = bvh.nearest_of(x[X][i], x[Y][i], x[Z][i], look, ground, shapes, nodes, links)
                 if f.distance < look:
                     feel(i, f, flock, numbers, plan=plan, model=model)
