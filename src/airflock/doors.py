@@ -13,7 +13,8 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.parsers import expat
 
 from airflock.errors import AirflockError, ScenarioError, bounded
 
@@ -24,6 +25,7 @@ MOST_VALUES = 1_000_000
 MOST_KEYS = 10_000
 MOST_KEY = 200  # letters of one key
 MOST_SHORT = 4000  # letters of a JSON text that needs no measuring: a store has very many of them
+MOST_ELEMENTS = 100_000  # of an XML text
 MOST_DIGITS = 400  # of one number, in any base
 MOST_WHOLE = 2**64  # whole numbers lie below it on both sides: seeds are the largest
 
@@ -134,6 +136,51 @@ def json_value(text: Any) -> Any:
         raise FormatError(f"is no JSON: {fault}") from fault
     _walk(found)
     return found
+
+
+class Element(NamedTuple):
+    """An element of an XML text: its name without a namespace, its own text, and the elements in it."""
+
+    tag: str
+    text: str
+    children: list["Element"]
+
+
+def xml(text: str) -> Element:
+    """An XML text as its outermost element; raises FormatError where it is none, TextError where it is beyond bounds.
+
+    A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
+    """
+    if len(text) > MOST_BYTES:
+        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    around: list[tuple[str, list[str], list[Element]]] = [("", [], [])]
+    count = 0
+
+    def begin(tag: str, _: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise TextError(f"has more than {MOST_ELEMENTS} elements")
+        if len(around) > MOST_DEPTH:
+            raise TextError(f"is nested more than {MOST_DEPTH} deep")
+        around.append((tag.rpartition(" ")[2], [], []))
+
+    def end(_: str) -> None:
+        tag, parts, children = around.pop()
+        around[-1][2].append(Element(tag, "".join(parts).strip(), children))
+
+    def refuse(*_: Any) -> Any:
+        raise FormatError("has a document type or entities, which no file of this kind needs")
+
+    parser = expat.ParserCreate("utf-8", namespace_separator=" ")
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler = lambda part: around[-1][1].append(part)
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(text.encode("utf-8"), True)
+    except expat.ExpatError as fault:
+        raise FormatError(f"is no XML: {fault}") from fault
+    return around[0][2][0]
 
 
 def _measure(text: str) -> None:

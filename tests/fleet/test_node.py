@@ -257,7 +257,7 @@ def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
     ({"safety": {"speed_max": 900.0, "breake": 2.0}}, "safety.speed_max = 900 m/s lies outside"),
     ({"safety": {"breake": 2.0}}, "safety.breake is not known; did you mean safety.brake"),
     ({"fence": {"corners": [[0, 0], [1, 0], [0, 1]], "low": 2.0, "high": 60.0}}, "does not hold the law's walls"),
-    ({"fence": {"corners": [[0, 0], [9, 0], [1, 1], [0, 9]], "low": 2.0, "high": 60.0}}, "not convex"),
+    ({"fence": {"corners": [[0, 0], [9, 0], [0, 9], [9, 9.5]], "low": 2.0, "high": 60.0}}, "crosses or touches itself"),
     ({"site": {"latitude": 95.0, "longitude": 0.0, "altitude": 0.0}}, "site.latitude = 95 lies outside"),
     ({"world": {"arena": "square", "side": 120.0, "edges": "periodic"}}, "real space is open"),
 ])  # fmt: skip

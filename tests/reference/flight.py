@@ -36,7 +36,7 @@ class Agent:
     state      : true position (m) and velocity (m/s)
     command    : what its model decided last
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
-    memory     : the model's Memory; rays: how many it cast at its last decision
+    memory     : the model's Memory; kept: the body's; rays: how many it cast at its last decision
     faults     : by kind, the latest that has hit it; present : whether it is there
     p, b       : its numbers of model and body
     packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
@@ -47,6 +47,7 @@ class Agent:
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     memory: Any = None
+    kept: Any = None
     rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
     faults: dict[str, Suffering] = field(default_factory=dict)
@@ -72,7 +73,8 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
-    flock = [Agent(state) for state in begun]
+    memory = scenario.vehicle.Memory
+    flock = [Agent(state, kept=memory() if memory else None) for state in begun]
     for i, agent in enumerate(flock):
         agent.p = own_parameters(scenario, "model", scenario.parameters, i, seed)
         agent.b = own_parameters(scenario, "body", scenario.body, i, seed)
@@ -291,7 +293,8 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
     known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
     given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
-    velocity = answer(body.move, "move", given | {"dt": dt, "b": agent.b}, body.name)
+    moved = answer(body.move, "move", given | {"dt": dt, "b": agent.b, "memory": agent.kept}, body.name)
+    velocity, agent.kept = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
     for suffering in agent.faults.values():
         told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}
         velocity = suffering.asked("motion", step * dt, **{k: given[k] for k in MOVING}, **told) or velocity

@@ -86,12 +86,13 @@ def test_all_faults_of_a_file_are_reported_together(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(
         'agents = "many"\nduratoin = 3\n[model]\nkind = "vasarhelyi"\n[sensors]\nperiod = -1\n'
-        '[world]\narena = "polygon"\ncorners = [[0, 0], [10, 0], [1, 1], [0, 10]]\n'
+        '[world]\narena = "polygon"\ncorners = [[0, 0], [10, 0], [0, 10], [10, 10]]\n'
         '[radio]\nrange = { value = 80, unit = "kg" }\n'
     )
     done = airflock("validate", file)
     assert done.returncode == 2
-    for word in ("agents", "duratoin", "model.kind", "sensors.period = -1 s", "not convex", "the unit is m"):
+    crossed = "crosses or touches itself"
+    for word in ("agents", "duratoin", "model.kind", "sensors.period = -1 s", crossed, "the unit is m"):
         assert word in done.stderr
     assert len(done.stderr.strip().splitlines()) == 6
 

@@ -10,7 +10,7 @@ import tomllib
 
 from processes import hear_interrupts
 
-SHORT = ["--duration", "2", "--agents", "10"]
+SHORT = ["--duration", "5", "--agents", "8", "--set", "dt=0.05"]
 NAME = "vasarhelyi_2018/4ms"
 
 

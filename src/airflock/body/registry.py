@@ -1,10 +1,11 @@
 """The bodies that a scenario can name: the key body.kind."""
 
-from airflock.body import direct, jostled, motion, steered, turning
+from airflock.body import direct, jostled, motion, quadrotor, steered, turning
 from airflock.core.contract import Body, body
 
 BODIES: dict[str, Body] = {
     "multirotor": body(motion, "multirotor"),
+    "quadrotor": body(quadrotor, "quadrotor"),
     "direct": body(direct, "direct"),
     "jostled": body(jostled, "jostled"),
     "steered": body(steered, "steered"),

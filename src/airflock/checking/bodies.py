@@ -19,6 +19,7 @@ from airflock.errors import ScenarioError
 from airflock.scenarios import checks
 
 MOTIONS = 40  # random motions that each truth is tried on
+REMEMBERED = 5  # steps after which a body that remembers is looked at
 CLOSE = 1e-9
 VECTORS = {"v": "m/s", "m": "m/s", "c": "", "g": "1", "w": "m/s"}  # what `move` may ask for; c: as ACCEPTS says
 Motion = dict[str, NDArray[np.float64]]
@@ -91,10 +92,20 @@ def _motion(found: Body, rng: np.random.Generator, speed: float) -> Motion:
     return made
 
 
-def _moved(found: Body, b: Any, motion: Motion, dt: float) -> NDArray[np.float64]:
-    """Velocity after one step, m/s."""
+def _step(found: Body, b: Any, motion: Motion, dt: float, memory: Any) -> tuple[NDArray[np.float64], Any]:
+    """Velocity (m/s) and Memory after one step."""
     given: dict[str, Any] = {f"{k}{a}": float(v[c]) for k, v in motion.items() for c, a in enumerate("xyz")}
-    return np.array(answer(found.move, "move", given | {"dt": dt, "b": b}, found.name))
+    moved = answer(found.move, "move", given | {"dt": dt, "b": b, "memory": memory}, found.name)
+    return np.array(moved[:3]), moved[3] if found.Memory is not None else None
+
+
+def _moved(found: Body, b: Any, motion: Motion, dt: float) -> NDArray[np.float64]:
+    """Velocity after one step, m/s; of a body that remembers after several, from its Memory at the start."""
+    memory = found.Memory() if found.Memory is not None else None
+    for _ in range(1 if memory is None else REMEMBERED):
+        velocity, memory = _step(found, b, motion, dt, memory)
+        motion = motion | {"v": velocity, "m": velocity}
+    return velocity
 
 
 def _apart(a: NDArray[np.float64], b: NDArray[np.float64], number: int, seed: int) -> str:
@@ -123,8 +134,9 @@ def _time_step(found: Body, b: Any, motions: list[Motion]) -> str:
         ends = []
         for steps in (2, 4, 8, 16):
             state = motion | {"g": np.zeros(3), "m": motion["v"]}
+            memory = found.Memory() if found.Memory is not None else None
             for _ in range(steps):
-                velocity = _moved(found, b, state, 0.1 / steps)
+                velocity, memory = _step(found, b, state, 0.1 / steps, memory)
                 state = state | {"v": velocity, "m": velocity}
             ends.append(state["v"])
         errors = [float(np.abs(x - y).max()) for x, y in zip(ends, ends[1:], strict=False)]
@@ -148,6 +160,6 @@ def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
 def _single(found: Body, b: Any, motions: list[Motion]) -> str:
     for motion in motions[:5]:
         given: dict[str, Any] = {f"{k}{a}": float(v[c]) for k, v in motion.items() for c, a in enumerate("xyz")}
-        given |= {"dt": 0.02, "b": b}
+        given |= {"dt": 0.02, "b": b, "memory": found.Memory() if found.Memory is not None else None}
         run(found.move, {"b": choices(b)}, given, asks(found.move, "move", found.name))
     return ""

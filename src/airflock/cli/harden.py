@@ -70,9 +70,9 @@ def harden(
 
 
 def _space(where: str, scenario: Any) -> Any:
-    """The space of the study in a folder, of the study that is shipped for a preset, or all the model's ranges."""
+    """The space of the study in a folder, of the study that is shipped for a preset, or the usual one."""
+    from airflock.evolve.bounds import usual_space
     from airflock.evolve.folder import STUDY, read
-    from airflock.evolve.space import full_space
     from airflock.evolve.space_table import read_space
     from airflock.evolve.study import load_study, shipped
 
@@ -83,7 +83,7 @@ def _space(where: str, scenario: Any) -> Any:
         if space is None:
             raise ScenarioError([f"{where}: {fault}" for fault in faults])
         return space
-    return full_space(scenario)
+    return usual_space(scenario)[0]
 
 
 def _print(name: str, steps: list[Any], seeds: int) -> None:

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from airflock import __version__
 from airflock.cli import (
+    certify,
     display,
     evolve,
     fleet,
@@ -26,6 +27,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    types,
     watch,
 )
 from airflock.errors import AirflockError, bounded, bounded_lines, printable
@@ -63,6 +65,7 @@ app.command("watch")(watch.watch)
 app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
+app.command("certify")(certify.certify)
 app.command("import")(imports.import_tracks)
 app.command("export")(imports.export)
 app.command("identify")(identify.identify)
@@ -76,6 +79,7 @@ app.command("paper")(paper.paper)
 app.command("presets")(inspect.presets)
 app.command("keys")(keys.keys)
 app.command("validate")(inspect.validate)
+app.command("types")(types.types)
 app.command("doctor")(inspect.doctor)
 
 

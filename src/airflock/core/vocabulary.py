@@ -83,6 +83,7 @@ BODY = {
     "wy": "the same, north, m/s",
     "wz": "the same, up, m/s",
     "dt": "time step, s",
+    "memory": "the body's Memory of this agent",
 }
 MEASURED = {
     "x": "position, east, m",
@@ -183,6 +184,11 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "agents": "number of agents",
         "duration": "time flown, s",
         "q": "metric parameters",
+    },
+    "limits": {
+        "b": "the body's parameters",
+        "dt": "time step, s",
+        "speed": "preferred speed of the law, m/s; 0.0 if it has none",
     },
     "faults": {
         "q": "metric parameters",

@@ -18,10 +18,10 @@ from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
 from airflock.engine.threads import in_threads
 from airflock.errors import FlightError, ScenarioError
-from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
+from airflock.world.place import half_sizes
 
 
 def plan_of(

@@ -40,11 +40,19 @@ def whole_number(recording: xr.Dataset, name: str, usual: int | None = None, whe
 
 
 def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
-    """The scenario that a recording was flown with; None for a flight log; RecordingError if damaged."""
+    """The scenario that a recording was flown with; None for tracks; RecordingError if damaged."""
     found = _object(recording, "airflock_scenario")
     if found is not None and not isinstance(found.get("model", {}), Mapping):
         raise RecordingError("recording: attribute airflock_scenario is damaged: model is no table")
     return found
+
+
+def name_of(recording: xr.Dataset) -> str:
+    """What to call a recording: its scenario's name, or that of the file that its tracks came from."""
+    files = str(recording.attrs.get("source_file") or "").split(", ")
+    first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return str(recording.attrs.get("airflock_name") or f"{bounded(first, 60) or 'recording'}{more}")
 
 
 def measured_by(recording: xr.Dataset) -> dict[str, Any]:

@@ -45,6 +45,15 @@ def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
     ]
 
 
+def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) -> list[str]:
+    """What of a scenario its body cannot fly: too long a step, too slow a law."""
+    b, p, flight = parts["body"], parts.get("parameters"), parts["flight"]
+    if b is None or flight is None or found is None or p is None:
+        return []
+    speed = float(found.preferred_speed(p)) if found.preferred_speed is not None else 0.0
+    return carried.lacks(b, flight.dt, speed)
+
+
 def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:
     """Metric set of the section metrics, by its key kind; and what is wrong with it."""
     kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL

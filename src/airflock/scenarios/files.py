@@ -17,6 +17,7 @@ from airflock.metrics.registry import as_set
 from airflock.scenarios import checks, faulty, formats, geometry, groups, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
+from airflock.scenarios.ground import file_faults, with_ground
 from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -108,6 +109,8 @@ def load(
         document, own = _given(document, metrics, body)
         own["kinds"] = _kinds(faults)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
+        document, settings, told = with_ground(document, settings or {}, folder)
+        own["notes"] += told
         if law is None:
             return make(document, where, settings, folder=folder, trust=trust, **own)
         flown = given_law(law)
@@ -204,6 +207,7 @@ def make(
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
+    document, left_out = _with_body(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -232,7 +236,7 @@ def make(
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, measures)
+    faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
     single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
     faults += more
     if faults or found is None:
@@ -246,7 +250,8 @@ def make(
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    notes = (*notes, *told, *converted, *told_of, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    notes = (*notes, *left_out, *told, *converted, *told_of, *_notes(scenario), *advice(scenario))
+    notes = (*notes, *places.place_notes(scenario))
     return replace(scenario, notes=notes)
 
 
@@ -282,6 +287,17 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     if scene.kind != "mesh" or folder is None or is_file(scene.file) or not is_file(folder / scene.file):
         return scene
     return replace(scene, file=str(folder / scene.file))
+
+
+def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body, where the settings name a body of another kind; and a note of it."""
+    given = document.get("body", {})
+    if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
+        return document, ()
+    known = set(given) - {"kind"}
+    kind = given.get("kind", "multirotor")
+    note = f"body.kind = {settings['body.kind']!r}: the numbers of the file's {kind} are left out"
+    return {**document, "body": {}}, (note,) if known else ()
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -339,6 +355,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
     if flight is not None and flight.agents != int(flight.agents):
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
+    faults += file_faults(parts["world"])
     if parts["world"] is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and found is not None and parts.get("parameters") is not None:
