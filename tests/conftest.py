@@ -11,15 +11,17 @@ hypothesis.settings.load_profile("untimed")
 
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=2018, help="seed of every random test")
+    parser.addoption("--nightly", action="store_true", help="also run what .ci/nightly runs")
     parser.addoption("--papers", action="store_true", help="also run the long reproductions of papers")
 
 
 def pytest_collection_modifyitems(config, items):
-    if not config.getoption("--papers"):
-        skip = pytest.mark.skip(reason="long reproduction: add --papers")
-        for item in items:
-            if item.get_closest_marker("papers"):
-                item.add_marker(skip)
+    for option, reason in (("papers", "long reproduction"), ("nightly", "many compilations")):
+        if not config.getoption(f"--{option}"):
+            skip = pytest.mark.skip(reason=f"{reason}: add --{option}")
+            for item in items:
+                if item.get_closest_marker(option):
+                    item.add_marker(skip)
     for item in items:
         if item.get_closest_marker("gpu") and not os.environ.get("AIRFLOCK_NEED_GPU"):
             item.fixturenames.insert(0, "gpu")

@@ -356,7 +356,7 @@ def test_a_figure_is_saved_in_the_format_of_its_ending(tmp_path, ending):
 
 def test_unknown_endings_and_missing_folders_are_refused_in_one_line(tmp_path):
     for name, reason in (
-        ("a.jpg", "ending .jpg is no format"),
+        ("a.jpg", "ending .jpg: unknown format"),
         ("a", "without an ending"),
         ("none/a.png", "No such file or directory"),
     ):

@@ -54,9 +54,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "threads": "threads", **TABLE, "changes": LOADED["changes"],
+            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
-            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.harden.evolved_again"),
+            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
         },
     ),
     "certify": Counterpart(
@@ -138,6 +139,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "plot": "airflock.plots.identified.identified", "plan": "airflock.identify.plan.flight_card",
             "flights": "airflock.identify.check.posterior",
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
+        },
+    ),
+    "infer": Counterpart(
+        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
+        {
+            "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
+            "trust": "trust", **TABLE, "out": "airflock.infer.run.Inferred.document",
+            "plot": "airflock.plots.inferred.inferred",
         },
     ),
     "fleet": Counterpart(

@@ -118,10 +118,10 @@ def axis(text: str) -> tuple[str, list[Any]]:
         except ValueError as fault:
             raise ScenarioError([f"--over {text}: write low:high:count, for instance radio.delay=0:2:5"]) from fault
         if not 1 <= count <= MOST_VALUES:
-            raise ScenarioError([f"--over {text}: the count must lie in [1, {MOST_VALUES}]"])
+            raise ScenarioError([f"--over {text}: the count lies outside [1, {MOST_VALUES}]"])
         step = (high - low) / max(count - 1, 1)
         return key, [low + step * i for i in range(count)]
-    if not equals or not values:
+    if not equals or not values or len(parts) == 2:
         raise ScenarioError([f"--over {text}: write KEY=a,b,c or KEY=low:high:count"])
     found = [options.value(part, f"--over {key}") for part in values.split(",")]
     if any(isinstance(value, (dict, list)) for value in found):

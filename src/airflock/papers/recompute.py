@@ -51,7 +51,7 @@ def paper(
     if name not in PAPERS:
         near = get_close_matches(name, PAPERS, n=1)
         raise AirflockError(
-            f"{name}: no such paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
+            f"{name}: unknown paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
         )
     claims: list[Claim] = import_module(f"airflock.papers.{name}").PAPER.run(
         only=only, quick=quick, seeds=seeds, threads=threads

@@ -30,7 +30,7 @@ def body_of(
     else:
         near = get_close_matches(str(kind), BODIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}, or a file that ends in .py"
-        return BODIES[usual], [f"body.kind = {kind!r} is no body; {hint}"]
+        return BODIES[usual], [f"body.kind = {kind!r}: unknown body; {hint}"]
     faults = carries(carried, found, kind)
     return BODIES[usual] if faults else carried, faults
 
