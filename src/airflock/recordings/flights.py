@@ -121,6 +121,8 @@ def recording_of(flight: Flight) -> xr.Dataset:
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
         attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
+    if flight.faults:
+        attributes["airflock_faults"] = json.dumps({"faults": plain(flight.faults)})
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
