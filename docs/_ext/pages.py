@@ -301,7 +301,7 @@ def commands() -> None:
 
 
 def _help(text: str) -> str:
-    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text)
+    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text.replace("\\[", "["))  # a terminal's markup
 
 
 def presets() -> None:
