@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.aero.wing import Parameters as Wing
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.single import run
@@ -20,6 +21,7 @@ from airflock.scenarios import checks
 MOTIONS = 40  # random motions that each truth is tried on
 REMEMBERED = 5  # steps after which a body that remembers is looked at
 CLOSE = 1e-9
+WING = Wing()
 VECTORS = {"v": "m/s", "m": "m/s", "c": "", "g": "1", "w": "m/s"}  # what `move` may ask for; c: as ACCEPTS says
 Motion = dict[str, NDArray[np.float64]]
 
@@ -87,23 +89,25 @@ def _motion(found: Body, rng: np.random.Generator, speed: float) -> Motion:
     return made
 
 
-def _given(b: Any, motion: Motion, dt: float, memory: Any) -> dict[str, Any]:
+def _given(b: Any, motion: Motion, dt: float, memory: Any, wing: Any = WING) -> dict[str, Any]:
     """Everything that `move` may ask for, by name."""
     numbers = {f"{k}{a}": float(v[c]) for k, v in motion.items() for c, a in enumerate("xyz")}
-    return {**numbers, "dt": dt, "b": b, "memory": memory}
+    return {**numbers, "dt": dt, "b": b, "memory": memory, "wing": wing}
 
 
-def _step(found: Body, b: Any, motion: Motion, dt: float, memory: Any) -> tuple[NDArray[np.float64], Any]:
+def _step(
+    found: Body, b: Any, motion: Motion, dt: float, memory: Any, wing: Any = WING
+) -> tuple[NDArray[np.float64], Any]:
     """Velocity (m/s) and Memory after one step."""
-    moved = answer(found.move, "move", _given(b, motion, dt, memory), found.name)
+    moved = answer(found.move, "move", _given(b, motion, dt, memory, wing), found.name)
     return np.array(moved[:3]), moved[3] if found.Memory is not None else None
 
 
-def _moved(found: Body, b: Any, motion: Motion, dt: float) -> NDArray[np.float64]:
+def _moved(found: Body, b: Any, motion: Motion, dt: float, wing: Any = WING) -> NDArray[np.float64]:
     """Velocity after one step, m/s; of a body that remembers after several, from its Memory at the start."""
     memory = found.Memory() if found.Memory is not None else None
     for _ in range(1 if memory is None else REMEMBERED):
-        velocity, memory = _step(found, b, motion, dt, memory)
+        velocity, memory = _step(found, b, motion, dt, memory, wing)
         motion = motion | {"v": velocity, "m": velocity}
     return velocity
 
@@ -150,7 +154,8 @@ def _units(found: Body, b: Any, motions: list[Motion], seed: int) -> str:
         scale = {name: factor(unit or COMMAND_UNITS[found.accepts], units) for name, unit in VECTORS.items()}
         other = rescaled(b, units)
         for number, motion in enumerate(motions):
-            moved = _moved(found, other, {k: scale[k] * v for k, v in motion.items()}, 0.02 * units.second)
+            scaled = {k: scale[k] * v for k, v in motion.items()}
+            moved = _moved(found, other, scaled, 0.02 * units.second, rescaled(WING, units))
             fault = _apart(moved / scale["v"], _moved(found, b, motion, 0.02), number, seed)
             if fault:
                 return f"{fault}: a unit is declared wrong, or a number with a unit stands in the rule"
