@@ -45,6 +45,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.scenarios.scaling import starting_set as starting_set
     from airflock.scenarios.scenario import Scenario as Scenario
     from airflock.studio.watch import watch as watch
+    from airflock.tune.run import tune as tune
 
 __version__ = "0.1.0"
 
@@ -76,6 +77,7 @@ _WHERE = {
     "evolve": "airflock.evolve",
     "harden": "airflock.evolve.harden",
     "certify": "airflock.certify",
+    "tune": "airflock.tune",
     "display": "airflock.display",
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",

@@ -27,6 +27,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    tune,
     types,
     watch,
 )
@@ -66,6 +67,7 @@ app.command("sweep")(sweep.sweep)
 app.command("evolve")(evolve.evolve)
 app.command("harden")(harden.harden)
 app.command("certify")(certify.certify)
+app.command("tune")(tune.tune)
 app.command("import")(imports.import_tracks)
 app.command("export")(imports.export)
 app.command("identify")(identify.identify)
