@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.evolve.run import evolve as evolve
     from airflock.evolve.validation import validate as validate
     from airflock.identify.run import identify as identify
+    from airflock.infer.run import infer as infer
     from airflock.metrics.registry import metric_set as metric_set
     from airflock.papers.recompute import paper as paper
     from airflock.plots.picture import plot as plot
@@ -87,19 +88,14 @@ _WHERE = {
     "export": "airflock.recordings.exports.export",
     "save": "airflock.recordings.files",
     "identify": "airflock.identify",
+    "infer": "airflock.infer",
     "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
     "paper": "airflock.papers.recompute",
     "doctor": "airflock.recordings.health",
 }
-_MODULES = (
-    "evolve",
-    "certify",
-    "display",
-    "identify",
-    "body",
-    "plots",
-)  # packages; all but plots can be called (decision 0010)
+# packages; all but plots can be called (decision 0010)
+_MODULES = ("evolve", "certify", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from airflock.errors import AirflockError, ScenarioError, bounded
+from airflock.errors import AirflockError, ScenarioError, bounded, reason
 
 MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
@@ -63,7 +63,7 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
             raise
         raise _one(kind, f"{where}: {fault}") from fault
     except OSError as fault:
-        raise _one(kind, f"{where}: {fault.strerror or fault}") from fault
+        raise _one(kind, f"{where}: {reason(fault)}") from fault
     except RecursionError as fault:
         raise _one(kind, f"{where}: is nested too deeply") from fault
     except MemoryError as fault:
@@ -89,7 +89,7 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
     source = Path(path)
     if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
-        raise TextError("is no regular file")
+        raise TextError("is not a regular file")
     with source.open("rb") as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -97,7 +97,7 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
-        raise FormatError(f"is no text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
+        raise FormatError(f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def json_value(text: Any) -> Any:
     try:
         found = json.loads(text)
     except ValueError as fault:
-        raise FormatError(f"is no JSON: {fault}") from fault
+        raise FormatError(f"is not JSON: {fault}") from fault
     _walk(found)
     return found
 
@@ -179,7 +179,7 @@ def xml(text: str) -> Element:
     try:
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as fault:
-        raise FormatError(f"is no XML: {fault}") from fault
+        raise FormatError(f"is not XML: {fault}") from fault
     return around[0][2][0]
 
 

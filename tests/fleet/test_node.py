@@ -238,7 +238,7 @@ def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
         path.write_text(text)
         with pytest.raises(CardError, match=line):
             read_card(path)
-    with pytest.raises(CardError, match="No such file"):
+    with pytest.raises(CardError, match="no such file"):
         read_card(tmp_path / "absent")
 
 
@@ -372,7 +372,7 @@ def test_the_command_tells_all_that_is_wrong_at_once(tmp_path, capsys):
     assert code == 2 and all(line.startswith("airflock: ") for line in lines)
     for part in (
         "members are 1, 2, 3",
-        "no key can be read",
+        "the key cannot be read",
         "--i-am-the-pilot is missing",
         "tcp:1: give",
         "1 to 65535",

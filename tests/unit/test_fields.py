@@ -94,10 +94,10 @@ WRONG = {
                 "feature 2 reaches outside feature 1"),
     "none": ([{"type": "Feature", "geometry": {"type": "Point", "coordinates": [1.0, 2.0]}}], "holds no polygon"),
     "two": ([polygon(SHELL[:2])], "a ring of 2 corners"),
-    "metres": ([polygon([[5e5, 5e6], [5.1e5, 5e6], [5e5, 5.1e6]])], "is no longitude and latitude in degrees"),
-    "text": ([polygon([["a", "b"], *SHELL[1:]])], "is no point [longitude, latitude]"),
-    "height": ([polygon(SHELL, floor="low")], "the property floor = 'low' is no height in m"),
-    "flat": ([{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}], "coordinates is no list"),
+    "metres": ([polygon([[5e5, 5e6], [5.1e5, 5e6], [5e5, 5.1e6]])], "is not a longitude and latitude in degrees"),
+    "text": ([polygon([["a", "b"], *SHELL[1:]])], "is not a point [longitude, latitude]"),
+    "height": ([polygon(SHELL, floor="low")], "the property floor = 'low' is not a height in m"),
+    "flat": ([{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}], "coordinates is not a list"),
 }  # fmt: skip
 
 

@@ -26,7 +26,8 @@ def spans(text):
 def calls(path):
     """Each call of `airflock`, as words."""
     for span in spans(path.read_text(encoding="utf-8")):
-        for part in re.split(r"&&|;|\|", span.partition("#")[0]):
+        unquoted = re.sub(r"'[^']*'|\"[^\"]*\"", "QUOTED", span)
+        for part in re.split(r"&&|;|\|", unquoted.partition("#")[0]):
             if part.strip().startswith("airflock "):
                 yield shlex.split(re.sub(r"[<>].*", "", part.strip()))
 

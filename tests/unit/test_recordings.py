@@ -73,7 +73,7 @@ def test_a_missing_position_takes_its_drone_out_of_that_instant_alone(circling):
         (lambda d: d.isel(individual=0), "lacks the dimension individual"),
         (lambda d: d.isel(individual=slice(0)), "is empty"),
         (lambda d: d.isel(space=[0]), "1 components"),
-        (lambda d: d.isel(time=slice(None, None, -1)), "time is no increasing"),
+        (lambda d: d.isel(time=slice(None, None, -1)), "time is not an increasing"),
         (lambda d: d.isel(time=[0, 1, 5, 6]), "resample"),
         (lambda d: d.isel(time=[0]), "one frame without velocity"),
     ],

@@ -110,7 +110,7 @@ def faults_of(settings, base="vasarhelyi_2018/4ms"):
         ("world.floor", 3.0, "world.floor: a plane has no heights"),
         ("world.obstacles", [[[500, 0], [510, 0], [505, 8]]], "world.obstacles[0] reaches outside the arena"),
         ("sensors.period", 0.001, "sensors.period = 0.001 s is shorter than dt = 0.01 s"),
-        ("wrld", {}, "wrld is no key; did you mean world?"),
+        ("wrld", {}, "wrld: unknown key; did you mean world?"),
     ],
 )
 def test_a_fault_names_key_value_unit_and_range(key, value, said):

@@ -98,7 +98,13 @@ def test_every_word_of_the_vocabulary_has_a_type():
         text = f"def {kind}({', '.join(words)}): pass\n"
         text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
-        text += "" if kind in ("decide", "move", "sample") else "def decide(): pass\ndef sample(): pass\n"
+        text += (
+            ""
+            if kind in ("decide", "move", "sample")
+            else "def move(): pass\n"
+            if kind == "limits"
+            else "def decide(): pass\ndef sample(): pass\n"
+        )
         (rule,) = [
             node
             for node in ast.parse(typed_copy(text).text).body
@@ -186,7 +192,7 @@ def test_annotations_of_a_users_own_stay():
     [
         ("def decide(own:\n", "mine.py:1: '(' was never closed"),
         ("x = 1\n", "holds no rule; a law has decide"),
-        (None, "No such file"),
+        (None, "no such file"),
     ],
 )
 def test_what_is_no_rule_file_is_one_line(tmp_path, text, fault):

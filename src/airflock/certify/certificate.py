@@ -26,7 +26,7 @@ NOT_SAID = (
     "the model was flown, no aircraft: a collision here is a distance of two centres",
     "no faults, no pilot and no common GNSS jump but those that the scenario holds",
     "the confidence is about chance within this scenario; numbers that are wrong in it are not covered",
-    "this is no airworthiness or SORA document",
+    "this is not an airworthiness or SORA document",
 )
 
 

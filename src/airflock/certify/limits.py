@@ -79,7 +79,7 @@ def read(text: str, scenario: Scenario) -> Limit:
     if score not in known:
         near = get_close_matches(score, known, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-        raise ScenarioError([f"{where}: {score} is no order parameter of this scenario; {hint}"])
+        raise ScenarioError([f"{where}: {score}: unknown order parameter; {hint}"])
     often = None if rate is None else float(rate) * (0.01 if percent else 1.0)
     timed = _lasting(scenario, score, sign, float(value))
     fault = ""
@@ -93,7 +93,7 @@ def read(text: str, scenario: Scenario) -> Limit:
     if unit == "?":
         fault = "say how often: a rate /h (flock hour), /drone-h or /flight, or a share in %"
     elif often is not None and not 0.0 < often < (1.0 if unit == "flight" else math.inf):
-        told = {"in": "the share must lie in (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
+        told = {"in": "the share lies outside (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
         fault = told[word]
     elif unit in ("h", "drone-h") and not timed:
         unit_of, meaning = reports(scenario.measures).get(score, ("", score))

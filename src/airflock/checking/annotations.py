@@ -54,7 +54,7 @@ RESULTS = {
     **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
     "pair": "Pair", "linked": "bool", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
-    "fitness": "Mapping[str, float]", "faults": "list[str]",
+    "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
 }  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def _kinds(functions: set[str]) -> dict[str, str]:
     if "decide" in functions:
         kinds |= {name: name for name in (*LAW, *LAW_NUMBERS, "workspace")}
     if "move" in functions:
-        kinds["move"] = "move"
+        kinds |= {"move": "move", "limits": "limits"}
     if "sample" in functions or "fitness" in functions:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
     return {name: kind for name, kind in kinds.items() if name in functions}
@@ -219,7 +219,7 @@ def _result(item: ast.FunctionDef, kind: str, names: _Names, scalar: bool) -> st
         }
         return "" if len(counts) != 1 else "float" if counts == {1} else f"tuple[{', '.join(['float'] * counts.pop())}]"
     found = RESULTS.get(kind, "")
-    if "Memory" in names.bound and kind == "decide":
+    if "Memory" in names.bound and kind in ("decide", "move"):
         return 'tuple[float, float, float, "Memory"]'
     if "Memory" in names.bound and kind == "agent":
         return 'tuple["Agent", "Memory"]'

@@ -148,6 +148,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **dict.fromkeys(("map", "unit", "time_unit", "axes", "decimal", "delimiter"), "options"),
         },
     ),
+    "infer": Counterpart(
+        'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
+        {
+            "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
+            "trust": "trust", **TABLE, "out": "airflock.infer.run.Inferred.document",
+            "plot": "airflock.plots.inferred.inferred",
+        },
+    ),
     "fleet": Counterpart(
         "airflock.fleet.compare.fly(scenario, card, seed)", "airflock.fleet.compare.fly",
         {
@@ -160,7 +168,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
-        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads", **TABLE},
+        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
+         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",

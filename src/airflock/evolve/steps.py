@@ -94,7 +94,10 @@ def recipe(scenario: Scenario, steps: Sequence[Step] = RECIPE) -> list[tuple[Ste
     missing = sorted(key for key in keys if key not in known)
     if missing:
         raise ScenarioError(
-            [f"{scenario.name}: no recipe for model {scenario.model.name}: {key} is no number of it" for key in missing]
+            [
+                f"{scenario.name}: no recipe for model {scenario.model.name}: {key} is not a number of it"
+                for key in missing
+            ]
         )
     now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
     found = [(Step("optimum", {}, "where hardening begins"), dict(now))]

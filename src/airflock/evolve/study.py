@@ -196,7 +196,7 @@ def make_study(
     for key in document:
         if key not in KEYS:
             near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
-            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
+            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
     if scenario is None:
         scenario = _scenario(document, where, settings or {}, folder, trust)
     space: Space | None
@@ -226,7 +226,7 @@ def _scenario(
 ) -> Scenario:
     named, keys = document.get("scenario"), document.get("set", {})
     if not isinstance(named, str) or not isinstance(keys, Mapping):
-        wrong = f"scenario = {named!r} is missing or no name" if not isinstance(named, str) else "set is no table"
+        wrong = f"scenario = {named!r} is missing or not a name" if not isinstance(named, str) else "set is not a table"
         raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
     beside = folder / named if folder is not None else None
     return load(beside if beside is not None and is_file(beside) else named, {**keys, **settings}, trust=trust)

@@ -20,7 +20,7 @@ from airflock.core.agent import State
 from airflock.core.contract import Model, model
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, ParameterError
+from airflock.errors import AirflockError, CardError, ParameterError, reason
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
@@ -123,7 +123,7 @@ def read_card(path: Path) -> Card:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as fault:
-        raise CardError([f"{path}: {fault.strerror}"]) from fault
+        raise CardError([f"{path}: {reason(fault)}"]) from fault
     except (ValueError, RecursionError) as fault:
         raise CardError([f"{path}: is not JSON: {fault}"]) from fault
     return card_of(document, str(path))

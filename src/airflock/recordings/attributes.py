@@ -34,7 +34,7 @@ def whole_number(recording: xr.Dataset, name: str, usual: int | None = None, whe
     if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not -(2**64) < int(value) < 2**64:
-        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is no whole number"
+        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is not a whole number"
         raise RecordingError(f"{where}: attribute {name} {told}")
     return int(value)
 
@@ -43,7 +43,7 @@ def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
     """The scenario that a recording was flown with; None for tracks; RecordingError if damaged."""
     found = _object(recording, "airflock_scenario")
     if found is not None and not isinstance(found.get("model", {}), Mapping):
-        raise RecordingError("recording: attribute airflock_scenario is damaged: model is no table")
+        raise RecordingError("recording: attribute airflock_scenario is damaged: model is not a table")
     return found
 
 

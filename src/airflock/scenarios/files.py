@@ -119,7 +119,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
         near = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
+        hint = f"; did you mean {near[0]}?" if near else "; airflock presets lists the presets"
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     with from_outside(name):
         document = read_toml(path)
@@ -162,7 +162,9 @@ def given_law(law: Any) -> Model:
         return find_model(str(law), told="law", trust=True)
     if isinstance(law, Mapping) or hasattr(law, "__dict__"):
         return model(law)
-    raise ScenarioError([f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"])
+    raise ScenarioError(
+        [f"law = {law!r} is not a law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
+    )
 
 
 def loaded(what: Any) -> Scenario:
@@ -171,7 +173,9 @@ def loaded(what: Any) -> Scenario:
         return what
     if isinstance(what, (str, os.PathLike)):
         return load(what)
-    raise ScenarioError([f"{type(what).__name__} is no scenario; give a Scenario, a preset's name or a scenario file"])
+    raise ScenarioError(
+        [f"{type(what).__name__} is not a scenario; give a Scenario, a preset's name or a scenario file"]
+    )
 
 
 def tells_of_study(document: Mapping[str, Any]) -> bool:
@@ -268,7 +272,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
     for key, value in settings.items():
         section, _, name = key.partition(".")
         if name and not isinstance(merged.setdefault(section, {}), dict):
-            faults.append(f"{key} is no key")
+            faults.append(f"{key}: unknown key")
         elif name:
             merged[section][name] = value
         else:
@@ -276,7 +280,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
     for key in merged:
         if key not in TOP:
             near = get_close_matches(key, TOP, n=1, cutoff=0.5)
-            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
+            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
     return merged, faults
 
 
@@ -284,7 +288,7 @@ def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str
     table = merged.get("model", {})
     if isinstance(table, Mapping):
         return table, []
-    return {}, [f"model = {table!r} is no table; write model.kind = {table!r}"]
+    return {}, [f"model = {table!r} is not a table; write model.kind = {table!r}"]
 
 
 def _parts(
@@ -334,14 +338,14 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
 def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
     """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
     if not isinstance(kind, str):
-        raise ScenarioError([f"{told} = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
+        raise ScenarioError([f"{told} = {kind!r} is missing or not a name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
         return model(own_code(told, kind, folder, trust=trust), Path(kind).stem)
     near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
-    raise ScenarioError([f"{told} = {kind!r} is no model; {hint}"])
+    raise ScenarioError([f"{told} = {kind!r}: unknown model; {hint}"])
 
 
 def _published(table: Any) -> dict[str, tuple[float, float | None]]:
@@ -389,8 +393,8 @@ def _notes(scenario: Scenario) -> list[str]:
     period, delay = scenario.sensors.period, scenario.radio.delay
     if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
         notes.append(
-            f"radio.delay = {delay:g} s is no multiple of sensors.period = {period:g} s: decisions use the states of "
-            "exactly that long ago, taken between two measurements"
+            f"radio.delay = {delay:g} s is not a multiple of sensors.period = {period:g} s: decisions use the states "
+            "of exactly that long ago, taken between two measurements"
         )
     notes += wings.notes(scenario)
     p = scenario.parameters

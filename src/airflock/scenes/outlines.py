@@ -106,13 +106,13 @@ def _told_heights(properties: Mapping[str, Any]) -> dict[str, float]:
     found = {key: properties[key] for key in ("floor", "ceiling") if properties.get(key) is not None}
     for key, value in found.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise FormatError(f"the property {key} = {bounded(repr(value), 40)} is no height in m")
+            raise FormatError(f"the property {key} = {bounded(repr(value), 40)} is not a height in m")
     return {key: float(value) for key, value in found.items()}
 
 
 def _list(value: Any, key: str) -> list[Any]:
     if not isinstance(value, list):
-        raise FormatError(f"{key} is no list")
+        raise FormatError(f"{key} is not a list")
     return value
 
 
@@ -121,7 +121,7 @@ def _ring(points: Any) -> Ring:
     for point in _list(points, "a ring of coordinates"):
         numbers = point if isinstance(point, list) else []
         if len(numbers) < 2 or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in numbers[:2]):
-            raise FormatError(f"{bounded(repr(point), 40)} is no point [longitude, latitude]")
+            raise FormatError(f"{bounded(repr(point), 40)} is not a point [longitude, latitude]")
         found.append((float(numbers[0]), float(numbers[1])))
     return _open(found)
 
@@ -150,7 +150,7 @@ def _coordinates(boundary: Element) -> Ring:
         try:
             longitude, latitude, *_ = (float(number) for number in point.split(","))
         except ValueError:
-            raise FormatError(f"{bounded(repr(point), 40)} is no point longitude,latitude") from None
+            raise FormatError(f"{bounded(repr(point), 40)} is not a point longitude,latitude") from None
         found.append((longitude, latitude))
     return _open(found)
 
@@ -168,7 +168,7 @@ def _degrees(one: Outline) -> Iterator[str]:
             yield f"{one.name}: a ring of {len(ring)} corners; a polygon needs at least 3"
         for longitude, latitude in ring:
             if not (abs(longitude) <= 180.0 and abs(latitude) <= 85.0):
-                yield f"{one.name}: ({longitude:g}, {latitude:g}) is no longitude and latitude in degrees"
+                yield f"{one.name}: ({longitude:g}, {latitude:g}) is not a longitude and latitude in degrees"
                 break
 
 

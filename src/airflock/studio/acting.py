@@ -1,6 +1,7 @@
 """Acting: what a hand can do to the world of a flight: a gust, an obstacle, a goal that is dragged."""
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from airflock.studio.drawing import Drawing
 from airflock.studio.room import Room, note
+from airflock.studio.side import Side
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page
@@ -29,6 +31,9 @@ class Acting(Room):
             self.strength = panel.number("gust (m/s)", 8, 1, 50, lambda _: None, f"blows for {BLOWS:g} s")
             self.towards = panel.menu("towards", tuple(TOWARDS), "east", lambda _: None)
             panel.row({"Gust": self.ask(self.gust), "Throw an obstacle in": self.ask(self._aim)})
+            self.dragging = False
+            if has_goals(self.player.sides):
+                panel.checkbox("drag goals", False, told=lambda on: self.player.ask(lambda: self._drag(on)))
             self.said = panel.text()
         self.drawing.handles = self._handles
         self._handles(self.drawing)
@@ -38,6 +43,10 @@ class Acting(Room):
         angle, strength = math.radians(TOWARDS[self.towards.value]), float(self.strength.value)
         east, north = (round(strength * c, 6) for c in (math.cos(angle), math.sin(angle)))
         self.player.gust(east, north, BLOWS)
+
+    def _drag(self, on: bool) -> None:
+        self.dragging = on
+        self.drawing.restand(always=True)
 
     def _aim(self) -> None:
         self.aiming = not self.aiming
@@ -58,7 +67,9 @@ class Acting(Room):
         self.drawing.restand()
 
     def _handles(self, drawing: Drawing) -> None:
-        """A handle on each goal of each side."""
+        """A handle on each goal of each side, while goals may be dragged."""
+        if not self.dragging:
+            return
         for flock in drawing.flocks:
             scenario = flock.side.scenario
             goals = scenario.waypoints() if scenario.goals.kind in ("points", "scene") else []
@@ -74,3 +85,8 @@ class Acting(Room):
             self.player.ask(lambda: self.player.move_goal(number, spot))
 
         return told
+
+
+def has_goals(sides: Sequence[Side]) -> bool:
+    """Whether a side has goals that can be dragged."""
+    return any(side.scenario.goals.kind in ("points", "scene") for side in sides)

@@ -56,7 +56,9 @@ class Comparing(Room):
         if len(sides) < 2:
             self.text.content = note(ALONE)
             return
-        names = [f"<b>{name}</b> {html.escape(side.origin.where)}" for name, side in zip(NAMES, sides, strict=True)]
+        first, second = (side.origin for side in sides)
+        other = second.beside(first) if second is not first else "forked from A"
+        names = [f"<b>A</b> {html.escape(first.where)}", f"<b>B</b> {html.escape(other)}"]
         same = difference_table(sides[0].scenario, sides[1].scenario)
         scores = score_table([side.flight for side in sides], self.page.measuring.scores)
         self.text.content = note("<br>".join(names)) + same + scores

@@ -20,7 +20,7 @@ from airflock.studio.view import View
 OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
 PIECE = 6  # frames of one piece of a trail
 MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
-BROAD = 0.75  # of the half width of two sides must fit the height of a page, which is broader than high
+BROAD = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
 APART = 2.3  # half widths between the middles of two sides
 LISTED = 40  # collisions that are kept
 LINKS = ("none", "three nearest", "radio")
@@ -117,7 +117,7 @@ class Drawing:
             self._build()
             view.agents(count, self.size, colours.LINES)
         wide = self.span + 0.5 * float(step[0]) * (len(sides) - 1)
-        beside = np.array([0.3 * wide if self.flat else 0.0, 0.0, 0.0])  # of the panel
+        beside = 0.3 * wide * np.array([1.0, 0.0 if self.flat else 0.3, 0.0])  # of the panel
         share = 1.0 if len(sides) == 1 else BROAD
         view.look_at(middle + 0.5 * step * (len(sides) - 1) + beside, share * wide, self.flat)
         self._before: NDArray[Any] | None = None
@@ -150,13 +150,13 @@ class Drawing:
         if self.handles is not None:
             self.handles(self)
 
-    def restand(self) -> None:
+    def restand(self, always: bool = False) -> None:
         """Draw what stands anew where it has changed: an obstacle was thrown in, a goal moved, a fork begun."""
         sides = self.player.sides
         if len(sides) != len(self._shown) or any(a is not b for a, b in zip(sides, self._shown, strict=True)):
             self.stand()
             return
-        if [_world(side) for side in sides] != self._worlds:
+        if always or [_world(side) for side in sides] != self._worlds:
             self.stages = [self._stage(side)._replace(span=old.span, centre=old.centre)
                            for side, old in zip(sides, self.stages, strict=True)]  # fmt: skip
             with self.view.atomic():

@@ -73,12 +73,11 @@ class Perceiving:
         pieces, tones, words = [], [], []
         for number, (name, vector) in enumerate((given | walls).items()):
             strength = float(np.linalg.norm(vector))
-            most = self._strongest[name] = max(self._strongest.get(name, 0.0), strength)
-            tone = colours.TERMS[number % len(colours.TERMS)]
-            shafts = arrow(own, own + vector * (REACH * size / max(most, 1e-9)))
-            for term in seen.terms if name in given else ():
-                part = values(term)[name if name != "neighbours" or "" not in values(term) else ""]
-                shafts = np.vstack([shafts, [[own, own + part * (REACH * size / max(most, 1e-9))]]])
+            parts = [values(term)["" if name == "neighbours" else name] for term in seen.terms] if name in given else []
+            longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
+            most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
+            tone, scale = colours.TERMS[number % len(colours.TERMS)], REACH * size / max(most, 1e-9)
+            shafts = np.vstack([arrow(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)])
             pieces.append(shafts)
             tones.append(np.tile(tone, (len(shafts), 1)))
             words.append(f"{_dash(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")

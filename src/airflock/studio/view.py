@@ -49,7 +49,7 @@ class View:
         scene.set_up_direction("+z")
         scene.configure_environment_map(None)
         scene.configure_default_lights(True, cast_shadow=False)
-        scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(150, 150, 160), intensity=1.0)
+        scene.add_light_hemisphere("/sky", sky_color=(255, 255, 255), ground_color=(185, 185, 194), intensity=1.0)
         self.panel = Panel(self.server)
         self._standing: list[Any] = []
         self._moving: list[Any] = []
@@ -84,7 +84,7 @@ class View:
     def look_at(self, centre: NDArray[Any], span: float, flat: bool) -> None:
         """Put every camera where `span` m around a centre fill it: straight above, or from the south."""
         field = NARROW if flat else WIDE
-        far = 1.15 * span / np.tan(0.5 * field)
+        far = (1.15 if flat else 1.45) * span / np.tan(0.5 * field)
         offset = np.array([0.0, -0.001, 1.0]) if flat else np.array([0.25, -0.8, 0.55])
         place = centre + offset / np.linalg.norm(offset) * far
         self._aim = {
@@ -193,7 +193,7 @@ class View:
         node = self._trails[self._turn % TRAILS]
         self._turn += done
         node.points = np.stack([begin, end], 1)
-        pale = (0.5 * colour + 0.5 * 235).astype(np.uint8)
+        pale = _linear(0.45 * colour + 0.55 * 235)
         node.colors = np.repeat(pale[:, None], 2, axis=1)
 
     def no_trails(self) -> None:
@@ -214,7 +214,7 @@ class View:
         self._bare.discard(name)
         node.points = points.astype(np.float32)
         if colour is not None:
-            node.colors = np.repeat(np.asarray(colour, np.uint8)[:, None], 2, axis=1)
+            node.colors = np.repeat(_linear(colour)[:, None], 2, axis=1)
 
     def on_click(self, told: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
         """Tell of a click into the scene: origin and direction of its ray."""
@@ -230,7 +230,7 @@ def _three(place: NDArray[Any]) -> tuple[float, float, float]:
 
 
 def _linear(colour: NDArray[Any]) -> NDArray[np.uint8]:
-    """Colours of batched meshes, which viser takes as linear light: sRGB (IEC 61966-2-1) decoded."""
+    """Colours of many meshes or segments, which viser takes as linear light: sRGB (IEC 61966-2-1) decoded."""
     share = np.asarray(colour, float) / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.asarray(np.round(255.0 * light), np.uint8)

@@ -230,6 +230,13 @@ class Place:
         if found.distance < AWAY:
             yield found
 
+    def distances(self, x: float, y: float, z: float) -> Iterator[tuple[str, float]]:
+        """Distance (m, negative beyond or within) to the walls, to each obstacle, and to what stands in the scene."""
+        yield "wall", -self._beyond(x, y, z - self._middle, *self._half, self._edges, self._corners)
+        for number, surface in enumerate(self.obstacles(x, y, z)):
+            yield f"obstacle {number}", surface.distance
+        yield "scene", bvh.nearest(x, y, z, AWAY, *self._scene).distance
+
     def excursion(self, x: float, y: float, z: float) -> float:
         """Distance outside the arena or inside an obstacle or a shape, m; negative where flying is allowed."""
         out = self._beyond(x, y, z - self._middle, *self._half, self._edges, self._corners)

@@ -31,7 +31,7 @@ def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, w
             plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
             mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
             gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
-            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers.b,
+            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers.b, wing=numbers.wing,
         )  # fmt: skip
         for a in range(plan.dimensions):
             v[a][i] = t[a]

@@ -50,7 +50,7 @@ class Cluster:
         try:
             from distributed import Client
         except ModuleNotFoundError as fault:
-            raise StudyError("--scheduler needs the package distributed: pip install 'airflock[cluster]'") from fault
+            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
         self.task, self.timeout = Task.of(study) if task is None and study is not None else task, timeout
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)

@@ -1,0 +1,178 @@
+"""Verb infer: which flocking law explains these tracks?"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.endings import PICTURES, SCENARIOS
+from airflock.errors import AirflockError
+
+LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
+Tracks = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="TRACKS...", show_default=False,
+        help="Recordings (.nc, as airflock import saves them), or files that import reads without options.",
+    ),
+]  # fmt: skip
+
+
+def infer(
+    tracks: Tracks,
+    models: Annotated[
+        str,
+        typer.Option(
+            "--models", metavar="LAW,FILE,...", help="Laws by name, presets, scenario files, files with own laws."
+        ),
+    ] = LAWS,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario of the law found.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Force maps: the tracks' and each law's.")
+    ] = None,
+    changes: options.Set = None,
+    flights: Annotated[int, typer.Option("--check", min=0, help="Flights to compare with the tracks; 0: none.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the search for the best fit.")] = 0,
+    trust: options.Trust = False,
+    as_json: options.Json = False,
+) -> None:
+    """Find which flocking law explains tracks, with which numbers, and how much it misses.
+
+    Each law is fitted by the likelihood of the next frame and judged on parts that it has not seen: neighbouring spans
+    of one recording, or whole recordings where there are several. --set says what is known of the place, for all laws.
+
+    Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
+    """
+    from airflock.infer.run import infer as find
+
+    faults: list[str] = []
+    with options.gathering(faults):
+        options.writable((out, SCENARIOS), (plot, PICTURES))
+    settings: dict[str, Any] = {}
+    with options.gathering(faults):
+        settings = options.settings(changes)
+    laws = [name.strip() for name in models.split(",") if name.strip()]
+    if not laws:
+        faults.append("--models names no law; write for instance --models couzin_2002,vicsek_1995")
+    faults += [f"{path}: no such file" for path in tracks if not path.exists()]
+    options.refuse(faults)
+    with _telling(as_json) as done:
+        found = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
+    if plot is not None:
+        from airflock.plots.inferred import inferred
+        from airflock.plots.save import save_figure
+
+        save_figure(inferred(found), plot)
+        tables.say(f"saved {plot}")
+    if out is not None and found.best is not None:
+        from airflock.evolve.folder import write
+
+        write(out, found.document())
+        tables.say(f"saved {out}")
+    if as_json:
+        tables.emit_json(_plain(found))
+        return
+    _table(found)
+    if found.best is not None:
+        _numbers(found)
+        _check(found)
+    if out is not None and found.best is None:
+        raise AirflockError(f"{out}: not written: {found.verdict}")
+
+
+@contextmanager
+def _telling(quiet: bool) -> Iterator[Any]:
+    """A line on the terminal that says what is under way."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("reading") as status:
+        steps: dict[str, int] = {}
+
+        def told(name: str) -> None:
+            steps[name] = steps.get(name, 0) + 1
+            status.update(f"{name}: step {steps[name]}")
+
+        yield told
+
+
+def _table(found: Any) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    fitted, every = found.fitted
+    title = f"{found.individuals} individuals, {found.steps} steps; fitted on {fitted} of {every} frames"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    for name in ("law", "log-likelihood gained", "ahead in spans", "AIC", "inside 95 %", "left over", "numbers"):
+        table.add_column(name, justify="left" if name == "law" else "right", no_wrap=True)
+    for law in found.laws:
+        table.add_row(
+            law.name, f"{law.gain:.0f} ± {law.error:.0f}", f"{law.ahead:.0%}", f"{law.criterion:.0f}",
+            f"{law.inside:.1%}", f"{law.missed:.1%}", str(len(law.numbers)),
+        )  # fmt: skip
+    console = Console()
+    console.print(table)
+    console.print("gained, AIC: against going straight on; gained on parts that were held out", highlight=False)
+    console.print(found.verdict, style="bold", highlight=False, markup=False)
+
+
+def _numbers(found: Any) -> None:
+    from rich.console import Console
+
+    from airflock.infer.run import interval
+
+    console = Console()
+    for key, number in found.best.numbers.items():
+        unit = "" if number.unit == "1" else f" {number.unit}"
+        console.print(f"  {key} {number.value:.4g}{unit}, {interval(number)}", highlight=False, markup=False)
+    console.print(f"  noise of the tracks {found.noise.seen:.3g} m", highlight=False)
+
+
+def _check(found: Any) -> None:
+    from rich.console import Console
+
+    if found.check is None:
+        return
+    console = Console()
+    console.print("check: flocks of this law, flown freely from the first frame, against the tracks")
+    for name, (own, low, high) in found.check.found.items():
+        verdict = "ok" if low <= own <= high else "OUTSIDE: not explained"
+        console.print(f"  {name} {own:.4g} in [{low:.4g}, {high:.4g}] {verdict}", highlight=False, markup=False)
+
+
+def _plain(found: Any) -> dict[str, Any]:
+    """What was found as plain values."""
+    laws = [
+        {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}
+        | {"numbers": {key: number.value for key, number in law.numbers.items()}}
+        for law in found.laws
+    ]
+    best = None
+    if found.best is not None:
+        numbers = {
+            key: {"value": number.value, "low": number.low, "high": number.high, "unit": number.unit}
+            for key, number in found.best.numbers.items()
+        }
+        best = {"name": found.best.name, "numbers": numbers, "noise_of_tracks": found.noise.seen}
+    check = {} if found.check is None else {
+        name: {"tracks": own, "low": low, "high": high} for name, (own, low, high) in found.check.found.items()
+    }  # fmt: skip
+    frames = {"fitted": found.fitted[0], "all": found.fitted[1]}
+    return {
+        "verdict": found.verdict,
+        "best": best,
+        "laws": laws,
+        "check": check,
+        "frames": frames,
+        "steps": found.steps,
+    }

@@ -1,0 +1,124 @@
+"""Fit one law to tracks, and hold out spans or whole recordings to see what it predicts."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.infer.candidates import Candidate
+from airflock.infer.fit import Fit, Model, climb, drawn, hop, scan, search, simplify, telling
+from airflock.infer.tracks import Scale, Tracks
+
+Array = NDArray[np.float64]
+FOLDS = 4  # parts of the tracks that are held out in turn
+ENOUGH = 24_000  # individual steps, and
+FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
+HOPS, FEW_HOPS = 6, 4  # climbs beside the best law's fit, and beside any
+AGAIN = 3  # steps of a climb without the part that is held out
+WITHIN = 1.959964  # standard deviations that hold 95 %
+
+
+@dataclass
+class Held:
+    """What a fit predicts of spans that it has not seen.
+
+    surprise : (span,) negative log-likelihood; inside: share of differences within the 95 % that are predicted
+    """
+
+    surprise: Array
+    inside: float
+
+
+def sample(model: Model) -> list[int]:
+    """Spans on which is fitted: all, or evenly some of them where tracks are long."""
+    individuals = max(tracks.individuals for tracks in model.tracks)
+    return model.few(int(np.clip(ENOUGH / individuals, *FRAMES)))
+
+
+def straight(tracks: Sequence[Tracks], scale: Scale) -> tuple[Model, Fit]:
+    """What is predicted by going straight on at one's own speed, which returns to the usual one."""
+    model = Model(None, tracks, scale)
+    return model, climb(model, model.first(), range(len(model.numbers)), sample(model), 30)
+
+
+def fit(
+    law: Candidate, tracks: Sequence[Tracks], scale: Scale, gains: Array, seed: int, say: Callable[[], None]
+) -> tuple[Model, Fit]:
+    """The law's numbers at their likeliest; those that cannot be told apart stay at their defaults.
+
+    gains : of going straight on, to begin with
+    """
+    model = Model(law, tracks, scale)
+    begin = drawn(model, _begin(model, gains), model.few(), seed)
+    kept = telling(model, _begin(model, gains), begin, model.few())
+    model = Model(replace(law, numbers=tuple(law.numbers[k] for k in kept)), tracks, scale)
+    say()
+    found = polish(model, search(model, _begin(model, gains), begin[:, kept], model.few(), seed, say))
+    say()
+    return model, found
+
+
+def simpler(model: Model, found: Fit, scale: Scale, seed: int, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit after more searching beside it, without numbers that the others make up for."""
+    found = hop(model, found, sample(model), HOPS, seed, say)
+    found = climb(model, found.place, found.free, sample(model))
+    gone = simplify(model, found, say)
+    if not gone:
+        return model, found
+    rest = [k for k in range(len(model.numbers)) if k not in gone]
+    assert model.law is not None
+    numbers = tuple(n for k, n in enumerate(model.law.numbers) if k not in gone)
+    without = Model(replace(model.law, numbers=numbers), model.tracks, scale)
+    place, _ = scan(without, found.place[rest], free(without), without.few())
+    less = polish(without, place)
+    return (without, less) if less.loss < found.loss + 2.0 * len(gone) else (model, found)
+
+
+def free(model: Model) -> list[int]:
+    """Numbers that are fitted: all, but the share of the own speed that is kept only where speeds are one's own."""
+    return list(range(len(model.numbers) - (0 if model.own_speed else 1)))
+
+
+def polish(model: Model, place: Array) -> Fit:
+    """Climb on a few spans and on the sample, looking along each number's range in between."""
+    spans = sample(model)
+    few = model.few()
+    rough = climb(model, place, free(model), few, rough=True)
+    for _ in range(3):
+        place, better = scan(model, rough.place, free(model), few)
+        if not better:
+            break
+        rough = climb(model, place, free(model), few, rough=True)
+    rough = hop(model, rough, few, FEW_HOPS, 0, lambda: None)
+    return climb(model, rough.place, free(model), spans)
+
+
+def _begin(model: Model, gains: Array) -> Array:
+    place = model.first()
+    place[model.named :] = gains
+    return place
+
+
+def folds(model: Model) -> list[list[int]]:
+    """Spans that are held out together: those of a recording where there are several, else neighbouring ones."""
+    if len(model.tracks) > 1:
+        groups = np.array_split(np.arange(len(model.tracks)), min(FOLDS, len(model.tracks)))
+        return [[k for k, (t, _) in enumerate(model.spans) if t in group] for group in groups]
+    return [part.tolist() for part in np.array_split(np.arange(len(model.spans)), FOLDS)]
+
+
+def hold_out(model: Model, fitted: Fit, say: Callable[[], None]) -> Held:
+    """Fit without each part in turn, and predict that part."""
+    spans = sample(model)
+    surprise, inside, count = np.zeros(len(model.spans)), 0.0, 0
+    for part in folds(model):
+        rest = [k for k in spans if k not in set(part)] or [k for k in range(len(model.spans)) if k not in set(part)]
+        own = climb(model, fitted.place, fitted.free, rest, AGAIN, rough=True)
+        along, across = own.score.variances()
+        e, owner = model.differences(own.place, part)
+        surprise[part] = model.tally(e, owner).surprise(along, across)[part]
+        inside += float((np.abs(e) < WITHIN * np.sqrt([along, *[across] * (model.axes - 1)])).sum())
+        count += e.size
+        say()
+    return Held(surprise, inside / count)
