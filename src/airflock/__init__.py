@@ -95,7 +95,7 @@ _WHERE = {
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "certify", "display", "identify", "infer", "body", "plots")
+_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 
