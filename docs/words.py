@@ -1,4 +1,5 @@
-"""Check the words of the documentation: one spelling for each term, no sentence of more than 35 words.
+"""Check the words of the documentation and of messages: one spelling for each term, one wording for each kind of fault,
+no sentence of more than 35 words in the documentation.
 
 python docs/words.py          # tells file, line and what is wrong; exit status 1 if anything is
 """
@@ -10,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 DOCS = Path(__file__).parent
+SOURCE = DOCS.parent / "src" / "airflock"
 LONGEST = 35  # words of a sentence
 # what not to write → what the glossary, or plain English as we spell it, has instead
 SPELLINGS = {
@@ -21,11 +23,24 @@ SPELLINGS = {
     r"parameter file": "scenario", r"utili[sz]e": "use", r"leverage": "use", r"in order to": "to",
 }  # fmt: skip
 ALLOWED = {"glossary.md": {"latency", "flight logs"}, "tracks.md": {"flight logs"}}
+# what no message says → how each kind of fault is worded (decision 0084)
+WORDINGS = {
+    r"\bis no key\b|\bno such (?:key|order parameter|paper|option|model|section|metric|part)\b": "NAME: unknown KIND",
+    r"(?<!there )\bis no (?:number|table|list|name|model|body|scenario|recording|file|law)\b": "VALUE is not a KIND",
+    r"\bis not one of\b|\bmust be one of\b|\bis not among\b|\bis not in\b \[": "= VALUE is none of A, B, C",
+    r"\bout of (?:range|bounds)\b|\bmust (?:lie in|be between|be in)\b": "= VALUE lies outside [LOW, HIGH]",
+    r"\bmust be positive\b": "= VALUE must be above 0",
+    r"\b[Ff]ile not found\b|\bfile does not exist\b|\bcannot be found\b": "FILE: no such file",
+    r"\b(?:could not|can't|can not|failed to|unable to) (?:read|write|open|load)\b": "FILE: cannot be read: WHY",
+    r"\bwhich is not installed\b|\bneeds the package\b": "WHAT needs PACKAGE: pip install",
+    r"\b(?:invalid|illegal|bad) (?:value|key|option|argument|parameter)\b": "one of the wordings above",
+}  # fmt: skip
 
 
 def main() -> int:
     """Print every fault; 1 if there is one."""
     faults = [fault for path in pages() for fault in faults_of(path)]
+    faults += [fault for path in sorted(SOURCE.rglob("*.py")) for fault in wording_faults(path)]
     for fault in faults:
         print(fault)
     return int(bool(faults))
@@ -49,6 +64,19 @@ def faults_of(path: Path) -> Iterator[str]:
             count = len(re.findall(r"[A-Za-zÀ-ž0-9][\w'’.-]*", sentence))
             if count > LONGEST:
                 yield f"{path.relative_to(DOCS)}:{line}: a sentence of {count} words: {sentence[:60]} ..."
+
+
+def wording_faults(path: Path) -> Iterator[str]:
+    """Messages of one source file that word a fault otherwise than the others do; docstrings are no messages."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Constant) or not isinstance(node.value, str) or id(node) in told:
+            continue
+        for wrong, right in WORDINGS.items():
+            match = re.search(wrong, node.value)
+            if match is not None:
+                yield f"{path.name}:{node.lineno}: {match[0]!r}: write {right}"
 
 
 def paragraphs(path: Path) -> Iterator[tuple[int, str]]:

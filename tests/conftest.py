@@ -1,5 +1,6 @@
 """Options and fixtures of all tests."""
 
+import gc
 import os
 
 import hypothesis
@@ -7,19 +8,22 @@ import pytest
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # no test asserts a time
 hypothesis.settings.load_profile("untimed")
+gc.set_threshold(100_000, 50, 50)  # a compilation makes millions of objects that stay: looking at them takes a tenth
 
 
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=2018, help="seed of every random test")
+    parser.addoption("--nightly", action="store_true", help="also run what .ci/nightly runs")
     parser.addoption("--papers", action="store_true", help="also run the long reproductions of papers")
 
 
 def pytest_collection_modifyitems(config, items):
-    if not config.getoption("--papers"):
-        skip = pytest.mark.skip(reason="long reproduction: add --papers")
-        for item in items:
-            if item.get_closest_marker("papers"):
-                item.add_marker(skip)
+    for option, reason in (("papers", "long reproduction"), ("nightly", "many compilations")):
+        if not config.getoption(f"--{option}"):
+            skip = pytest.mark.skip(reason=f"{reason}: add --{option}")
+            for item in items:
+                if item.get_closest_marker(option):
+                    item.add_marker(skip)
     for item in items:
         if item.get_closest_marker("gpu") and not os.environ.get("AIRFLOCK_NEED_GPU"):
             item.fixturenames.insert(0, "gpu")

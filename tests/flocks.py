@@ -10,6 +10,7 @@ from airflock.engine.tables import tables
 from airflock.scenarios.files import make
 
 ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
+NOTCHED = [[-45.0, -38.0], [40.0, -38.0], [40.0, 4.0], [2.0, 6.0], [6.0, 44.0], [-45.0, 40.0]]  # an L
 PENTAGON = [[-40.0, -30.0], [35.0, -38.0], [50.0, 10.0], [5.0, 45.0], [-45.0, 20.0]]
 SILENT = {"sensors.noise": 0.0, "body.noise": 0.0}
 IDEAL = SILENT | {"radio.delay": 0.0, "radio.range": 1e6}  # no noise, everybody hears everybody at once

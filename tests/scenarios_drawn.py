@@ -28,7 +28,7 @@ SCALES = {
     "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
 }  # fmt: skip
 BODIES = {
-    "velocity": ("multirotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
+    "velocity": ("multirotor", "quadrotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
 }  # fmt: skip
 CUBE = str(Path(__file__).parent / "cube.obj")
 SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python
@@ -120,13 +120,20 @@ def world(keys: dict[str, Any], rng: Random, length: float) -> None:
     side = length * rng.choice((1.5, 3.0, 6.0))
     keys |= {"world.side": side, "world.radius": side, "world.height": side * rng.choice((0.5, 1.0))}
     if arena == "polygon":
-        keys["world.corners"] = [[-side, -side], [side, -0.8 * side], [1.2 * side, 0.3 * side], [0.0, side]]
+        ring = [[-side, -side], [side, -0.8 * side], [1.2 * side, 0.3 * side], [0.0, side]]
+        keys["world.corners"] = ring if rng.random() < 0.4 else [*ring, [0.1 * side, 0.05 * side], [-0.5 * side, 0.0]]
     if arena == "square":
         keys["world.walls"] = rng.choice(("every_edge", "nearest_per_axis"))
     if rng.random() < 0.3 and edges != "periodic":
         a, b = 0.1 * side, 0.25 * side
         islands = [[[a, a], [b, a], [b, b], [a, b]], [[-b, -b], [-a, -b], [-a, -a]]]
-        keys["world.obstacles"] = islands[: rng.randint(1, 2)]
+        keys["world.obstacles"] = islands = islands[: rng.randint(1, 2)]
+        if len(islands) == 2 and rng.random() < 0.5:
+            islands[1].append([-0.13 * side, -0.2 * side])  # a corner that makes it concave
+        if keys["world.dimensions"] == "3" and rng.random() < 0.5:
+            keys["world.heights"] = [[rng.uniform(-1.0, 0.0) * side, rng.uniform(0.1, 1.0) * side] for _ in islands]
+    if keys["world.dimensions"] == "3" and edges == "open" and rng.random() < 0.3:
+        keys["world.floor"] = rng.choice((-1.0, -0.3, 0.2)) * keys["world.height"]
 
 
 def scene(keys: dict[str, Any], rng: Random, length: float) -> None:

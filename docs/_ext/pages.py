@@ -6,7 +6,7 @@ All are written to docs/generated when a build begins; a page is only touched wh
 import ast
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from inspect import getsource
 from typing import Any
 
@@ -171,7 +171,8 @@ def robots() -> None:
 
     pieces = [
         "# Bodies, sensors, radio, wind\n\nA model commands; a body obeys as far as it can. Neighbours hear of it "
-        "through the radio, and an agent knows itself through its sensors.\n"
+        "through the radio, and an agent knows itself through its sensors.\n",
+        _abilities(BODIES),
     ]
     for name, body in BODIES.items():
         module = sys.modules[body.move.__module__]
@@ -186,6 +187,20 @@ def robots() -> None:
                 pieces.append(f"```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(keys_of(name)))
     put("robots.md", "".join(pieces))
+
+
+def _abilities(bodies: Mapping[str, Any]) -> str:
+    """Table of what each body has, from what its rule asks for."""
+    from inspect import signature
+
+    lines = ["", "| body | takes | has inertia | sees its measured velocity | noise | wind | remembers | has limits |"]
+    lines += ["|---|---|---|---|---|---|---|---|"]
+    for name, body in bodies.items():
+        asked = set(signature(body.move).parameters)
+        has = ["yes" if word in asked else "no" for word in ("vx", "mx", "gx", "wx")]
+        kept = ", ".join(getattr(body.Memory, "_fields", ())) or "nothing"
+        lines.append(f"| `{name}` | {body.accepts} | {' | '.join(has)} | {kept} | {'yes' if body.limits else 'no'} |")
+    return "\n".join(lines) + "\n"
 
 
 def vocabulary() -> None:
@@ -210,6 +225,7 @@ def vocabulary() -> None:
         "survey": "of an order parameter: asked once for the whole flock",
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
+        "limits": "of a body: what of a scenario it cannot fly, as lines",
         "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
     }
     wrong = sorted(set(told) ^ set(VOCABULARY))

@@ -2,7 +2,7 @@
 A city in space
 ===============
 
-The same flight as from above, seen from the side.
+The same flight as from above, seen obliquely. Ways behind a building are drawn faintly; stars are goals.
 """
 
 import airflock

@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getattr__ below loads each on first use
     from airflock import plots as plots
+    from airflock.certify.run import certify as certify
     from airflock.checking.bodies import check_body as check_body
     from airflock.checking.metrics import check_metric as check_metric
     from airflock.checking.models import check_model as check_model
+    from airflock.checking.types import check_types as check_types
     from airflock.core.contract import body as body
     from airflock.core.contract import metric as metric
     from airflock.core.contract import model as model
@@ -65,6 +67,7 @@ _WHERE = {
     "check_model": "airflock.checking.models",
     "check_metric": "airflock.checking.metrics",
     "check_body": "airflock.checking.bodies",
+    "check_types": "airflock.checking.types",
     "simulate": "airflock.recordings.flights",
     "Flight": "airflock.engine.flight",
     "recording_of": "airflock.recordings.flights",
@@ -73,6 +76,7 @@ _WHERE = {
     "sweep": "airflock.recordings.sweeps",
     "evolve": "airflock.evolve",
     "harden": "airflock.evolve.harden",
+    "certify": "airflock.certify",
     "display": "airflock.display",
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",
@@ -89,7 +93,7 @@ _WHERE = {
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "display", "identify", "infer", "body", "plots")
+_MODULES = ("evolve", "certify", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 

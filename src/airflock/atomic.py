@@ -27,7 +27,7 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
-        raise OSError(0, "is there and is no regular file", str(path))
+        raise OSError(0, "is there and is not a regular file", str(path))
     swept(target.parent)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
     temporary = Path(name)

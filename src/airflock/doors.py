@@ -13,9 +13,10 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.parsers import expat
 
-from airflock.errors import AirflockError, ScenarioError, bounded
+from airflock.errors import AirflockError, ScenarioError, bounded, reason
 
 MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
@@ -24,6 +25,7 @@ MOST_VALUES = 1_000_000
 MOST_KEYS = 10_000
 MOST_KEY = 200  # letters of one key
 MOST_SHORT = 4000  # letters of a JSON text that needs no measuring: a store has very many of them
+MOST_ELEMENTS = 100_000  # of an XML text
 MOST_DIGITS = 400  # of one number, in any base
 MOST_WHOLE = 2**64  # whole numbers lie below it on both sides: seeds are the largest
 
@@ -61,7 +63,7 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
             raise
         raise _one(kind, f"{where}: {fault}") from fault
     except OSError as fault:
-        raise _one(kind, f"{where}: {fault.strerror or fault}") from fault
+        raise _one(kind, f"{where}: {reason(fault)}") from fault
     except RecursionError as fault:
         raise _one(kind, f"{where}: is nested too deeply") from fault
     except MemoryError as fault:
@@ -87,7 +89,7 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     """Text of a regular file in UTF-8, with or without a byte order mark; raises TextError or OSError."""
     source = Path(path)
     if not stat.S_ISREG(source.stat().st_mode):  # a named pipe would wait for ever
-        raise TextError("is no regular file")
+        raise TextError("is not a regular file")
     with source.open("rb") as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -95,7 +97,7 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_BYTES) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
-        raise FormatError(f"is no text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
+        raise FormatError(f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}") from fault
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -131,9 +133,54 @@ def json_value(text: Any) -> Any:
     try:
         found = json.loads(text)
     except ValueError as fault:
-        raise FormatError(f"is no JSON: {fault}") from fault
+        raise FormatError(f"is not JSON: {fault}") from fault
     _walk(found)
     return found
+
+
+class Element(NamedTuple):
+    """An element of an XML text: its name without a namespace, its own text, and the elements in it."""
+
+    tag: str
+    text: str
+    children: list["Element"]
+
+
+def xml(text: str) -> Element:
+    """An XML text as its outermost element; raises FormatError where it is none, TextError where it is beyond bounds.
+
+    A document type is refused before anything of it is read, so that no entity is ever defined, expanded or fetched.
+    """
+    if len(text) > MOST_BYTES:
+        raise TextError(f"is larger than {MOST_BYTES / 1e6:g} MB, more than any text of this kind needs")
+    around: list[tuple[str, list[str], list[Element]]] = [("", [], [])]
+    count = 0
+
+    def begin(tag: str, _: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS:
+            raise TextError(f"has more than {MOST_ELEMENTS} elements")
+        if len(around) > MOST_DEPTH:
+            raise TextError(f"is nested more than {MOST_DEPTH} deep")
+        around.append((tag.rpartition(" ")[2], [], []))
+
+    def end(_: str) -> None:
+        tag, parts, children = around.pop()
+        around[-1][2].append(Element(tag, "".join(parts).strip(), children))
+
+    def refuse(*_: Any) -> Any:
+        raise FormatError("has a document type or entities, which no file of this kind needs")
+
+    parser = expat.ParserCreate("utf-8", namespace_separator=" ")
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler = lambda part: around[-1][1].append(part)
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        parser.Parse(text.encode("utf-8"), True)
+    except expat.ExpatError as fault:
+        raise FormatError(f"is not XML: {fault}") from fault
+    return around[0][2][0]
 
 
 def _measure(text: str) -> None:

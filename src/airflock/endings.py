@@ -19,4 +19,4 @@ def ending_fault(path: str | os.PathLike[str], endings: tuple[str, ...]) -> str:
     said = f"ending {target.suffix}" if target.suffix else "name without an ending"
     if len(endings) == 1:
         return f"{target}: {said} is not {endings[0]}, the only format written here"
-    return f"{target}: {said} is no format known here; give one of {', '.join(endings)}"
+    return f"{target}: {said}: unknown format; give one of {', '.join(endings)}"

@@ -23,6 +23,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+def reason(fault: OSError) -> str:
+    """Why a file cannot be used, for the end of a line that begins with its name."""
+    return "no such file" if isinstance(fault, FileNotFoundError) else fault.strerror or str(fault)
+
+
 class AirflockError(Exception):
     """Root of every error that the command line prints as one line before it exits with status 2.
 

@@ -1,6 +1,7 @@
 """Flights on workers of dask: the same study, bit by bit, also when workers are killed at random."""
 
 import os
+import pickle
 import random
 import signal
 import threading
@@ -9,6 +10,11 @@ import warnings
 import pytest
 
 import toys
+from airflock.certify.campaign import FOLDER, Campaign
+from airflock.certify.flights import Task as CertifyTask
+from airflock.certify.flights import measured, score_of
+from airflock.certify.limits import read_all
+from airflock.certify.run import run as certified
 from airflock.errors import StudyError
 from airflock.evolve.executors import Flight
 from airflock.evolve.executors.cluster import Cluster, Task
@@ -16,6 +22,7 @@ from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import run
 from airflock.evolve.store import Store
+from airflock.scenarios.files import load
 from needed import needed
 
 distributed = needed("distributed")
@@ -141,3 +148,42 @@ def test_a_task_flies_the_same_flight_as_this_process():
     parameters = study.space.parameters([0.5] * 11)
     values, reason, _, _ = Task.of(study)(parameters, 5)
     assert not reason and values == score_flight(with_parameters(study.scenario, parameters), 5)
+
+
+def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_path, doomed, seed):
+    scenario = load("vasarhelyi_2018/real_6ms")
+    campaign = Campaign(scenario, read_all(["r_min<1 at 5%"], scenario))
+
+    def task(parameters, own):  # a closure, because workers cannot import the tests
+        import random as chance
+        import time as clock
+
+        clock.sleep(0.03)
+        near = chance.Random(own).random() < 0.01
+        return {"r_min": 0.5, "closest": 0.4, "first": [3.0]} if near else {"r_min": 5.0}, "", 0.0, "worker"
+
+    open_folder(tmp_path / "here", campaign, resume=False, kind=FOLDER)
+    wanted = certified(campaign, tmp_path / "here", Here(lambda p, own: task(p, own)[0], 4), 600.0, kept=False)
+    open_folder(tmp_path / "there", campaign, resume=False, kind=FOLDER)
+    executor = Cluster(None, doomed.scheduler_address, task=task)
+    worker = random.Random(seed).choice(list(doomed.workers.values()))
+    killer = threading.Timer(0.5, os.kill, (worker.pid, signal.SIGKILL))
+    killer.start()
+    try:
+        found = certified(campaign, tmp_path / "there", executor, 600.0, kept=False)
+    finally:
+        executor.close()
+        killer.join()
+    assert found.shown and found.document() == wanted.document()
+    assert contents(tmp_path / "there") == contents(tmp_path / "here")
+
+
+def test_a_worker_flies_a_certificate_to_the_bits_of_one_process():
+    scenario = load("vasarhelyi_2018/real_4ms", {"agents": 6, "duration": 10.0})
+    limits = read_all(["r_min<60 at 5%", "phi_wall>0 at 5%"], scenario)
+    task = pickle.loads(pickle.dumps(CertifyTask(scenario, limits, 32)))
+    score = score_of(measured(scenario, limits), limits, 32)
+    for own in range(3):
+        values, reason, _, _ = task({}, own)
+        assert values == score({}, own) and not reason
+    assert any("closest" in task({}, own)[0] for own in range(3))

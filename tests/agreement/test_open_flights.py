@@ -2,11 +2,12 @@
 
 import signal
 
+import numba
 import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import finish, fly
+from airflock.engine.simulate import finish, fly, plan_of
 from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.files import load, presets
 
@@ -33,10 +34,43 @@ def whole(flight):
 # ------------------------------------------------------------------------------------------------------------ cuts
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+def one_of_each_plan():
+    """Presets whose small flights have drivers of their own, those of FLIGHTS first."""
+    found = {}
+    for name in (*FLIGHTS, *sorted(presets())):
+        scenario = few(name)
+        found.setdefault(plan_of(scenario), name)
+    return list(found.values())
+
+
+def few(name):
+    """A short flight of few agents of a preset."""
+    scenario = load(name, FLIGHTS.get(name))
+    if name in FLIGHTS or scenario.goals.kind == "own":
+        return scenario
+    return load(name, {"agents": min(scenario.agents, 8), "duration": 400.0 * scenario.flight.dt})
+
+
 @pytest.mark.parametrize("steps", [1, 7, 100])
-def test_any_cuts_give_the_bits_of_the_whole(name, steps):
-    scenario = load(name, FLIGHTS[name])
+def test_any_cuts_give_the_bits_of_the_whole(steps):
+    cut_and_whole("vasarhelyi_2018/4ms", steps)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", one_of_each_plan())
+def test_any_cuts_of_any_plan_give_the_bits_of_the_whole(name, threads):
+    most = numba.get_num_threads()
+    numba.set_num_threads(min(threads, most))
+    try:
+        for steps in (1, 7, 100):
+            cut_and_whole(name, steps)
+    finally:
+        numba.set_num_threads(most)
+
+
+def cut_and_whole(name, steps):
+    scenario = few(name)
     closed = fly(scenario, 3, record=True)
     flight = airflock.open(scenario, 3, record=True)
     while not flight.over:
@@ -79,7 +113,7 @@ def test_a_flight_that_ends_at_a_collision_ends_there_in_parts_too():
 def test_what_is_not_kept_in_the_state_carries_nothing_from_step_to_step():
     for name, settings in FLIGHTS.items():
         scenario = load(name, settings)
-        quiet, poisoned = airflock.open(scenario, 5), airflock.open(scenario, 5)
+        quiet, poisoned = (airflock.open(scenario, 5, device="python") for _ in range(2))
         for _ in range(5):
             quiet.advance(steps=7)
             poisoned.advance(steps=7)

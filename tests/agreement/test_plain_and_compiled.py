@@ -8,7 +8,7 @@ import pytest
 from airflock.engine import cpu
 from airflock.engine.simulate import plan_of
 from airflock.engine.tables import tables
-from flocks import IDEAL, ISLANDS, PENTAGON, flown, scenario
+from flocks import IDEAL, ISLANDS, NOTCHED, flown, scenario
 from reference.flight import fly_plainly
 
 COMMON = {"duration": 10.0, "world.side": 90.0, "world.height": 50.0, "world.radius": 48.0, "start.separation": 5.0}
@@ -24,14 +24,18 @@ FLIGHTS = {
         "radio.delay": 0.2, "radio.near": 5.0, "radio.far": 30.0, "model.limit": "cap", "radio.range": 60.0,
     }),
     "polygon": ("vasarhelyi_2018", {
-        "agents": 8, "world.arena": "polygon", "world.corners": PENTAGON, "radio.kind": "links", "radio.loss": 0.6,
+        "agents": 8, "world.arena": "polygon", "world.corners": NOTCHED, "radio.kind": "links", "radio.loss": 0.6,
         "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5, "sensors.noise": 0.0,
         "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
     }),
-    "circle": ("vasarhelyi_2018", {"agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0}),
+    "circle": ("vasarhelyi_2018", {
+        "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "fixed_wing",
+        "model.v_flock": 15.0, "start.speed": 15.0, "wind.east": 2.0,
+    }),
     "silo": ("viragh_2014", {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
-        "wind.gust": 1.0, "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0,
+        "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
+        "wind.gust": 1.0, "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
     }),
     "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
     "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),

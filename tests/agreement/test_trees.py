@@ -22,7 +22,7 @@ from airflock.engine.simulate import plan_of
 from airflock.engine.specialise import values
 from airflock.engine.stages import move, neighbours, noise, perceive, receive, surfaces
 from airflock.scenarios.files import load, presets
-from flocks import ISLANDS, PENTAGON, SILENT, scenario
+from flocks import ISLANDS, NOTCHED, SILENT, scenario
 from trees import digests
 
 RECORD = Path(__file__).with_suffix(".json")
@@ -40,7 +40,7 @@ OTHERS = {
     "silo, islands": ("viragh_2014", {
         "world__dimensions": "3", "world__arena": "circle", "world__obstacles": ISLANDS,
     }),
-    "polygon": ("vasarhelyi_2018", {"world__arena": "polygon", "world__corners": PENTAGON}),
+    "polygon": ("vasarhelyi_2018", {"world__arena": "polygon", "world__corners": NOTCHED}),
 }  # fmt: skip
 
 

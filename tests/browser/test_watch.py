@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import contextmanager
 
 import pytest
 from pixels import coloured, places, shot
@@ -14,18 +15,27 @@ pytestmark = pytest.mark.browser
 PATIENCE = 120.0  # s
 
 
-@pytest.fixture
-def live(browser):
-    player = Player("vasarhelyi_2018/4ms", {"agents": 20}, seed=1)
+@contextmanager
+def flying(where="vasarhelyi_2018/4ms", settings=None, **more):
+    """A page that flies in a thread of its own."""
+    player = Player(where, {"agents": 20, **(settings or {})}, seed=1, **more)
     view = View("127.0.0.1", 0, player.where)
     page = Page(player, view)
     thread = threading.Thread(target=page.run)
     thread.start()
-    yield player, view, page
-    page.stop()
-    thread.join(30.0)
-    assert not thread.is_alive()
-    view.stop()
+    try:
+        yield player, view, page
+    finally:
+        page.stop()
+        thread.join(30.0)
+        assert not thread.is_alive()
+        view.stop()
+
+
+@pytest.fixture
+def live(browser):
+    with flying() as found:
+        yield found
 
 
 def until(holds, what):
@@ -88,9 +98,78 @@ def test_a_page_that_is_closed_can_be_opened_again(live, browser, tab):
     opened(tab, view)
     other = browser.new_page()
     opened(other, view)
+    assert view.clients == 2
     other.close()
     until(lambda: view.clients == 1, "a closed page still counts")
-    time_then = player.flight.time
-    until(lambda: player.flight.time > time_then, "the flight stopped with a page")
+    then = player.flight.time
+    until(lambda: player.flight.time > then, "the flight stopped with a page")
     tab.reload(timeout=PATIENCE * 1000)
     until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents after a reload")
+    assert player.flight.time > then and view.clients == 1 and not tab.faults
+
+
+def test_a_fork_flies_beside_and_what_is_changed_is_its_own(live, tab):
+    player, view, page = live
+    opened(tab, view)
+    until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
+    tab.get_by_text("Pause", exact=True).first.click()
+    until(lambda: player.paused, "the button did not pause")
+    tab.get_by_text("Compare", exact=True).click()
+    tab.get_by_text("Fork here", exact=True).click()
+    until(lambda: len(player.sides) == 2, "no fork")
+    until(lambda: "controls act on" in tab.inner_text("body"), "the page does not say whom its controls act on")
+    time.sleep(2.0)
+    picture = coloured(shot(tab))
+    assert places(picture[:, :330]) >= 5 and places(picture[:, 330:640]) >= 5, "two flocks are not seen"
+
+    tab.get_by_text("Tune", exact=True).click()
+    slider = tab.locator('[role=slider][aria-label*="p_rep"]').first
+    slider.focus(timeout=PATIENCE * 1000)
+    slider.press("ArrowRight")
+    a, b = player.sides
+    until(lambda: b.flight.events, "no change came")
+    assert [event.kind for event in b.flight.events] == ["change"] and not a.flight.events
+    player.ask(player.toggle)
+    then = a.flight.time
+    until(lambda: a.flight.time > then + 1.0, "nothing flies")
+    player.ask(player.toggle)
+    until(lambda: player.paused, "no pause")
+    assert a.flight.time == b.flight.time and (a.flight.state != b.flight.state).any()
+    tab.get_by_text("Compare", exact=True).click()
+    until(lambda: "model.p_rep" in tab.inner_text("body"), "the difference is not in the table")
+    tab.get_by_text("End comparison", exact=True).click()
+    until(lambda: len(player.sides) == 1, "the comparison goes on")
+    assert player.flight is b.flight and not tab.faults
+
+
+def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, tab):
+    with flying("vasarhelyi_2018/obstacles", {"agents": 12}) as (player, view, page):
+        opened(tab, view)
+        until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents are seen")
+        player.ask(player.toggle)
+        tab.get_by_text("Act on the world", exact=True).click()
+        tab.get_by_text("Throw an obstacle in", exact=True).click()
+        until(lambda: page.acting.aiming, "the button did nothing")
+        before, known = coloured(shot(tab), right=640), len(player.scenario.world.obstacles)
+        tab.mouse.click(330, 420)
+        until(lambda: player.flight.events or player.note, "the click did nothing")
+        assert player.flight.events, player.note
+        assert player.flight.events[-1].kind == "change" and list(player.flight.events[-1].data) == ["world.obstacles"]
+        assert len(player.scenario.world.obstacles) == known + 1
+        until(lambda: coloured(shot(tab), right=640)[390:450, 290:370].sum() > 200, "no obstacle is seen")
+        assert before[390:450, 290:370].sum() < 200
+
+        tab.get_by_text("Gust", exact=True).click()
+        player.ask(player.toggle)
+        until(lambda: player.scenario.wind.east == 8.0, "no gust")
+        player.ask(lambda: setattr(player.pace, "speed", 20.0))
+        until(lambda: player.scenario.wind.east == 0.0, "the gust does not end")
+        assert [list(event.data) for event in player.flight.events[-2:]] == [["wind.east", "wind.north"]] * 2
+
+        player.ask(lambda: page.playing.reset(agents=1))
+        until(lambda: player.flight.agents == 1, "agents stay")
+        time.sleep(2.0)
+        inside = shot(tab)[160:615, 140:640]  # of the arena's blue walls
+        teal = (inside[..., 1] - inside[..., 0] > 60) & (inside[..., 2] > 60)  # darts, not orange obstacles
+        assert places(teal) <= 4, "agents that were removed are still seen"
+        assert not tab.faults

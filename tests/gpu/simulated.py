@@ -17,7 +17,7 @@ from airflock.engine.cuda.shape import Shape  # noqa: E402
 from airflock.engine.simulate import plan_of  # noqa: E402
 from airflock.engine.tables import tables  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
-from flocks import IDEAL, ISLANDS, PENTAGON, scenario  # noqa: E402
+from flocks import IDEAL, ISLANDS, NOTCHED, scenario  # noqa: E402
 from reference.flight import fly_plainly  # noqa: E402
 
 COMMON = {"duration": 0.8, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}
@@ -31,7 +31,9 @@ CASES = {
         "metrics.stop": "collision", "metrics.r_coll": 14.0, "start.separation": 15.0, "start.speed": 4.0,
         "agents": 10, "duration": 1.6, "metrics.period": 0.05,
     }, 1, True),
-    "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
+    "split": ("vasarhelyi_2018", {
+        "metrics.r_cluster": 12.0, "start.speed": 15.0, "agents": 7, "body.kind": "fixed_wing", "model.v_flock": 15.0,
+    }, 2, True),
     "storm": ("viragh_2014", {
         "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
         "metrics.r_coll": 9.0, "metrics.collision_period": 0.15,
@@ -45,11 +47,16 @@ CASES = {
         "radio.far": 20.0, "start.speed": 4.0,
     }, 2, True),
     "polygon": ("vasarhelyi_2018", {
-        "world.arena": "polygon", "world.corners": PENTAGON, "sensors.noise": 0.0, "radio.delay": 0.31,
+        "world.arena": "polygon", "world.corners": NOTCHED, "sensors.noise": 0.0, "radio.delay": 0.31,
         "sensors.period": 0.25, "metrics.period": 0.5, "agents": 4,
     }, 1, True),
-    "silo": ("viragh_2014", IDEAL | {"world.dimensions": "3", "world.arena": "circle"}, 1, True),
-    "table": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4}, 1, False),
+    "silo": ("viragh_2014", {key: value for key, value in IDEAL.items() if key != "body.noise"} | {
+        "world.dimensions": "3", "world.arena": "circle", "world.floor": 5.0, "world.obstacles": ISLANDS[:1],
+        "world.heights": [[0.0, 18.0]], "body.kind": "quadrotor", "dt": 0.04, "duration": 0.6, "wind.east": 3.0,
+    }, 1, True),
+    "table": ("vasarhelyi_2018", {
+        "metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4, "body.kind": "quadrotor", "dt": 0.04,
+    }, 1, False),
     "couzin": ("couzin_2002/swarm", {"agents": 5, "duration": 1.0}, 1, True),
     "vicsek": ("vicsek_1995/ordered", {"agents": 6, "duration": 5.0, "world.side": 3.0}, 1, True),
     "groups": ("zapotecatl_2016/best", {

@@ -47,7 +47,7 @@ def test_a_list_of_sentences_is_checked_against_a_text() -> None:
 @pytest.mark.parametrize("name", PAPERS)
 def test_an_unknown_part_is_refused_before_anything_flies(name: str) -> None:
     paper: Paper = import_module(f"airflock.papers.{name}").PAPER
-    with pytest.raises(airflock.AirflockError, match=f"only = 'nothing' is no part; known: .*{paper.parts[0]}"):
+    with pytest.raises(airflock.AirflockError, match=f"only = 'nothing': unknown part; known: .*{paper.parts[0]}"):
         paper.run(only="nothing")
 
 

@@ -34,7 +34,7 @@ class Agent:
     state      : true position (m) and velocity (m/s)
     command    : what its model decided last
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
-    memory     : the model's Memory; rays: how many it cast at its last decision
+    memory     : the model's Memory; kept: the body's; rays: how many it cast at its last decision
     packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
     """
 
@@ -43,6 +43,7 @@ class Agent:
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     memory: Any = None
+    kept: Any = None
     rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
 
@@ -64,7 +65,8 @@ def fly_plainly(
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
-    flock = [Agent(state) for state in begun]
+    memory = scenario.vehicle.Memory
+    flock = [Agent(state, kept=memory() if memory else None) for state in begun]
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = scenario.order_parameters if metrics is None else metrics
@@ -231,7 +233,13 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
     known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
     given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
-    velocity = answer(body.move, "move", given | {"dt": dt, "b": scenario.body}, body.name)
+    moved = answer(
+        body.move,
+        "move",
+        given | {"dt": dt, "b": scenario.body, "memory": agent.kept, "wing": scenario.wing},
+        body.name,
+    )
+    velocity, agent.kept = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
     integration = choices(scenario.body).get("integration", body.integration)
     vx, vy, vz = s[3:] if integration == "old" else velocity
     agent.state = place.settled(State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity))

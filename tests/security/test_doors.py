@@ -61,8 +61,8 @@ def test_brackets_dots_and_digits_inside_strings_and_comments_do_not_count():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[space.model]\np_rep = { above = [1] }\n", "space.model.p_rep.above = [1] is no number"),
-        ("search = 1.5\n", "search = 1.5 is no table of keys"),
+        ("[space.model]\np_rep = { above = [1] }\n", "space.model.p_rep.above = [1] is not a number"),
+        ("search = 1.5\n", "search = 1.5 is not a table of keys"),
         ("[objective]\nover_seeds = [[]]\n", "objective.over_seeds = [[]] is none of mean, worst, quantile"),
         ("[set]\nagents = 1" + "0" * 500 + "\n", "more than 400 letters"),
     ],
@@ -108,8 +108,8 @@ def test_names_that_are_no_files_are_one_line(name):
 def test_a_format_that_is_newer_is_refused_and_one_that_is_none_too(tmp_path):
     for text, words in (
         ("2", "is newer than this Airflock"),
-        ("0", "is no number of a format"),
-        ("'a'", "is no number"),
+        ("0", "is not a number of a format"),
+        ("'a'", "is not a number"),
     ):
         (tmp_path / "a.toml").write_text(f"format = {text}\n[model]\nkind = 'vicsek_1995'\n")
         with pytest.raises(ScenarioError, match=f"format = {text}.* {words}"):

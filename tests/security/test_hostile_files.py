@@ -35,6 +35,10 @@ def packed(tmp_path):
         text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
         (tmp_path / f"{section}.toml").write_text(text)
     (tmp_path / "extended.toml").write_text('extends = "evil.toml"\nagents = 4\n')
+    version = f'[flown]\nairflock = "{airflock.__version__}"\nprecision = 32\ndevice = "cpu"\nrules = "0"\n'
+    text = 'seal = ""\nformat = 1\nconfidence = 0.95\nlimit = []\n[flights]\ncount = 1\nlooks = ""\nuncertain = false\n'
+    law = '[scenario]\nname = "a"\nduration = 1.0\nagents = 3\n[scenario.model]\nkind = "evil.py"\n'
+    (tmp_path / "certificate.toml").write_text(text + version + law)
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "best.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
     return tmp_path
@@ -129,6 +133,8 @@ WAYS = {
     "plot rules": (command("plot", "evil.toml", "--kind", "rules"), ""),
     "evolve": (command("evolve", "own.toml", "--out", "out"), ""),
     "validate study": (command("validate", "study.toml"), ""),
+    "certify": (command("certify", "evil.toml", "--limit", "r_min<1 at 1%", "--flights", "2"), ""),
+    "certificate": (command("certify", "certificate.toml", "--check"), ""),
     "harden": (command("harden", "folder", "--out", "out.toml"), ""),
     "score": (command("score", "evil.nc"), ""),
     "score path": (command("score", "path.nc"), ""),

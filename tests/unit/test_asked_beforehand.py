@@ -34,10 +34,10 @@ def refused(*arguments):
 
 def test_a_wrong_name_to_show_is_refused_with_the_nearest(grounded):
     assert refused("sweep", BEST, *OVER, "--show", "qualitty") == [
-        "--show qualitty: no such order parameter; did you mean quality?"
+        "--show qualitty: unknown order parameter; did you mean quality?"
     ]
     (line,) = refused("sweep", BEST, *OVER, "--show", "fitness")
-    assert "no such order parameter" in line and "polarisation" in line
+    assert "unknown order parameter" in line and "polarisation" in line
 
 
 def test_all_faults_of_a_sweep_are_told_together(grounded):

@@ -10,7 +10,7 @@ BAD = {
     "model.r_a": (-0.1, "model.r_a = -0.1 m lies outside [0, 1000] m"),
     "model.r_c": (-0.1, "model.r_c = -0.1 m lies outside [0, 1000] m"),
     "model.r_floor": (-0.1, "model.r_floor = -0.1 m lies outside"),
-    "model.rs": (0.1, "model.rs is no key; did you mean model.r_s?"),
+    "model.rs": (0.1, "model.rs: unknown key; did you mean model.r_s?"),
     "model.w_c": (-1.0, "model.w_c = -1 lies outside [0, 1e+06]"),
     "model.w_s": (-1.0, "model.w_s = -1 lies outside [0, 1e+06]"),
     "model.w_a": (-1.0, "model.w_a = -1 lies outside [0, 1e+06]"),

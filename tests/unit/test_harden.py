@@ -6,7 +6,7 @@ import pytest
 import toys
 from airflock.engine.simulate import score_flights
 from airflock.errors import ScenarioError
-from airflock.evolve import harden
+from airflock.evolve import again, harden
 from airflock.evolve.executors.here import Here
 from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
@@ -30,41 +30,105 @@ def test_models_without_these_parameters_are_refused():
         harden.recipe(load("zapotecatl_2016/best"))
 
 
-def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
+def flown_by(monkeypatch, score):
+    """Flights whose scores are a function of the parameters and of the seed's chance."""
+
     def score_flights(scenarios, seeds, **_):
         chance = {seed: np.random.default_rng(seed).normal() for seed in seeds}
-        return [
-            {
-                "fitness": s.parameters.p_rep + chance[seed],
-                "r_min": 2.0 * s.parameters.p_rep + chance[seed],
-                "n_coll": 0.0,
-            }
-            for s, seed in zip(scenarios, seeds, strict=True)
-        ]
+        return [score(s.parameters, chance[seed]) for s, seed in zip(scenarios, seeds, strict=True)]
 
     monkeypatch.setattr("airflock.engine.simulate.score_flights", score_flights)
+
+
+def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
+    def score(p, chance):
+        return {"fitness": 5.0 + p.p_rep + chance, "r_min": 2.0 * p.p_rep + chance, "n_coll": 0.0}
+
+    flown_by(monkeypatch, score)
     steps = harden.harden(load("vasarhelyi_2018/6ms"), range(20))
     assert steps[1].cost == pytest.approx((-0.035,) * 3) and steps[1].gain == pytest.approx((0.07,) * 3)
+    assert [step.kept for step in steps] == [True, True, False, False, False, True]
+    assert (
+        steps[-1].verdict == "kept: p_rep up" and steps[2].verdict == "undone: gains neither distance nor room at walls"
+    )
     found = make(harden.document(load("vasarhelyi_2018/6ms"), steps[-1]), "hardened")
     assert found.parameters.p_rep == pytest.approx(0.105) and found.published == {}
+
+
+def test_a_step_that_drives_the_flock_into_trees_is_undone_however_much_distance_it_gains(monkeypatch):
+    """In the field of trees Table S4's walls cost everything: f_wall 0.995 before, 0.14 after. Half is as bad."""
+
+    def score(p, chance):
+        wall = 0.14 if p.v_shill < 19.0 else 0.995
+        return {
+            "fitness": 0.9 * wall, "r_min": 3.0 * p.p_rep - 0.1 * p.v_shill + 0.001 * chance, "n_coll": 0.0,
+            "f_wall": wall, "phi_wall": 3.0 * (wall < 0.5), "f_coll": 1.0,
+        }  # fmt: skip
+
+    flown_by(monkeypatch, score)
+    steps = harden.harden(load("vasarhelyi_2018/6ms"), range(20))
+    (whole, half) = (step for step in steps if "v_shill" in step.name)
+    assert not whole.kept and whole.gain[1] > 0.0 and whole.verdict == "undone: f_wall falls from 0.995 to 0.14"
+    assert not half.kept and half.name == "half of: v_shill down, r0_shill up"
+    last = steps[-1]
+    assert last.kept and last.parts["f_wall"] == pytest.approx(0.995) and last.contacts == 0.0
+    assert last.parameters["model.v_shill"] == load("vasarhelyi_2018/6ms").parameters.v_shill
+
+
+def test_half_a_step_is_kept_where_the_whole_one_costs_too_much(monkeypatch):
+    def score(p, chance):  # 0.07 to 0.105 costs 0.07; half a step, to 0.0857, costs 0.031
+        return {"fitness": 0.9 - 2.0 * (p.p_rep - 0.07), "r_min": p.p_rep, "n_coll": 0.0, "f_coll": 1.0}
+
+    flown_by(monkeypatch, score)
+    steps = harden.harden(load("vasarhelyi_2018/6ms"), range(5))
+    assert steps[1].verdict == "undone: costs 0.07 of fitness, more than 0.05" and steps[2].kept
+    assert steps[-1].parameters["model.p_rep"] == pytest.approx(0.07 * 1.5**0.5)
+
+
+def test_walls_come_first_where_they_are_what_is_short(monkeypatch):
+    def score(p, chance):
+        return {"fitness": 0.5, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.5, "phi_wall": 0.1, "f_coll": 0.9}
+
+    flown_by(monkeypatch, score)
+    assert "v_shill" in harden.harden(load("vasarhelyi_2018/6ms"), range(5))[1].name
+
+
+def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):
+    """On the seeds of the steps all is well; on those after them more repulsion makes agents collide."""
+    lucky = {np.random.default_rng(seed).normal() for seed in range(20)}
+
+    def score(p, chance):
+        coll = 1.0 if chance in lucky or p.p_rep < 0.1 else 0.2
+        return {"fitness": 0.9, "r_min": 5.0 + p.p_rep, "n_coll": 0.0, "f_coll": coll}
+
+    flown_by(monkeypatch, score)
+    steps = harden.harden(load("vasarhelyi_2018/6ms"), range(20))
+    assert steps[1].kept and not steps[-1].kept
+    assert steps[-1].parameters == steps[0].parameters and "nothing was kept" in steps[-1].verdict
+
+
+def test_what_does_not_fly_is_not_hardened(monkeypatch):
+    flown_by(monkeypatch, lambda p, chance: {"fitness": 0.0, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.0})
+    with pytest.raises(ScenarioError, match="does not fly, so there is nothing to harden: f_wall is zero in 100 %"):
+        harden.harden(load("vasarhelyi_2018/6ms"), range(5))
 
 
 def test_evolving_again_flies_a_stricter_scenario_but_is_measured_in_the_given_one(tmp_path):
     """Workaround (i): the search minds larger spheres and a longer delay; what it costs and gains is told without."""
     given = load("vasarhelyi_2018/6ms", {"agents": 8, "duration": 20.0, "dt": 0.05})
-    settings = harden.cautious(given, r_coll=2.0, delay=1.5)
+    settings = again.cautious(given, r_coll=2.0, delay=1.5)
     search = {"population": 4, "generations": 2, "top": 1, "pool": 0, "final_seeds": 2}
-    study = harden.stricter(given, load_study("vasarhelyi_2018/6ms").space, settings, search)
+    study = again.stricter(given, load_study("vasarhelyi_2018/6ms").space, settings, search)
     assert study.scenario.metrics.r_coll == 2.0 * given.metrics.r_coll
     assert study.scenario.radio.delay == 1.5 * given.radio.delay
-    steps = harden.evolved_again(given, study, settings, tmp_path / "again", range(3))
-    optimum, again = steps
-    assert optimum.parameters["model.p_rep"] == given.parameters.p_rep and "metrics.r_coll = 6" in again.reason
+    steps = again.evolved_again(given, study, settings, tmp_path / "again", range(3))
+    optimum, evolved = steps
+    assert optimum.parameters["model.p_rep"] == given.parameters.p_rep and "metrics.r_coll = 6" in evolved.reason
     for step in steps:
         rows = score_flights([with_parameters(given, step.parameters)] * 3, range(3))
         assert step.fitness == np.mean([row["fitness"] for row in rows])
-    continued = harden.evolved_again(given, study, settings, tmp_path / "again", range(3))
-    assert continued[1].parameters == again.parameters
+    continued = again.evolved_again(given, study, settings, tmp_path / "again", range(3))
+    assert continued[1].parameters == evolved.parameters
 
 
 def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):

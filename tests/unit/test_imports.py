@@ -281,11 +281,11 @@ def test_files_that_are_no_tables_end_with_one_line(tmp_path):
     (tmp_path / "numbers.csv").write_text("1,2,3\n4,5,6\n")
     assert "the first row holds numbers" in refused(tmp_path / "numbers.csv")
     (tmp_path / "text.csv").write_text("t,x,y\n0,1,2\n1,one,2\n")
-    assert "column x, row 3: 'one' is no number" in refused(tmp_path / "text.csv")
+    assert "column x, row 3: 'one' is not a number" in refused(tmp_path / "text.csv")
     np.save(tmp_path / "objects.npy", np.array({"trajectories": np.zeros(3)}, object), allow_pickle=True)
     line = refused(tmp_path / "objects.npy", fps=25.0, unit="m")
     assert "pickled" in line and "idtrackerai_format" in line
-    assert "is no format read here" in refused(written(tmp_path, own, "a.xlsx"))
+    assert ": unknown format" in refused(written(tmp_path, own, "a.xlsx"))
     assert "no such file" in refused(tmp_path / "nothing.csv")
 
 

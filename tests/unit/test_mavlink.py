@@ -262,5 +262,5 @@ def test_key_files(tmp_path):
     path.write_text("beef")
     with pytest.raises(LinkError, match="64 hexadecimal"):
         read_key(path)
-    with pytest.raises(LinkError, match="no key can be read"):
+    with pytest.raises(LinkError, match="the key cannot be read"):
         read_key(tmp_path / "absent")

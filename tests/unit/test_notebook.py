@@ -28,7 +28,7 @@ def test_names_and_files_fly_like_the_scenarios_that_they_stand_for(tmp_path):
     for door in (airflock.score, airflock.simulate):
         with pytest.raises(ScenarioError, match="did you mean vasarhelyi_2018/4ms?"):
             door("vasarhelyi_2018/4m")
-        with pytest.raises(ScenarioError, match="int is no scenario; give a Scenario, a preset's name"):
+        with pytest.raises(ScenarioError, match="int is not a scenario; give a Scenario, a preset's name"):
             door(7)
 
 
@@ -40,9 +40,9 @@ def test_a_law_may_be_given_by_its_name_or_its_file(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(Path(viragh_2014.__file__).read_text())
     assert airflock.load(NAME, law=path).model.name == airflock.load(NAME, law=str(path)).model.name == "mine"
-    with pytest.raises(ScenarioError, match="'vicsek' is no model; did you mean vicsek_1995?"):
+    with pytest.raises(ScenarioError, match="'vicsek': unknown model; did you mean vicsek_1995?"):
         airflock.load(NAME, law="vicsek")
-    with pytest.raises(ScenarioError, match=r"law = 3 is no law; give a module, a class, a mapping, or one of"):
+    with pytest.raises(ScenarioError, match=r"law = 3 is not a law; give a module, a class, a mapping, or one of"):
         airflock.load(NAME, law=3)
 
 
@@ -72,7 +72,12 @@ def test_the_largest_seed_flies_and_is_kept_in_a_file(short, tmp_path):
 
 @pytest.mark.parametrize(
     ("seeds", "said"),
-    [(0, "seeds = 0: nothing would be flown"), ([], "seeds = ..: nothing"), (-2, "give at least 1"), (1.5, "no whole")],
+    [
+        (0, "seeds = 0: nothing would be flown"),
+        ([], "seeds = ..: nothing"),
+        (-2, "give at least 1"),
+        (1.5, "neither a whole number"),
+    ],
 )
 def test_a_score_of_no_flight_is_refused(short, seeds, said):
     with pytest.raises(ParameterError, match=said):

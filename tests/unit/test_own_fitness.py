@@ -54,9 +54,9 @@ def test_a_file_of_functions_that_no_objective_names_is_refused(tmp_path):
 
 @pytest.mark.parametrize("timeout", [-1.0, 0.0, float("nan")])
 def test_a_time_limit_in_which_nothing_can_fly_is_refused_before_the_folder_is_made(tmp_path, timeout):
-    with pytest.raises(StudyError, match=f"timeout = {timeout:g} s is not positive"):
+    with pytest.raises(StudyError, match=f"timeout = {timeout:g} s must be above 0"):
         airflock.evolve(toys.study(), tmp_path / "a", timeout=timeout)
     command = [sys.executable, "-m", "airflock", "evolve", "vasarhelyi_2018/4ms", "--timeout", str(timeout)]
     done = subprocess.run([*command, "--out", tmp_path / "a"], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2 and done.stderr == f"airflock: timeout = {timeout:g} s is not positive\n"
+    assert done.returncode == 2 and done.stderr == f"airflock: timeout = {timeout:g} s must be above 0\n"
     assert not (tmp_path / "a").exists()

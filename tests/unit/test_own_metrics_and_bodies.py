@@ -136,8 +136,10 @@ def test_code_in_the_current_folder_is_found_and_only_its_name_is_kept(files, mo
     assert document["metrics"]["kind"] == "spread.py"
     kept = flown_document(load("vasarhelyi_2018/4ms", {"metrics.kind": "spread.py"}, trust=True))
     assert kept["metrics"]["kind"] == "spread"  # no place of a file
-    with pytest.raises(ScenarioError, match="body.tau is no key"):  # the preset's keys are another body's
-        load("vasarhelyi_2018/4ms", keys, trust=True)
+    other = load("vasarhelyi_2018/4ms", keys, trust=True)  # the preset's numbers are another body's
+    assert other.vehicle.name == "half" and any("multirotor are left out" in note for note in other.notes)
+    with pytest.raises(ScenarioError, match="body.tau: unknown key"):
+        load("vasarhelyi_2018/4ms", keys | {"body.tau": 1.0}, trust=True)
 
 
 BAD = {

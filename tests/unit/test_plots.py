@@ -17,15 +17,17 @@ from airflock.errors import AirflockError, RecordingError
 from airflock.models import vasarhelyi_2018
 from airflock.plots import scene, style
 from airflock.plots.exposure import develop, exposure, light
+from airflock.plots.film_stage import Stage
 from airflock.plots.heatmap import heatmap
-from airflock.plots.rules import alignment, allowed_difference, repulsion, rules, vectors, wall_response
+from airflock.plots.rules import alignment, allowed_difference, repulsion, rules, wall_response
 from airflock.plots.save import PictureError, save_figure
-from airflock.plots.series import rotations, series
+from airflock.plots.series import Pen, rotations, series
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
-from airflock.plots.video import Stage, frame_count, video
+from airflock.plots.video import frame_count, video
 from airflock.recordings.layout import dataset
 from airflock.scenarios.files import make
+from airflock.stage.arrows import vectors
 
 RADIUS, PACE = 50.0, 4.0
 
@@ -55,7 +57,7 @@ def coloured_paths(figure):
 
 
 def test_every_path_is_drawn_once_in_its_window_and_coloured_by_its_speed():
-    figure = trajectories(flight(document=SQUARE), start=20.0, stop=30.0)
+    figure = trajectories(flight(document=SQUARE), start=20.0, stop=30.0, colour="speed")
     paths = coloured_paths(figure)
     assert len(paths) == 3  # two in colour, one in grey
     for path in paths:
@@ -341,6 +343,13 @@ def test_pictures_in_space_project_parallel():
     assert np.allclose([view.right @ view.up, view.right @ view.right, view.up @ view.up], [0.0, 1.0, 1.0])
     stage = Stage(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
     assert stage.picture(1.0).shape == (stage.size[1], stage.size[0], 4)
+    flat = Stage(flight(document=SQUARE), None, None, tail=2.0, height=120, speed=1.0, space=True)
+    flat.picture(12.0)
+    corners = np.array([path.vertices[:4] for path in flat.darts.get_paths()])
+    angle = 12.0 * PACE / RADIUS + np.arange(3) * 2.0 * math.pi / 3.0
+    ring = RADIUS * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
+    centre = corners[:, 0] + (corners[:, 2] - corners[:, 0]) * (0.6 / 0.82)
+    assert np.allclose(centre, np.column_stack(view(ring)), atol=0.05)
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
@@ -354,7 +363,7 @@ def test_a_figure_is_saved_in_the_format_of_its_ending(tmp_path, ending):
 
 def test_unknown_endings_and_missing_folders_are_refused_in_one_line(tmp_path):
     for name, reason in (
-        ("a.jpg", "ending .jpg is no format"),
+        ("a.jpg", "ending .jpg: unknown format"),
         ("a", "without an ending"),
         ("none/a.png", "No such file or directory"),
     ):
@@ -425,3 +434,106 @@ def test_no_line_is_drawn_across_a_periodic_world():
     drawn = [c.get_segments() for c in axes.collections if hasattr(c, "get_segments")]
     lines = np.concatenate([segments for segments in drawn if len(segments)])
     assert len(lines) and np.abs(lines[:, 1] - lines[:, 0]).max() <= half
+
+
+def wrapping(seconds=60.0, period=0.5):
+    """Three agents that fly east at 4 m/s round a periodic square of 40 m."""
+    times = np.arange(0.0, seconds + 1e-9, period)
+    x = (times[:, None] * PACE + np.array([0.0, 5.0, 11.0]) + 20.0) % 40.0 - 20.0
+    y = np.broadcast_to([-10.0, 0.0, 10.0], x.shape)
+    pace, still = np.full_like(x, PACE), np.zeros_like(x)
+    world = {
+        "agents": 3,
+        "model": {"kind": "vicsek_1995"},
+        "world": {"side": 40.0, "edges": "periodic", "height": 40.0},
+    }
+    attributes = {"airflock_scenario": json.dumps(world), "airflock_seed": 7}
+    return dataset(np.stack([x, y, pace, still, pace, still], axis=1), 2, period, attributes, "velocity")
+
+
+def test_nothing_is_drawn_through_a_periodic_face():
+    recording = wrapping()
+    for path in coloured_paths(trajectories(recording)):
+        assert np.abs(np.diff(np.array(path.get_segments())[..., 0], axis=1)).max() < 3.0
+    stage = Stage(recording, None, None, tail=4.0, height=120, speed=1.0)
+    for instant in np.arange(4.0, 20.0, 0.125):
+        stage.picture(float(instant))
+        tails = np.array(stage.tails.get_segments())
+        assert np.abs(np.diff(tails[..., 0], axis=1)).max() < 3.0
+        expected = (instant * PACE + np.array([0.0, 5.0, 11.0]) + 20.0) % 40.0 - 20.0
+        corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
+        centre = corners[:, 0, 0] + (corners[:, 2, 0] - corners[:, 0, 0]) * (0.6 / 0.82)
+        away = np.abs(centre - expected)
+        assert np.minimum(away, 40.0 - away).max() <= 0.5 * 0.5 * PACE + 0.02  # half a frame's way, at a face
+    shown = scene.paths_of(recording)
+    leaps = np.abs(np.diff(shown.position[:, 0], axis=0)) > 20.0
+    film = light(shown, shown.position[:, 0], shown.position[:, 1], (-20.0, 20.0, -20.0, 20.0), 1e9, leaps)
+    rows = film.sum(axis=2)[[350, 700, 1049]]  # where the three fly
+    assert rows.max(axis=1).min() > 0.0
+    assert (rows[:, 100:1300].max(axis=1) / rows[:, 100:1300].min(axis=1)).max() < 1.7  # no streak along the row
+
+
+def test_colours_follow_the_heading_where_all_fly_equally_fast():
+    recording = flight(document=SQUARE)
+    figure = trajectories(recording, highlight=False)
+    for agent, path in enumerate(coloured_paths(figure)):
+        first = recording["velocity"].sel(time=40.0).values[:, 0, agent]
+        assert path.get_array()[0] == pytest.approx(math.degrees(math.atan2(first[1], first[0])) % 360.0)
+    assert figure.axes[1].get_ylabel() == "heading"
+    with pytest.raises(AirflockError, match="none of auto, speed, heading, agent"):
+        trajectories(recording, colour="mood")
+
+
+def test_many_paths_in_little_room_are_cut_and_the_title_says_so():
+    crowd = flight(agents=120, seconds=100.0)
+    figure = trajectories(crowd)
+    texts = " ".join(t.get_text() for t in figure.axes[0].texts)
+    shown = len(coloured_paths(figure)[0].get_segments()) * 0.5
+    assert shown < 60.0 and f"{100.0 - shown:.4g} to 100 s" in texts
+
+
+@pytest.mark.parametrize("smooth", [0.0, 5.0, None])
+def test_smoothed_series_keep_constants_and_say_their_window(smooth):
+    recording = flight(agents=12, document={**SQUARE, "agents": 12})
+    figure = series(recording, smooth=smooth)
+    upper = figure.axes[0]
+    title = figure._suptitle.get_text()
+    assert ("means over 5 s" in title) == (smooth == 5.0)
+    line = next(line for line in upper.lines if line.get_label().startswith("$\\phi^{\\mathrm{vel}}"))
+    course = airflock.over_time(recording)["phi_vel"]
+    pen = Pen(airflock.over_time(recording), smooth)
+    assert line.get_ydata().mean() == pytest.approx(course.mean() / 4.0, rel=0.02)
+    assert len(line.get_ydata()) == len(course)
+    assert pen.window == {0.0: 0.0, 5.0: 5.0, None: 0.5}[smooth]
+
+
+def test_the_least_of_a_window_is_never_above_the_instant():
+    times = np.arange(0.0, 50.0, 0.5)
+    values = pd.Series(np.random.default_rng(8).normal(size=len(times)), index=times)
+    axes = style.Picture(3.0, 2.0).add_subplot()
+    (line,) = Pen(pd.DataFrame({"a": values}), 4.0).draw(axes, values, style.BLUE, "a", least=True)
+    assert (line.get_ydata() <= values.to_numpy()).all() and line.get_ydata().min() == values.min()
+    (line,) = Pen(pd.DataFrame({"a": values}), 4.0).draw(axes, values * 0.0 + 3.0, style.BLUE, "a")
+    assert line.get_ydata() == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("kind", ["trajectories", "exposure"])
+def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given(kind):
+    figure = style.Picture(6.0, 3.0)
+    left, right = figure.subplots(1, 2)
+    assert airflock.plot(flight(document=SQUARE), kind, ax=right) is figure
+    assert not left.has_data() and right.has_data()
+    with pytest.raises(AirflockError, match="panels of its own"):
+        airflock.plot(flight(document=SQUARE), "series", ax=left)
+
+
+def test_a_chart_beside_a_video_moves_with_it():
+    recording = flight(agents=12, seconds=20.0, document={**SQUARE, "agents": 12})
+    stage = Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="phi_vel")
+    plain = Stage(recording, None, None, tail=0.0, height=160, speed=1.0)
+    assert stage.size[0] > plain.size[0] + 50 and stage.size[1] == plain.size[1]
+    one, other = (stage.picture(t)[:, plain.size[0] :].copy() for t in (2.0, 18.0))
+    assert (one != other).any()
+    assert stage.cursor.get_xdata() == [18.0, 18.0]
+    with pytest.raises(RecordingError, match="this recording has"):
+        Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="mood")

@@ -8,6 +8,7 @@ import xarray as xr
 
 import airflock
 from airflock.errors import RecordingError
+from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
 
@@ -72,7 +73,7 @@ def test_a_missing_position_takes_its_drone_out_of_that_instant_alone(circling):
         (lambda d: d.isel(individual=0), "lacks the dimension individual"),
         (lambda d: d.isel(individual=slice(0)), "is empty"),
         (lambda d: d.isel(space=[0]), "1 components"),
-        (lambda d: d.isel(time=slice(None, None, -1)), "time is no increasing"),
+        (lambda d: d.isel(time=slice(None, None, -1)), "time is not an increasing"),
         (lambda d: d.isel(time=[0, 1, 5, 6]), "resample"),
         (lambda d: d.isel(time=[0]), "one frame without velocity"),
     ],
@@ -135,3 +136,17 @@ def test_same_sampling_gives_the_same_numbers_from_the_kernel_and_from_the_recor
         direct = airflock.score(scenario, [1], precision=64).iloc[0]
         scored = airflock.score(airflock.simulate(scenario, 1, precision=64)).iloc[0]
         assert scored[direct.index].to_numpy() == pytest.approx(direct.to_numpy(), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "attributes, name",
+    [
+        ({"airflock_name": "vasarhelyi_2018/4ms", "source_file": "a.csv"}, "vasarhelyi_2018/4ms"),
+        ({"source_file": "tank/fish.csv"}, "fish"),
+        ({"source_file": "log_1.ulg, log_2.ulg, log_3.ulg"}, "log_1 and 2 more"),
+        ({"source_file": ".csv"}, ".csv"),
+        ({}, "recording"),
+    ],
+)
+def test_pictures_of_tracks_are_called_like_their_file(circling, attributes, name):
+    assert name_of(circling.assign_attrs(attributes)) == name

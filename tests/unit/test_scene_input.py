@@ -114,10 +114,9 @@ def test_free_goals_and_starts_lie_outside_a_closed_mesh(tmp_path, seed):
         keys = {"start.side": 50.0, "world.dimensions": dims, "goals.high": 20.0, "goals.apart": 1.0, "agents": 8}
         found = fly_in(tmp_path / "ball.stl", **keys, **{"scene.ground": "no", "goals.count": 8, "duration": 0.02})
         assert np.linalg.norm(found.waypoints(), axis=1).min() > 23.0
-        for device, flights in (("python", 1), ("cpu", 3)):
-            for number in range(seed, seed + flights):
-                start = airflock.simulate(found, number, device=device)["position"].values[0, :, 0]
-                assert np.linalg.norm(start, axis=0).min() > 23.0
+        for number in range(seed, seed + 3):
+            start = airflock.simulate(found, number, device="python")["position"].values[0, :, 0]
+            assert np.linalg.norm(start, axis=0).min() > 23.0
 
 
 def test_a_start_region_inside_a_closed_mesh_is_refused(tmp_path):

@@ -8,15 +8,21 @@ import pandas as pd
 import pytest
 
 import airflock
+from airflock.aero.wing import pitch
 from airflock.cli import tables
 from airflock.errors import RecordingError
+from airflock.plots.film_stage import Stage
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import cast_at, rays
-from airflock.plots.scene import paths_of
+from airflock.plots.scene import paths_of, view_of
+from airflock.plots.solid import render
 from airflock.plots.through import nearby, scenery, through
+from airflock.plots.trajectories import trajectories
 from airflock.plots.video import video
+from airflock.plots.wash import downwash, formation_at, wash
 from airflock.recordings.flights import plain
 from airflock.recordings.layout import dataset
+from airflock.stage.scene import prism
 
 
 def recording(name="kidger/city", **keys):
@@ -43,7 +49,10 @@ def test_paths_through_a_scene_show_what_stands_there(name):
     assert len(shown) and len(scenery(made, paths_of(made))) >= len(shown)
     if name == "kidger/city":
         assert len(axes.collections[0].get_paths()) == len(shown)  # a ground plan of each building
-        assert through(made, space=True).axes[0].get_zlabel() == "up (m)"
+        named = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+        assert named == ["at the end", "goal"]
+        assert [axes.get_ylabel() for axes in figure.axes[1:]] == ["height of what stands (m)", "speed (m/s)"]
+        assert len(trajectories(made).axes[0].collections[0].get_paths()) == len(shown)  # so does run --plot
     if name == "kidger/final_2d":
         with pytest.raises(RecordingError, match="flown in a plane"):
             through(made, space=True)
@@ -105,3 +114,85 @@ def test_only_the_time_of_an_event_is_never(capsys):
         shown = {line.split()[0]: line.split()[1:] for line in capsys.readouterr().out.splitlines() if line.strip()}
         assert shown["time_to_flock"] == ["never"] * count and shown["time_to_goal"][:2] == ["1,", "never"]
         assert shown["r_min"] == ["nan"] * count and shown["power"][0] == "inf"
+
+
+def boxes_in_the_way(points, toward, low, high):
+    """Whether a ray from each point along `toward` meets an upright box, by its slabs."""
+    with np.errstate(divide="ignore"):
+        a, b = ((bound[None] - points[:, None]) / toward for bound in (low, high))
+    enter, leave = np.minimum(a, b).max(axis=2), np.maximum(a, b).min(axis=2)
+    return ((enter <= leave) & (leave > 0.0)).any(axis=1)
+
+
+def test_what_a_solid_hides_is_what_a_ray_to_the_viewer_meets():
+    rng = np.random.default_rng(11)
+    low = np.column_stack([rng.uniform(-50.0, 45.0, (12, 2)), np.zeros(12)])
+    high = low + rng.uniform(4.0, 25.0, (12, 3))
+    solids = [
+        prism(f"box_{k}", np.array([[a[0], a[1]], [b[0], a[1]], [b[0], b[1]], [a[0], b[1]]]), 0.0, b[2], (90, 90, 90))
+        for k, (a, b) in enumerate(zip(low, high, strict=True))
+    ]
+    view = view_of(3, elevation_deg=40.0)
+    picture = render(solids, view, (-110.0, 110.0, -70.0, 90.0), pixels=700)
+    points = np.column_stack([rng.uniform(-60.0, 60.0, (4000, 2)), rng.uniform(0.0, 30.0, 4000)])
+    assert picture.toward @ view.right == pytest.approx(0.0) and picture.toward[2] == pytest.approx(
+        np.sin(np.radians(40.0))
+    )
+    expected = boxes_in_the_way(points, picture.toward, low, high)
+    assert 0.05 < expected.mean() < 0.95
+    assert (picture.hides(points) == expected).mean() > 0.985  # but for the pixels along edges
+    assert picture.colour.max() <= 1.0 and set(np.unique(np.round(picture.colour[..., 3], 2))) <= {
+        0.0,
+        0.25,
+        0.5,
+        0.75,
+        1.0,
+    }
+
+
+def test_a_city_in_space_draws_all_that_was_flown_once():
+    made = recording()
+    figure = through(made, space=True)
+    hidden, seen = figure.axes[0].collections[:2]
+    flown = made["position"].values[:, :, 0]
+    assert len(hidden.get_segments()) + len(seen.get_segments()) == (len(flown) - 1) * 4
+    assert hidden.get_alpha() < 0.5 and seen.get_alpha() == 1.0
+
+
+def test_videos_in_space_and_from_above_stand_on_the_same_ground(tmp_path):
+    made = recording()
+    for space in (True, False):
+        stage = Stage(made, None, None, tail=0.1, height=160, speed=1.0, space=space)
+        assert stage.picture(0.3).shape == (stage.size[1], stage.size[0], 4)
+        assert (stage.solid is not None) == space
+    corners = np.array([path.vertices[:4] for path in stage.darts.get_paths()])
+    where = made["position"].sel(time=0.3, method="nearest").values[:2, 0].T
+    np.testing.assert_allclose(corners[:, 0] + (corners[:, 2] - corners[:, 0]) * (0.6 / 0.82), where, atol=0.05)
+
+
+def test_the_air_of_a_formation_is_that_of_its_lifting_line():
+    scenario = airflock.load("dimock_2003/physical", {"wing.segments": "10"})
+    rng = np.random.default_rng(3)
+    position = rng.uniform(-4.0, 4.0, (3, 5)) * [[1.0], [1.0], [0.05]]
+    found = formation_at(scenario, position, np.ones((3, 5)))
+    m, h = 10, pitch(scenario.wing)
+    for bird, place in enumerate(found.place):
+        across = place[1] + (np.arange(m) - 0.5 * (m - 1)) * h
+        points = np.column_stack([np.full(m, place[0]), across, np.full(m, place[2])])
+        np.testing.assert_allclose(downwash(scenario, found, points, without=bird), found.wash[bird], atol=1e-5)
+    alone = formation_at(scenario, np.array([[0.0, 0.0], [-1e5, 1e5], [0.0, 0.0]]), np.ones((3, 2)))
+    np.testing.assert_allclose(alone.drag, alone.solo, rtol=1e-6)
+
+
+def test_a_formation_is_drawn_with_what_each_bird_saves():
+    scenario = airflock.load("dimock_2003/physical", {"agents": 3, "wing.segments": "5"})
+    span = scenario.wing.span
+    frames = np.zeros((1, 9, 3))
+    frames[0, 0], frames[0, 1], frames[0, 3] = [0.0, -1.5 * span, -1.5 * span], [0.0, 0.95 * span, -0.95 * span], 13.0
+    about = {"airflock_scenario": json.dumps(plain(scenario.document)), "airflock_name": "v", "airflock_seed": 0}
+    axes = wash(dataset(frames, 3, 1.0, about, "velocity")).axes[0]
+    said = [float(text.get_text().replace(" %", "")) for text in axes.texts if text.get_text().endswith("%")]
+    assert len(said) == 3 and said[1] == said[2] < -20.0 and said[1] < said[0]  # who flies behind saves most
+    assert len(axes.lines) == 3 and np.ptp(axes.lines[0].get_xdata()) == pytest.approx(span)
+    with pytest.raises(RecordingError, match="fly in space"):
+        wash(recording("kidger/final_2d"))

@@ -61,7 +61,7 @@ def test_another_kind_of_law_keeps_none_of_the_other_law_s_keys(tmp_path):
         ('extends = "vasarhelyi_2018/real_6m"', "did you mean vasarhelyi_2018/real_6ms?"),
         ("extends = 4", "extends = 4 is not a name"),
         ('extends = "mine.toml"', "comes back to itself"),
-        (f'extends = "{NAME}"\n[radio]\ndelai = 1.0', "radio.delai is no key; did you mean radio.delay?"),
+        (f'extends = "{NAME}"\n[radio]\ndelai = 1.0', "radio.delai: unknown key; did you mean radio.delay?"),
     ],
 )
 def test_what_cannot_be_extended_is_told_with_the_file_s_name(tmp_path, monkeypatch, text, fault):
@@ -82,8 +82,8 @@ def test_a_last_word_that_one_section_has_is_that_key():
     ("key", "fault"),
     [
         ("noise", "noise is several keys; write body.noise or sensors.noise"),
-        ("delai", "delai is no key; did you mean radio.delay?"),
-        ("agnets", "agnets is no key; did you mean agents?"),
+        ("delai", "delai: unknown key; did you mean radio.delay?"),
+        ("agnets", "agnets: unknown key; did you mean agents?"),
     ],
 )
 def test_a_last_word_of_several_sections_or_none_is_refused(key, fault):

@@ -77,7 +77,7 @@ def test_numbers_outside_their_declaration_are_refused():
         ({"low": 0.0, "high": 1.0, "scale": "log"}, "must be above 0 on a logarithmic scale"),
         ({"low": 0.0, "high": 1.0, "scale": "cubic"}, "none of linear, log"),
         ({"low": "0", "high": 1.0}, "space.model.p_rep.low = '0' is not a number; give [0, 10] 1/s"),
-        ({"low": 0.0, "hihg": 1.0}, "space.model.p_rep.hihg is no key; did you mean high?"),
+        ({"low": 0.0, "hihg": 1.0}, "space.model.p_rep.hihg: unknown key; did you mean high?"),
         ({"low": 0.0, "high": 1.0, "unit": "m"}, "the unit is 1/s"),
         ({"low": 0.1, "high": 0.9, "integer": True}, "holds no whole number"),
         ({"low": 0.1, "high": 0.9, "above": "model.c_frict"}, ""),
@@ -105,7 +105,7 @@ def test_drag_descent_varies_only_where_it_is_flown():
     table = {"aero": {"k_d": {"low": 0.01, "high": 1.0}}}
     _, faults = read_space(table, FLOCK)
     assert faults[0] == (
-        "space.aero.k_d is no number of vasarhelyi_2018/6ms, which has no section [aero]; "
+        "space.aero.k_d is not a number of vasarhelyi_2018/6ms, which has no section [aero]; "
         "--set aero.k_d=VALUE adds drag descent to it"
     )
     assert space(table, load("vasarhelyi_2018/6ms", {"aero.k_d": 0.1})).keys == ("aero.k_d",)

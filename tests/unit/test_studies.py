@@ -190,7 +190,7 @@ def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
 @pytest.mark.parametrize(
     ("tables", "search", "words"),
     [
-        ({"objective": {"maximize": "fitness"}}, {}, "objective.maximize is no key; did you mean objective.maximise?"),
+        ({"objective": {"maximize": "fitness"}}, {}, "objective.maximize: unknown key; did you mean objective.max"),
         ({"objective": {"over_seeds": "median"}}, {}, "'median' is none of mean, worst, quantile"),
         ({"objective": {"quantile": 2.0}}, {}, "objective.quantile = 2.0 lies outside [0, 1]"),
         ({"objective": {"own": "mine.py"}}, {}, "objective.own = 'mine.py': no such Python file"),
@@ -199,7 +199,7 @@ def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
         ({}, {"algorithm": "cma"}, "search.algorithm = 'cma' is none of cmaes, ga"),
         ({}, {"algorithm": "nsga2"}, "is for several objectives, but there is one"),
         ({"objective": {"maximise": ["a", "b"]}}, {}, "takes one objective, but there are 2"),
-        ({"searhc": {}}, {}, "searhc is no key; did you mean search?"),
+        ({"searhc": {}}, {}, "searhc: unknown key; did you mean search?"),
     ],
 )
 def test_each_fault_of_a_study_is_one_line(tables, search, words):
@@ -209,9 +209,7 @@ def test_each_fault_of_a_study_is_one_line(tables, search, words):
 
 
 def test_unknown_order_parameters_name_the_known_ones(tmp_path):
-    with pytest.raises(
-        StudyError, match="objective beauty is no order parameter of this scenario; known: fitness, phi"
-    ):
+    with pytest.raises(StudyError, match="objective beauty: unknown order parameter; known: fitness, phi"):
         finished(tmp_path / "a", toys.study({"objective": {"maximise": "beauty"}}))
 
 

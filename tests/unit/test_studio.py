@@ -2,6 +2,7 @@
 
 import math
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -15,10 +16,15 @@ from airflock.scenarios.files import presets
 from airflock.stage import colours
 from airflock.stage.scene import dart, stage_of, turned
 from airflock.studio import door, measures
+from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.controls import controls_of, span
+from airflock.studio.drawing import arrival
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
-from airflock.studio.player import Player, value_of
+from airflock.studio.perceiving import Perceiving
+from airflock.studio.player import Player
+from airflock.studio.score_tables import differences
+from airflock.studio.side import Origin, Side, value_of
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
@@ -84,11 +90,10 @@ def test_going_back_gives_up_what_came_after(player):
     for _ in range(50):
         player.fly(20)
     before = player.flight.time
-    early = player.moments.at(4.0)
     player.change("model.p_rep", 0.3)
     player.fly(20)
     player.back(4.1)
-    assert player.flight.time == pytest.approx(early.step * 0.01) and player.flight.time <= 4.1 < before
+    assert player.flight.time == pytest.approx(4.1) and before > 4.1
     assert player.paused and not player.flight.events and not player.changed
     other = airflock.open(player.preset, 3).advance(steps=player.flight.step)
     np.testing.assert_array_equal(player.flight.state, other.state)
@@ -100,10 +105,10 @@ def test_undo_takes_back_one_change_and_the_preset_all(player):
         player.change("model.p_rep", value)
     player.change("body.tau", 0.5)
     preset = value_of(player.preset, "model.p_rep")
-    assert player.undo() == {"body.tau": value_of(player.preset, "body.tau")}
-    assert player.undo() == {"model.p_rep": 0.2}
+    assert player.side.undo() == {"body.tau": value_of(player.preset, "body.tau")}
+    assert player.side.undo() == {"model.p_rep": 0.2}
     assert value_of(player.scenario, "model.p_rep") == 0.2
-    assert player.to_preset() == {"model.p_rep": preset} and player.changed == {}
+    assert player.side.to_preset() == {"model.p_rep": preset} and player.changed == {}
     assert value_of(player.scenario, "model.p_rep") == preset
 
 
@@ -156,10 +161,10 @@ def test_moments_are_thinned_and_the_last_before_a_time_is_found():
     moments = Moments(1.0)
     for second in range(2000):
         if moments.due(float(second)):
-            moments.keep(float(second), Kept(second))
+            moments.keep(float(second), (Kept(second),))
     assert len(moments) <= 400 and moments.every > 1.0
-    for time in (0.0, 17.0, 999.5, 1999.0):
-        assert time - moments.every <= moments.at(time).time <= time
+    for when in (0.0, 17.0, 999.5, 1999.0):
+        assert when - moments.every <= moments.at(when)[0].time <= when
 
 
 def test_darts_point_where_agents_fly():
@@ -231,7 +236,7 @@ def test_another_number_of_agents_that_cannot_be_leaves_the_flight_as_it_was(pla
     player.fly(10)
     with pytest.raises(ScenarioError):
         player.reset(settings={"agents": 10**8})
-    assert player.flight.step == 10 and player.given == FEW
+    assert player.flight.step == 10 and player.side.settings == FEW
 
 
 def test_a_recording_is_flown_again_with_its_events(player, tmp_path):
@@ -251,3 +256,175 @@ def test_a_flight_log_is_refused_in_one_line(tmp_path):
     airflock.save(log, tmp_path / "log.nc")
     with pytest.raises(airflock.AirflockError, match="airflock replay"):
         Player(str(tmp_path / "log.nc"))
+
+
+def test_a_fork_without_a_change_flies_the_same_and_its_change_is_all_that_differs(player):
+    player.fly(130)
+    player.fork()
+    player.fly(150)
+    a, b = player.sides
+    np.testing.assert_array_equal(a.flight.state, b.flight.state)
+    player.change("model.p_rep", 0.3)
+    player.fly(200)
+    assert differences(a.scenario, b.scenario) == [("model.p_rep", value_of(a.preset, "model.p_rep"), 0.3)]
+    assert not a.flight.events and [event.kind for event in b.flight.events] == ["change"]
+    assert a.flight.time == b.flight.time and (a.flight.state != b.flight.state).any()
+    alone = airflock.open(a.preset, 3).advance(steps=a.flight.step)
+    np.testing.assert_array_equal(a.flight.state, alone.state)
+    player.back(1.0)
+    assert player.sides == [a] and a.flight.time == 1.0
+
+
+def test_two_parameter_sets_side_by_side_meet_the_same_noise():
+    player = Player(PRESET, FEW, 3, against={"radio.delay": 2.0})
+    player.fly(300)
+    for side, delay in zip(player.sides, (1.0, 2.0), strict=True):
+        alone = airflock.open(airflock.load(PRESET, {**FEW, "radio.delay": delay}), 3).advance(steps=300)
+        np.testing.assert_array_equal(side.flight.state, alone.state)
+    assert player.where == f"{PRESET} | radio.delay = 2.0"
+
+
+def test_flights_of_other_dimensions_are_not_compared():
+    with pytest.raises(StudioError, match="share one scene"):
+        Player(PRESET, {"agents": 3}, against="couzin_2002/torus")
+
+
+def test_going_back_twice_never_meets_a_past_that_was_given_up(player):
+    for _ in range(50):
+        player.fly(20)
+    player.back(3.0)
+    player.change("model.p_rep", 0.3)
+    player.fly(100)
+    player.back(9.0)
+    assert player.flight.time <= 4.0 and [event.kind for event in player.flight.events] == ["change"]
+
+
+def test_back_flies_again_what_was_done_meanwhile(player):
+    for step in range(12):
+        player.fly(25)
+        if step == 5:
+            player.push(2, 4.0)
+        if step == 7:
+            player.change("model.p_rep", 0.3)
+    live = airflock.open(player.preset, 3, events=player.flight.events).advance(steps=230)
+    player.back(2.3)
+    np.testing.assert_array_equal(player.flight.state, live.state)
+    assert player.changed == {"model.p_rep": 0.3}
+
+
+def test_a_gust_blows_for_its_time_and_is_an_event(player):
+    player.fly(20)
+    player.side.flight.change({"wind.north": 1.0})  # so that both drivers are there at once
+    player.side.flight.change({"wind.north": 0.0})
+    player.gust(6.0, 0.0, 0.5)
+    for _ in range(400):
+        player.fly(1)
+        if player.scenario.wind.east:
+            break
+        time.sleep(0.05)
+    began = player.flight.step - 1
+    assert player.scenario.wind.east == 6.0
+    player.fly(100)
+    assert player.scenario.wind.east == 0.0
+    last = player.flight.events[-1]
+    assert last.kind == "change" and last.step == began + 50 and last.data == {"wind.east": 0.0, "wind.north": 0.0}
+
+
+def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in():
+    player = Player("vasarhelyi_2018/obstacles", FEW, 3)
+    position, _ = player.motion
+    with pytest.raises(StudioError, match="agent 4 is where"):
+        player.throw(*map(float, position[4, :2]), 6.0)
+    gaps = [(x, y) for x in range(-100, 101, 10) for y in range(-100, 101, 10)
+            if np.abs(position[:, :2] - (x, y)).max(axis=1).min() > 20.0]  # fmt: skip
+    before = len(player.scenario.world.obstacles)
+    player.throw(*map(float, gaps[0]), 6.0)
+    corners = np.array(player.scenario.world.obstacles[-1])
+    assert len(player.scenario.world.obstacles) == before + 1
+    np.testing.assert_allclose(corners.mean(axis=0), gaps[0])
+    player.side.undo()
+    assert len(player.scenario.world.obstacles) == before
+
+
+def test_a_goal_is_moved_and_the_others_stay():
+    player = Player("kidger/city", {"agents": 4}, 1)
+    before = player.scenario.waypoints()
+    player.move_goal(1, [10.0, -20.0, 80.0])
+    after = player.scenario.waypoints()
+    np.testing.assert_allclose(after[1], [10.0, -20.0, 80.0])
+    np.testing.assert_allclose(np.delete(after, 1, 0), np.delete(before, 1, 0), atol=1e-4)
+
+
+def test_what_an_agent_perceives_is_drawn_where_it_is():
+    player = Player("vasarhelyi_2018/real_4ms", FEW, 3)
+    player.fly(400)
+    drawn = Perceiving().of(player.side, 2, 1.0, 6.0)
+    seen = player.flight.look(2)
+    heard, _ = drawn.lines["heard"]
+    np.testing.assert_allclose(heard[:, 0], np.broadcast_to(seen.true[:3], heard[:, 0].shape))
+    np.testing.assert_allclose(heard[:, 1], [other.state[:3] for other in seen.heard])
+    believed = drawn.lines["measured"][0].reshape(-1, 3).mean(axis=0)
+    np.testing.assert_allclose(believed, seen.own[:3])
+    shaft = drawn.lines["command"][0][0]
+    np.testing.assert_allclose((shaft[1] - shaft[0])[:2], np.array(seen.command) * 5.0 / 6.0)
+    assert f"hears {len(seen.heard)} others" in drawn.words
+
+
+def test_rays_of_a_selected_boid_end_where_the_world_begins():
+    player = Player("kidger/city", {"agents": 6}, 1)
+    player.fly(30)
+    points, tones = Perceiving().of(player.side, 0, 1.0, 60.0).lines["rays"]
+    length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+    free = (tones == colours.GREEN).all(axis=1)
+    assert len(points) >= 1 and (length <= player.scenario.parameters.r_ray + 1e-4).all()
+    np.testing.assert_allclose(length[free], length.max(), rtol=1e-4)
+    assert (length[~free] < length[free].max(initial=np.inf)).all()
+
+
+def test_a_bird_tells_what_the_wakes_of_others_save_it():
+    side = Side(Origin.of("dimock_2003/physical", {"agents": 3, "wing.segments": "5"}), 1)
+    side.flight = airflock.open(side.preset, 1, device="python").advance(steps=2)
+    drawn = Perceiving().of(side, 1, 1.0, 13.0)
+    legs, _ = drawn.lines["wake"]
+    span = side.scenario.wing.span
+    assert len(legs) == 6  # two legs a bird
+    np.testing.assert_allclose(np.abs(legs[:, 0, 1] - np.repeat(side.motion[0][:, 1], 2)), 0.5 * span, rtol=1e-5)
+    assert (legs[:, 1, 0] < legs[:, 0, 0]).all() and "of a lone bird" in drawn.words
+
+
+@given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))
+def test_shares_of_a_histogram_add_up_to_one(values):
+    made = measures.Histogram(10.0)
+    made.add(np.array(values))
+    edges, shares = made.steps
+    assert shares[::2].sum() == pytest.approx(1.0)
+    inside = np.array(values) < 2.5  # ten bins of a quarter
+    assert shares[::2][:10].sum() == pytest.approx(inside.mean())
+    assert len(edges) == len(shares) and edges[0] == 0.0 and edges[-1] == 10.0
+
+
+def test_links_by_radio_join_the_pairs_in_range_and_pale_with_the_loss():
+    rng = np.random.default_rng(4)
+    where = np.column_stack([rng.uniform(-60.0, 60.0, (40, 2)), np.zeros(40)])
+    pairs, length = measures.Pairs(where).linked(30.0)
+    far = np.linalg.norm(where[:, None] - where[None], axis=2)
+    assert {tuple(sorted(p)) for p in pairs.tolist()} == {
+        tuple(p) for p in np.argwhere(np.triu(far < 30.0, 1)).tolist()
+    }
+    np.testing.assert_allclose(length, far[pairs[:, 0], pairs[:, 1]])
+    k = airflock.load(PRESET, {"radio.loss": 0.5}).radio
+    at, share = arrival(k)
+    np.testing.assert_allclose(np.interp([0.0, 40.0, 80.0], at, share), [1.0, 0.875, 0.5], atol=1e-4)
+
+
+def test_a_study_in_the_background_searches_around_what_was_set(tmp_path):
+    scenario = airflock.load(PRESET, {"model.p_rep": 0.3})
+    found = around(scenario, varied(PRESET))
+    assert found["model.p_rep"] == (0.15, 0.6) and "model.v_flock" not in found
+    assert "model.v_flock" in around(scenario)
+    for key, (low, high) in found.items():
+        assert low <= value_of(scenario, key) <= high
+    rows = [(0, "[0.2]", '{"a": 1.0}'), (0, "[0.4]", '{"a": 2.0}'), (1, "[0.3]", '{"a": 3.0}'), (1, None, "{}")]
+    assert summary(rows) == ([(0.4, pytest.approx(0.3)), (0.4, 0.3)], 0.4, {"a": 2.0})
+    with pytest.raises(StudioError, match="no number"):
+        Study(tmp_path / "study", "", {}, "fitness")

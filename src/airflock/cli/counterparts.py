@@ -54,9 +54,26 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "threads": "threads", **TABLE, "changes": LOADED["changes"],
+            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
-            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.harden.evolved_again"),
+            **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
+        },
+    ),
+    "certify": Counterpart(
+        'airflock.certify("mine.toml", "r_min<1 at 1e-3/h")', "certify",
+        {
+            "scenario": "scenario", "limit": "limit", "out": "airflock.certify.certificate.Certificate.save",
+            "tolerance_of": "tolerance", "check": "airflock.certify.check.check", "changes": "settings", **CODE,
+            "agents": 'settings["agents"]', "duration": 'settings["duration"]', **TABLE,
+            "plot": "airflock.plots.certificate.certificate",
+            **{
+                name: name
+                for name in (
+                    "confidence", "budget", "flights", "resume", "tolerance", "split", "uncertain", "scheduler",
+                    "timeout", "threads", "precision", "device",
+                )
+            },
         },
     ),
     "plot": Counterpart(
@@ -70,14 +87,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.video(recording, "flight.mp4")', "video",
         {
             "what": "recording", "out": "path", "seed": "airflock.simulate", "begin": "start", "end": "stop",
-            "fps": "fps", "speed": "speed", **LOADED,
+            "fps": "fps", "speed": "speed", "space": "space", "chart": "chart", **LOADED,
         },
     ),
     "watch": Counterpart(
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
             "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", **CODE,
+            "host": "host", "port": "port", "against": "against", **CODE,
         },
     ),
     "replay": Counterpart(
@@ -144,7 +161,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
-        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads", **TABLE},
+        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
+         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",
@@ -154,6 +172,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "validate": Counterpart(
         'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
     ),
+    "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
     "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.engine.store.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them

@@ -39,6 +39,8 @@ def evolve(
 ) -> None:
     """Evolve a flock's parameters; the folder then holds the optimum, all evaluations, tables and pictures.
 
+    Exit status 1 where nothing flies; then there is no best.toml.
+
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """
     from airflock.errors import StudyError
@@ -65,6 +67,8 @@ def evolve(
     check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
+    for text in study.notes:
+        tables.say(f"note: {text}")
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
     with options.searching(study, quiet or as_json) as (watch, note):
@@ -73,6 +77,9 @@ def evolve(
         tables.emit_json({**result.document(), "folder": str(out), "seconds": time.perf_counter() - begin})
     elif not quiet:
         _print(result)
+    if result.dead:
+        tables.say(f"airflock: {result.scenario.name}: {result.dead}")
+        raise typer.Exit(1)
 
 
 def _print(result: Any) -> None:
@@ -95,4 +102,6 @@ def _print(result: Any) -> None:
         f"{result.above} of {result.candidates} candidates reach the mean; {result.failed} failed",
         highlight=False,
     )
+    if result.dead:
+        return
     console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False)

@@ -50,7 +50,7 @@ def fleet(
         period = found.sensors.period or found.flight.dt
         found = compare.sampled(found, period)
     if vehicle not in VEHICLES:
-        wrong.append(f"--vehicle {vehicle}: give one of {', '.join(VEHICLES)}")
+        wrong.append(f"--vehicle {vehicle} is none of {', '.join(VEHICLES)}")
     if against not in (None, "simulator"):
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)

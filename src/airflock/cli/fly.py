@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock.cli import options, tables
+from airflock.doors import is_file
 from airflock.errors import CardError, ScenarioError
 
 DATAGRAM = 95  # bytes of a signed status packet
@@ -21,8 +22,8 @@ class Fly(TyperGroup):
     """Subcommands; anything else is a flight card, which is flown."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """A subcommand by its name, else `card`."""
-        if args and args[0] not in self.commands and not args[0].startswith("-"):
+        """A subcommand by its name; `card` for the name of a file."""
+        if args and args[0] not in self.commands and (Path(args[0]).suffix or is_file(args[0])):
             args = ["card", *args]
         return super().resolve_command(ctx, args)
 

@@ -28,19 +28,23 @@ def harden(
         float | None, typer.Option(help="Likewise with a delay so many times as large.", show_default=False)
     ] = None,
     generations: Annotated[int, typer.Option(min=1, help="Generations of that evolution.")] = 150,
+    cost: Annotated[float, typer.Option(min=0.0, help="Fitness that the recipe may give up.")] = 0.05,
     changes: options.Set = None,
     trust: options.Trust = False,
     duration: options.Duration = None,
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
-    """Make an optimum safe, showing what each step costs in fitness and gains in distance.
+    """Make an optimum safer: steps of Table S4 stay if they gain, cost little, and break nothing that held.
+
+    Exit status 1 where no step could be kept.
 
     Example: airflock harden study --out flyable.toml
     """
     from airflock.evolve.after import BEST
+    from airflock.evolve.again import cautious, evolved_again, stricter
     from airflock.evolve.folder import write
-    from airflock.evolve.harden import cautious, document, evolved_again, harden, stricter
+    from airflock.evolve.harden import document, harden
     from airflock.scenarios.files import load
 
     path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
@@ -57,22 +61,24 @@ def harden(
         with options.searching(study, quiet=as_json) as (watch, note):
             steps = evolved_again(found, study, settings, folder, numbers, threads, watch, note)
     else:
-        with options.progress(f"{scenario}: flights", 5 * seeds, quiet=as_json) as done:
-            steps = harden(found, numbers, threads=threads, done=done)
+        with options.progress(f"{scenario}: flights", 11 * seeds, quiet=as_json) as done:  # at most
+            steps = harden(found, numbers, cost=cost, threads=threads, done=done)
     write(out, document(found, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
         tables.emit_json(
             {"scenario": found.name, "seeds": seeds, "out": str(out), "steps": [s.as_dict() for s in steps]}
         )
-        return
-    _print(found.name, steps, seeds)
-    tables.say(f"saved {out}")
+    else:
+        _print(found.name, steps, seeds)
+        tables.say(f"saved {out}")
+    if not steps[-1].kept:
+        raise typer.Exit(1)
 
 
 def _space(where: str, scenario: Any) -> Any:
-    """The space of the study in a folder, of the study that is shipped for a preset, or all the model's ranges."""
+    """The space of the study in a folder, of the study that is shipped for a preset, or the usual one."""
+    from airflock.evolve.bounds import usual_space
     from airflock.evolve.folder import STUDY, read
-    from airflock.evolve.space import full_space
     from airflock.evolve.space_table import read_space
     from airflock.evolve.study import load_study, shipped
 
@@ -83,7 +89,7 @@ def _space(where: str, scenario: Any) -> Any:
         if space is None:
             raise ScenarioError([f"{where}: {fault}" for fault in faults])
         return space
-    return full_space(scenario)
+    return usual_space(scenario)[0]
 
 
 def _print(name: str, steps: list[Any], seeds: int) -> None:
@@ -92,13 +98,15 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
     from rich.table import Table
 
     table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
-    for column in ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)", "n_coll"):
-        table.add_column(column, justify="left" if column == "step" else "right")
+    for column in ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)", "n_coll", "f_wall", "contacts", ""):
+        table.add_column(column, justify="left" if column in ("step", "") else "right")
     for step in steps:
         cost, gain = (f"{m:.3g} ({low:.3g} … {high:.3g})" for m, low, high in (step.cost, step.gain))
         first = step is steps[0]
+        walls = f"{step.parts['f_wall']:.3g}" if "f_wall" in step.parts else ""
+        contacts = f"{100.0 * step.contacts:.0f} %" if step.contacts == step.contacts else ""
         table.add_row(
             step.name, f"{step.fitness:.4f}", "" if first else cost, f"{step.r_min:.3g}", "" if first else gain,
-            f"{step.n_coll:.3g}",
+            f"{step.n_coll:.3g}", walls, contacts, step.verdict,
         )  # fmt: skip
     Console().print(table)

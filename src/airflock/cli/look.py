@@ -22,6 +22,7 @@ class Kind(StrEnum):
     SPACE = "space"
     RAYS = "rays"
     FLOCKED = "flocked"
+    WASH = "wash"
 
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending decides the format.")]
@@ -65,6 +66,15 @@ def video(
     seed: Seed = 0,
     begin: Begin = None,
     end: End = None,
+    space: Annotated[
+        bool | None,
+        typer.Option(
+            "--space/--above", help="Seen obliquely, buildings solid; or from above.", show_default="as flown"
+        ),
+    ] = None,
+    chart: Annotated[
+        str, typer.Option(metavar="NAME", help="An order parameter over time beside the picture.", show_default=False)
+    ] = "",
     fps: Annotated[int, typer.Option(min=1, max=120, help="Pictures per second.")] = 25,
     speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Times real time.")] = 10.0,
     changes: options.Set = None,
@@ -75,7 +85,7 @@ def video(
 ) -> None:
     """Make an MP4 or GIF of a flight.
 
-    Example: airflock video vasarhelyi_2018/obstacles --duration 120 --out flight.mp4
+    Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.writable((out, VIDEOS))
     from airflock.plots.picture import flight_of
@@ -85,7 +95,7 @@ def video(
     recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
-        make_video(recording, out, done=done, **choice)
+        make_video(recording, out, done=done, space=space, chart=chart, **choice)
     tables.say(f"saved {out}")
 
 

@@ -6,6 +6,7 @@ import sys
 import threading
 import traceback
 import warnings
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 import typer
@@ -13,6 +14,7 @@ from typer.core import TyperGroup
 
 from airflock import __version__
 from airflock.cli import (
+    certify,
     display,
     evolve,
     fleet,
@@ -27,9 +29,11 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    types,
     watch,
 )
-from airflock.errors import AirflockError, bounded, bounded_lines, printable
+from airflock.cli.usage import usage_fault
+from airflock.errors import AirflockError, bounded, bounded_lines, printable, reason
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
 
@@ -38,7 +42,31 @@ Try [bold]airflock run vasarhelyi_2018/4ms[/bold]. Every verb has --help with an
 
 
 class Verbs(TyperGroup):
-    """The verbs; Ctrl-C ends one of them like any other fault, with one line and status 2."""
+    """The verbs; a wrong command line and Ctrl-C end like any other fault, with one line and status 2."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run a command line; raise an AirflockError where it is wrong."""
+        words = sys.argv[1:] if args is None else list(args)
+        try:
+            result = super().main(words, prog_name, complete_var, False, windows_expand_args, **extra)
+        except typer.Abort as stop:
+            raise AirflockError("interrupted") from stop
+        except Exception as fault:
+            if not hasattr(fault, "format_message"):
+                raise
+            if type(fault).__name__ == "NoArgsIsHelpError":
+                fault.show()  # type: ignore[attr-defined]
+                sys.exit(2)
+            raise AirflockError(usage_fault(fault, words)) from fault
+        return sys.exit(result if isinstance(result, int) else 0) if standalone_mode else result
 
     def invoke(self, ctx: Any) -> Any:
         """Run a verb."""
@@ -58,27 +86,28 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-app.command("run")(run.run)
-app.command("score")(run.score)
-app.command("watch")(watch.watch)
-app.command("sweep")(sweep.sweep)
-app.command("evolve")(evolve.evolve)
-app.command("harden")(harden.harden)
-app.command("import")(imports.import_tracks)
-app.command("export")(imports.export)
-app.command("identify")(identify.identify)
-app.command("infer")(infer.infer)
-app.command("plot")(look.plot)
-app.command("video")(look.video)
-app.command("replay")(look.replay)
-app.command("display")(display.display)
-app.command("fleet")(fleet.fleet)
-app.add_typer(fly.app, name="fly")
-app.command("paper")(paper.paper)
-app.command("presets")(inspect.presets)
-app.command("keys")(keys.keys)
-app.command("validate")(inspect.validate)
-app.command("doctor")(inspect.doctor)
+PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
+    "Fly, measure, look": {
+        "run": run.run, "watch": watch.watch, "plot": look.plot, "video": look.video, "replay": look.replay,
+        "score": run.score, "sweep": sweep.sweep, "display": display.display,
+    },
+    "Search and make safe": {"evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify},
+    "Recordings of others": {
+        "import": imports.import_tracks, "identify": identify.identify, "infer": infer.infer,
+        "export": imports.export,
+    },
+    "Towards real drones": {"fleet": fleet.fleet, "fly": fly.app},
+    "Look something up": {
+        "presets": inspect.presets, "keys": keys.keys, "validate": inspect.validate, "types": types.types,
+        "paper": paper.paper, "doctor": inspect.doctor,
+    },
+}  # fmt: skip
+for _panel, _verbs in PANELS.items():
+    for _name, _verb in _verbs.items():
+        if isinstance(_verb, typer.Typer):
+            app.add_typer(_verb, name=_name, rich_help_panel=_panel)
+        else:
+            app.command(_name, rich_help_panel=_panel)(_verb)
 
 
 def _version(asked: bool) -> None:
@@ -114,7 +143,7 @@ def main() -> None:
     except KeyboardInterrupt as stop:  # while the verb was still being looked up, or after it
         _end("interrupted", stop)
     except OSError as fault:
-        _end(f"{fault.filename or 'output'}: {fault.strerror or fault}", fault)
+        _end(f"{fault.filename or 'output'}: {reason(fault)}", fault)
     except MemoryError as fault:
         _end(f"needs more memory than there is: {fault}; ask for fewer agents, flights or samples", fault)
     except Exception as fault:  # the border: whatever else goes wrong is one line, too

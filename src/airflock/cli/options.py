@@ -37,17 +37,19 @@ PlotFile = Annotated[
 SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help="Save the recordings as netCDF.")]
 
 
-def settings(pairs: list[str] | None, agents: int | None = None, duration: float | None = None) -> dict[str, Any]:
-    """Keys and values from --set and its short forms; values are read as TOML, or else as text."""
+def settings(
+    pairs: list[str] | None, agents: int | None = None, duration: float | None = None, option: str = "--set"
+) -> dict[str, Any]:
+    """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
     found: dict[str, Any] = {}
     faults = []
     for pair in pairs or []:
         key, equals, text = pair.partition("=")
         if not equals or not key.strip():
-            faults.append(f"--set {pair}: write KEY=VALUE, for instance --set model.p_rep=0.14")
+            faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
         try:
-            found[key.strip()] = value(text, f"--set {key.strip()}")
+            found[key.strip()] = value(text, f"{option} {key.strip()}")
         except ScenarioError as fault:
             faults += fault.faults
     if faults:

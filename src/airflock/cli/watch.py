@@ -1,10 +1,11 @@
 """Verb watch: a page in the browser that shows a flight and lets it be played, tuned and measured."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import StudioError
 
 
 def watch(
@@ -16,15 +17,31 @@ def watch(
     law: options.Law = None,
     trust: options.Trust = False,
     agents: options.Agents = None,
+    against: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PRESET|FILE|KEY=VALUE", help="Fly this beside it, same seed and noise; keys may repeat."),
+    ] = None,
     host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes any free one.")] = 8080,
 ) -> None:
     """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what was found.
 
-    Example: airflock watch vasarhelyi_2018/4ms --agents 50
+    Two laws or sets of parameters fly side by side with --against.
+
+    Example: airflock watch vasarhelyi_2018/4ms --agents 50 --against radio.delay=3
     """
     from airflock.studio.watch import watch as open_page
 
     open_page(
-        scenario, options.settings(changes, agents), seed, law=law, trust=trust, host=host, port=port, say=tables.say
-    )
+        scenario, options.settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,
+        against=_rival(against or []), say=tables.say,
+    )  # fmt: skip
+
+
+def _rival(given: list[str]) -> str | dict[str, Any] | None:
+    """What flies beside the scenario: a name, or keys with values."""
+    if any("=" not in each for each in given) and len(given) > 1:
+        raise StudioError(f"--against {' '.join(given)}: give one preset or file, or only KEY=VALUE")
+    if given and "=" not in given[0]:
+        return given[0]
+    return options.settings(given, option="--against") if given else None

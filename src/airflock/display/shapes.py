@@ -43,7 +43,7 @@ def points_of(shape: str, count: int, spacing: float = 3.0, height: float = 15.0
         if path.stat().st_size > MOST_BYTES:
             raise AirflockError(f"{shape}: {path.stat().st_size / 1e6:.0f} MB is more than {MOST_BYTES / 1e6:.0f} MB")
     elif FILE_NAME.fullmatch(shape) or (kind and os.path.isfile(shape)):
-        fault = f"ending {path.suffix} is no picture or mesh" if os.path.isfile(shape) else "no such file"
+        fault = f"ending {path.suffix}: neither a picture nor a mesh" if os.path.isfile(shape) else "no such file"
         raise AirflockError(
             f"{shape}: {fault}; give {', '.join(IMAGES + MESHES)}, or for a text add a space at its end"
         )
@@ -89,7 +89,7 @@ def _pixels_of_image(path: Path) -> NDArray[np.bool_]:
     except AirflockError:
         raise
     except Exception as fault:  # any decoder may fail in any way on a damaged file
-        raise AirflockError(f"{path}: is no image, damaged or cut short: {str(fault).splitlines()[0]}") from fault
+        raise AirflockError(f"{path}: is not an image, damaged or cut short: {str(fault).splitlines()[0]}") from fault
     if image.ndim == 2:
         return image < 128
     if image.shape[2] in (2, 4) and image[:, :, -1].min() < 250:

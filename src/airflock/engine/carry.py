@@ -42,8 +42,11 @@ def _rows(old: State, new: State) -> None:
     slots = np.arange(m)
     if old.slots is not None and not new.has_slots:
         slots[: old.agents] = old.slots
+    other = {f"body{c}" for c in range(len(new.plan.body.beginnings))} if new.plan.body != old.plan.body else set()
     truth = {*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)}
     for name, place in new.driver.ROWS.items():
+        if name in other:  # another body begins to remember anew
+            continue
         source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in truth else None
         if source is not None:
             work[place] = before[had[source]][slots]

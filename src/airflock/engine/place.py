@@ -9,11 +9,11 @@ from airflock.core.agent import State, answer
 from airflock.core.maths import FAR
 from airflock.core.vocabulary import Percept
 from airflock.engine.plan import EDGES, arena_ray, arena_surfaces
-from airflock.engine.tables import faces, polygon_edges, unbuilt
-from airflock.scenarios.geometry import half_sizes
+from airflock.engine.tables import faces, unbuilt
 from airflock.scenarios.scenario import Scenario
-from airflock.world import arena, bvh, edges, goals, rays
+from airflock.world import arena, bvh, edges, goals, polygon, rays
 from airflock.world.inside import inside
+from airflock.world.place import edge_rows, half_sizes, middle, obstacle_rule, raised
 
 
 class Place:
@@ -27,7 +27,8 @@ class Place:
         families = [function for function, count in zip(functions, counts, strict=False) for _ in range(count)]
         self.walls = list(zip(families, rows, strict=True))
         self.half = half_sizes(scenario.world)
-        self.edges, self.corners, self.obstacles = polygon_edges(scenario)
+        self.edges, self.corners, self.obstacles = edge_rows(world)
+        self.obstacle, self.middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
         stands = scenario.stands()
         shapes, later = unbuilt(stands)
         self.scene = shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()
@@ -39,24 +40,36 @@ class Place:
         self.casts = scenario.model.sight is not None  # polygons are part of the scene then
         rule = scenario.model.wall_reach
         self.look = FAR if rule is None else answer(rule, "wall_reach", {"p": scenario.parameters})
-        self.flat = world.arena == "polygon"
+        self.flat = world.arena == "polygon" and world.edges != "periodic"
 
     def surfaces(self, x: float, y: float, z: float) -> Iterator[arena.Surface]:
         """Distance and normal of every wall and every obstacle, as seen from a position."""
         for function, row in self.walls:
             yield function(x, y, z, *row)
+        if self.flat:
+            yield from self.sides(x, y, z)
         for first, last in self.obstacles if not self.casts else ():
-            yield arena.convex_obstacle(x, y, z, self.edges, first, last)
+            yield self.obstacle(x, y, z, self.edges, first, last)
         for ground in (0.0, 1.0)[: self.dims - 1]:
             found = bvh.nearest_of(x, y, z, self.look, ground, *self.scene)
             if found.distance < self.look:
                 yield found
 
+    def sides(self, x: float, y: float, z: float) -> Iterator[arena.Surface]:
+        """Distance and normal of the sides of a polygonal arena that act on a position."""
+        for e in range(self.corners):
+            found = polygon.wall(x, y, z, self.edges, e, self.corners, self.look)
+            if found.distance < self.look:
+                yield found
+        found = polygon.outside(x, y, z, self.edges, self.corners)
+        if found.distance < 0.0:
+            yield found
+
     def excursion(self, x: float, y: float, z: float) -> float:
         """Distance outside the arena or inside an obstacle, m; negative where flying is allowed."""
-        out: float = self.beyond(x, y, z, *self.half, self.edges, self.corners)
+        out: float = self.beyond(x, y, z - self.middle, *self.half, self.edges, self.corners)
         for first, last in self.obstacles:
-            out = max(out, -arena.convex_obstacle(x, y, z, self.edges, first, last).distance)
+            out = max(out, -self.obstacle(x, y, z, self.edges, first, last).distance)
         return float(max(out, -bvh.nearest(x, y, z, 1e8, *self.scene).distance))
 
     def roomy(self, x: float, y: float, z: float) -> bool:
@@ -103,8 +116,12 @@ class Place:
 
     def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float) -> float:
         """Free distance (m) along a unit vector to walls and obstacles."""
-        free: float = self.clear(x, y, z, ux, uy, uz, *self.half, self.edges, self.corners)
-        nearest: float = min([free, *(rays.to_edges(x, y, ux, uy, self.edges, a, b) for a, b in self.obstacles)])
+        free: float = self.clear(x, y, z - self.middle, ux, uy, uz, *self.half, self.edges, self.corners)
+        if self.obstacle is polygon.prism:
+            solid = [polygon.ray_to_prism(x, y, z, ux, uy, uz, self.edges, a, b) for a, b in self.obstacles]
+        else:
+            solid = [rays.to_edges(x, y, ux, uy, self.edges, a, b) for a, b in self.obstacles]
+        nearest: float = min([free, *solid])
         return float(bvh.cast(x, y, z, ux, uy, uz, nearest, 0.0, *self.scene))
 
     def cast(self, at: State, u: tuple[float, float, float], length: float, radius: float) -> float:
@@ -114,7 +131,7 @@ class Place:
             sides = (1e8, 1e8) if self.flat else (self.half[0] - radius, self.half[1] - radius)
             up = self.half[2] - radius if self.dims == 3 else 1e8
             rule = rays.to_box if self.flat else self.clear
-            free = min(free, rule(*at[:3], *u, *sides, up, self.edges, 0))
+            free = min(free, rule(*at[:2], at[2] - self.middle, *u, *sides, up, self.edges, 0))
         return float(bvh.cast(*at[:3], *u, free, radius, *self.scene)) if self.casts else free
 
 

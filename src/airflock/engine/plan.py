@@ -8,6 +8,7 @@ from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
 from airflock.core.parameters import choices
 from airflock.world import arena, edges, excursion, rays
+from airflock.world.place import obstacle_rule, raised
 
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
@@ -40,6 +41,8 @@ class Plan:
     build     : how it is built; bits, record, given_start and grid read it
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
     surfaces  : surface function of each family of walls, in the order of the faces table
+    polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is not 0
+    obstacle  : surface function of an obstacle
     excursion : how far outside a position is
     ray       : free distance along a direction
     body      : what turns commands into motion; body_choices its compile-time constants
@@ -81,6 +84,9 @@ class Plan:
     links: bool = False
     windy: bool = False
     obstacles: bool = False
+    obstacle: Callable[..., Any] = arena.convex_obstacle
+    polygon: bool = False
+    raised: bool = False
     build: Build = Build()
 
     def built(self, **changes: Any) -> "Plan":
@@ -140,7 +146,8 @@ def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], .
     if world.edges == "periodic":
         return (), excursion.beyond_nothing
     three = world.dimensions == "3"
-    ground = {"square": (arena.plane,), "polygon": (arena.plane,), "circle": (arena.cylinder,), "none": ()}[world.arena]
+    caps = (arena.plane,) if three else ()
+    ground = {"square": (arena.plane,), "polygon": caps, "circle": (arena.cylinder,), "none": ()}[world.arena]
     if world.arena == "square" and world.walls == "nearest_per_axis":
         return (arena.slab,), excursion.beyond_box
     beyond = {
@@ -187,5 +194,8 @@ def make_plan(
         edge=EDGES[world.edges],
         dimensions=int(world.dimensions),
         obstacles=bool(world.obstacles),
+        obstacle=obstacle_rule(world),
+        polygon=world.arena == "polygon" and world.edges != "periodic",
+        raised=raised(world),
         **options,
     )

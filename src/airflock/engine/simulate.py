@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import cpu, devices, failure
+from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe
@@ -18,10 +18,10 @@ from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
 from airflock.engine.threads import in_threads
 from airflock.errors import FlightError, ScenarioError
-from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
+from airflock.world.place import half_sizes
 
 
 def plan_of(
@@ -115,6 +115,8 @@ def fly(
         plan = plan.built(given_start=True)
         start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
+    if chosen != "cuda":
+        needs.check(scenario, plan)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
 
@@ -207,6 +209,7 @@ def opened(
     plan = plan_of(scenario, precision=precision, record=record)
     if device == "python":
         plan = plan.built(grid=False, bits=64)
+    needs.check(scenario, plan)
     given = None
     if start is not None:
         given = sound_start(scenario, plan, start)

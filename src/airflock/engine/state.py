@@ -45,6 +45,8 @@ class State:
         self.buffer, self.arrays = layout.filled()
         own = self.arrays
         own["row"][:], own["whole"][:] = tables.row, tables.whole
+        for c, begin in enumerate(plan.body.beginnings if "body0" in driver.ROWS else ()):
+            own["work"][driver.ROWS[f"body{c}"]] = begin
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
         if len(tables.later):

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.plan import WHOLE, Plan
-from airflock.scenarios.geometry import counter_clockwise, half_sizes
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, Clock, Geometry
 from airflock.scenes.tree import Scene
 from airflock.scenes.tree import scene as make_scene
+from airflock.world.arena import heights_of
+from airflock.world.place import edge_rows, half_sizes, inward
 from airflock.world.shapes import APPEARS
 
 AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
@@ -25,7 +26,8 @@ class Tables:
     row   : (columns,) all records of numbers in the plan's order, SI
     whole : (len(WHOLE),) integers
     faces : (face, 4) numbers of each surface, families one after another
-    edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles'
+    edges : (edge, 4) ax ay bx by of polygons, m: the arena's first, then the obstacles', with heights behind them where
+            there are any (`world.place.edge_rows`)
     spans : (obstacle, 2) first and last edge of each obstacle
     shapes, nodes, links : what stands in the scene, as in `scenes.tree`
     later : (shape, 8) bounds (m), time (s) and number of each shape that appears while flying
@@ -73,14 +75,15 @@ def extents(scenario: Scenario) -> tuple[float, float, float]:
         return reach, reach, reach if scenario.dimensions == 3 else 0.0
     if world.arena == "polygon":
         x, y = (max(abs(c[axis]) for c in world.corners) for axis in (0, 1))
-    return x, y, z if scenario.dimensions == 3 else 0.0
+    return x, y, max(map(abs, heights_of(world))) if scenario.dimensions == 3 else 0.0
 
 
 def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
     """Rows of the surface functions of `plan.arena_surfaces`, and how many belong to each family."""
     world, three = scenario.world, scenario.dimensions == 3
     h, z = 0.5 * world.side, 0.5 * world.height
-    caps = [[0.0, 0.0, 1.0, z], [0.0, 0.0, -1.0, z]] if three else []
+    low, high = heights_of(world)
+    caps = [[0.0, 0.0, 1.0, -low], [0.0, 0.0, -1.0, high]] if three else []
     if world.arena == "none" or world.edges == "periodic":
         return [], []
     if world.arena == "circle":
@@ -88,33 +91,9 @@ def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
     if world.arena == "square" and world.walls == "nearest_per_axis":
         rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
         return rows, [len(rows)]
-    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else counter_clockwise(world.corners)
-    rows = []
-    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-        tx, ty = b[0] - a[0], b[1] - a[1]
-        length = (tx * tx + ty * ty) ** 0.5
-        nx, ny = -ty / length, tx / length  # inwards, because the corners run counter-clockwise
-        rows.append([nx, ny, 0.0, -(nx * a[0] + ny * a[1])])
+    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else ()  # a polygon's edges are no planes
+    rows = [list(inward(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
     return rows + caps, [len(rows) + len(caps)]
-
-
-def polygon_edges(scenario: Scenario) -> tuple[list[list[float]], int, list[list[int]]]:
-    """Edges of all polygons, how many are the arena's, and the span of each obstacle."""
-    world = scenario.world
-    edges: list[list[float]] = []
-
-    def add(corners: Any) -> None:
-        ring = counter_clockwise(corners)
-        edges.extend([*a[:2], *b[:2]] for a, b in zip(ring, ring[1:] + ring[:1], strict=True))
-
-    if world.arena == "polygon":
-        add(world.corners)
-    own, spans = len(edges), []
-    for corners in world.obstacles:
-        first = len(edges)
-        add(corners)
-        spans.append([first, len(edges)])
-    return edges, own, spans
 
 
 def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -159,7 +138,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     real = np.float32 if plan.bits == 32 else np.float64
     dt, times = scenario.flight.dt, clock(scenario)
     surfaces, families = faces(scenario)
-    edges, corners, spans = polygon_edges(scenario)
+    edges, corners, spans = edge_rows(scenario.world)
     scene = scenario.stands() if plan.scene else EMPTY
     shapes, later = unbuilt(scene)
     values = read_by_drivers(scenario, dt * times["decide_every"])

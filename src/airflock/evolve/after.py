@@ -21,6 +21,7 @@ from airflock.errors import StudyError
 from airflock.evolve import tables
 from airflock.evolve.executors import Executor
 from airflock.evolve.folder import plain, write
+from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
 from airflock.evolve.race import race
 from airflock.evolve.search import evaluate
@@ -45,6 +46,7 @@ class Result:
     ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
     finalists  : one row each: origin, parameters, fitness on fresh seeds
     failed     : candidates of the search that failed
+    dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
     """
 
     folder: Path
@@ -62,6 +64,7 @@ class Result:
     candidates: int
     failed: int
     finalists: pd.DataFrame
+    dead: str = ""
 
     def document(self) -> dict[str, Any]:
         """The result as plain values, for result.toml and --json."""
@@ -76,6 +79,7 @@ class Result:
                 "largest_in_search": self.largest,
             },
             "origin": self.origin,
+            **({"dead": self.dead} if self.dead else {}),
             "parameters": self.parameters,
             "working_ranges": {
                 "candidates": self.candidates,
@@ -124,10 +128,11 @@ def conclude(
         folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
         float(sound[first.name].iloc[0]), origins[i],
         {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
-        len(good), len(table), len(table) - len(sound), shown,
+        len(good), len(table), len(table) - len(sound), shown, dead(study, list(flown.values())),
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
-    write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
+    if not result.dead:
+        write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
     tables.export(store, folder)
     return result
 

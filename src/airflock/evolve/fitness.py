@@ -36,13 +36,13 @@ class Objective:
         """Value of one flight; nan where it is not finite."""
         if self.own is None and self.name not in values:
             known = ", ".join(key for key, value in values.items() if isinstance(value, (int, float)))
-            raise StudyError(f"objective {self.name} is no order parameter of this scenario; known: {known}")
+            raise StudyError(f"objective {self.name}: unknown order parameter; known: {known}")
         if self.own is not None:
             value = own_value(self.own, self.name, values)
         elif isinstance(values[self.name], (int, float)):
             value = float(values[self.name])
         else:
-            raise StudyError(f"objective {self.name} = {bounded(repr(values[self.name]), 80)} is no number")
+            raise StudyError(f"objective {self.name} = {bounded(repr(values[self.name]), 80)} is not a number")
         return value if math.isfinite(value) else math.nan
 
     def of_candidate(self, flights: Sequence[Mapping[str, Any] | None]) -> float | None:

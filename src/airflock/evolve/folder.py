@@ -5,36 +5,43 @@ import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from airflock import atomic
 from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
-from airflock.evolve.study import Study, same_or_refuse
+from airflock.evolve.study import same_or_refuse
 
 STUDY = "study.toml"
 PACKAGES = ("airflock", "numpy", "numba", "cma", "pymoo")
 
 
-def open_folder(folder: Path, study: Study, *, resume: bool) -> None:
-    """Make a study's folder, or check that it holds this very study.
+class Documented(Protocol):
+    """What is done in a folder and can be continued there: a study, or a campaign of certify."""
+
+    def document(self) -> dict[str, Any]:
+        """Everything that decides its result, as plain values."""
+
+
+def open_folder(folder: Path, study: Documented, *, resume: bool, kind: str = "study") -> None:
+    """Make a study's folder, or check that it holds this very study; likewise for another kind, such as a campaign.
 
     Raises StudyError where the folder holds another study, or this one and `resume` was not asked for.
     """
-    found = folder / STUDY
+    found = folder / f"{kind}.toml"
     if found.is_file():
-        same_or_refuse(folder, read(found), plain(study.document()))
+        same_or_refuse(folder, read(found), plain(study.document()), kind)
         if not resume:
-            raise StudyError(f"{folder}: already holds this study; continue it with --resume, or give another --out")
+            raise StudyError(f"{folder}: already holds this {kind}; continue it with --resume, or give another --out")
         return
     if resume:
-        raise StudyError(f"{folder}: holds no study to resume ({STUDY} is missing)")
+        raise StudyError(f"{folder}: holds no {kind} to resume ({found.name} is missing)")
     # hidden files: what a process that was killed had begun to write
     if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise StudyError(f"{folder}: is not empty and holds no {STUDY}; give a new folder")
+        raise StudyError(f"{folder}: is not empty and holds no {found.name}; give a new folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write(found, study.document(), "A study of Airflock. Written once, when it began.")
+        write(found, study.document(), f"A {kind} of Airflock. Written once, when it began.")
     except OSError as fault:
         raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
 

@@ -117,7 +117,7 @@ def _algorithm(bits: int, population: int, seed: int, mutation: float, crossover
         from pymoo.operators.sampling.rnd import BinaryRandomSampling
         from pymoo.operators.selection.tournament import TournamentSelection
     except ModuleNotFoundError as fault:
-        raise StudyError("the genetic algorithm needs the package pymoo: pip install 'airflock[evolve]'") from fault
+        raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from fault
 
     class Generational(GA):  # type: ignore[misc]
         """Children replace their parents, whoever is better."""

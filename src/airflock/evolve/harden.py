@@ -4,108 +4,31 @@ The optimum of a fitness tolerates a few collisions. The paper makes it safe in 
 radius of collision or a larger delay, so that distances grow, or (ii) by hand, Table S4: more repulsion, more
 alignment, a slower but earlier braking at walls. Each step here flies the same seeds as the one before, so that its
 price in fitness and its gain in distance are differences of pairs.
+
+The table is a list of what to try, no more: what widens distances in one arena drives agents into the trees of another.
+So a step stays only if it gains, costs little, and keeps every constraint that held; else half of it is tried, else it
+is undone. What is left is judged on fresh seeds.
 """
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from airflock.errors import ScenarioError
 from airflock.evolve.after import interval
-from airflock.evolve.folder import STUDY, open_folder, plain
-from airflock.evolve.run import executor_for, run
-from airflock.evolve.search import Watch
-from airflock.evolve.space import Space, declared, with_parameters
-from airflock.evolve.study import Study, make_study
+from airflock.evolve.folder import plain
+from airflock.evolve.landscape import ZERO, why_zero
+from airflock.evolve.space import declared
+from airflock.evolve.steps import RECIPE, Measured, Step, Table, against, flown, moved, recipe
 from airflock.scenarios import formats
-from airflock.scenarios.files import loaded, make
+from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
 
-S4 = "Table S4"
-
-
-@dataclass(frozen=True)
-class Step:
-    """One change of the recipe: factors and additions to keys, and why."""
-
-    name: str
-    factors: Mapping[str, float]
-    reason: str
-
-
-# ratios of Table S4 to Table S1, columns 4, 6, 8 m/s: p_rep 2.3, 1.4, 1.7; C_frict 10, 10, 8; v_shill 0.74, 0.71, 0.61;
-# r0_shill from 0.3, 0.5, 0.1 m to 0, 5, 30 m
-RECIPE = (
-    Step("p_rep up", {"model.p_rep": 1.5}, f"{S4}: gain increased to prevent collisions"),
-    Step("c_frict up", {"model.c_frict": 3.0}, f"{S4}: increased substantially to minimise oscillations"),
-    Step("c_frict up again", {"model.c_frict": 3.0}, f"{S4}: 8 to 10 times in all, here in two steps"),
-    Step(
-        "v_shill down, r0_shill up",
-        {"model.v_shill": 0.7},
-        f"{S4}: a higher r0_shill makes up for it",
-    ),
-)
-EARLIER = 0.5  # s of flight by which r0_shill grows with the last step: 2 to 4 m; the paper's table has 0, 5 and 30 m
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Parameters of one step and what they cost and gain against the optimum, over paired seeds.
-
-    fitness, r_min, n_coll : mean over seeds; r_min (m) is the smallest distance of two agents in a flight
-    cost, gain : fitness lost and smallest distance won (m) against the first step: mean, and 95 % interval
-    """
-
-    name: str
-    reason: str
-    parameters: Mapping[str, float]
-    fitness: float
-    r_min: float
-    n_coll: float
-    cost: tuple[float, float, float]
-    gain: tuple[float, float, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """The step as plain values."""
-        return {
-            "name": self.name,
-            "reason": self.reason,
-            "parameters": dict(self.parameters),
-            "fitness": self.fitness,
-            "r_min": self.r_min,
-            "n_coll": self.n_coll,
-            "cost": list(self.cost),
-            "gain": list(self.gain),
-        }
-
-
-def recipe(scenario: Scenario, steps: Sequence[Step] = RECIPE) -> list[tuple[Step, dict[str, float]]]:
-    """Parameters after each step, the optimum first. Values stay inside their declared ranges."""
-    known = declared(scenario)
-    keys = {key for step in steps for key in step.factors} | {"model.r0_shill"}
-    missing = sorted(key for key in keys if key not in known)
-    if missing:
-        raise ScenarioError(
-            [f"{scenario.name}: no recipe for model {scenario.model.name}: {key} is no number of it" for key in missing]
-        )
-    now = {key: float(known[key][1] or 0.0) for key in sorted(keys)}
-    found = [(Step("optimum", {}, "where hardening begins"), dict(now))]
-    for step in steps:
-        for key, factor in step.factors.items():
-            now[key] = _inside(now[key] * factor, known[key][0])
-        if "model.v_shill" in step.factors:
-            speed = scenario.measured_by().v_flock or 0.0
-            now["model.r0_shill"] = _inside(now["model.r0_shill"] + EARLIER * speed, known["model.r0_shill"][0])
-        found.append((step, dict(now)))
-    return found
-
-
-def _inside(value: float, how: Any) -> float:
-    return min(max(value, float(how.low)), float(how.high))
+WALLS = ("v_shill down, r0_shill up",)  # steps that are about walls: tried first where those are short
+SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
+SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
+COST = 0.05  # of fitness, at most
 
 
 def harden(
@@ -113,19 +36,22 @@ def harden(
     seeds: Sequence[int] = range(100),
     *,
     steps: Sequence[Step] = RECIPE,
+    cost: float = COST,
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[Measured]:
-    """Fly each step of the recipe of Vásárhelyi et al. 2018, Table S4, on the same seeds.
+    """Make an optimum safer by the steps of Vásárhelyi et al. 2018, Table S4, as far as they keep what held.
 
     Parameters
     ----------
     scenario : Scenario, str or path
         An optimum: a scenario, or its name or file, such as best.toml of a study.
     seeds : sequence of int
-        Seeds of the flights of each step.
+        Seeds of the flights of each step; the result is judged on as many seeds after the largest of them.
     steps : sequence of Step
-        What is changed, one after another.
+        What is tried, one after another; those about walls first where walls are what is short.
+    cost : float
+        Fitness that may be given up in all.
     threads : int, optional
         Flights side by side; by default one per core.
     done : callable, optional
@@ -134,91 +60,116 @@ def harden(
     Returns
     -------
     list of Measured
-        The optimum and each step: parameters, fitness, r_min (m), and what the step costs and gains.
+        The optimum, each step that was tried with whether it was kept and why, and last what is left on fresh seeds:
+        parameters, fitness, r_min (m), what it costs and gains, partial fitnesses, contacts with walls.
 
     Raises
     ------
     ScenarioError
-        If the model has no such parameters, or the flights have no fitness.
+        If the model has no such parameters, the flights have no fitness, or the optimum does not fly.
 
     Examples
     --------
     >>> import airflock
-    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
-    >>> steps = airflock.harden(short, range(2))
-    >>> steps[0].name, round(steps[1].parameters["model.p_rep"], 3)
-    ('optimum', 0.195)
+    >>> small = airflock.load("vasarhelyi_2018/4ms", {"agents": 5, "duration": 20.0, "dt": 0.1, "world.side": 120.0})
+    >>> steps = airflock.harden(small, range(4))
+    >>> steps[0].name, steps[-1].name
+    ('optimum', 'on fresh seeds')
     """
     scenario = loaded(scenario)
-    return measured(scenario, recipe(scenario, steps), seeds, threads, done)
-
-
-def measured(
-    scenario: Scenario,
-    plans: Sequence[tuple[Step, dict[str, float]]],
-    seeds: Sequence[int],
-    threads: int | None = None,
-    done: Callable[[], None] | None = None,
-) -> list[Measured]:
-    """Fly each plan's parameters on the same seeds and set them against the first plan."""
-    from airflock.engine.simulate import score_flights
-
-    flown = [with_parameters(scenario, parameters) for _, parameters in plans]
-    rows = score_flights(
-        [found for found in flown for _ in seeds], [s for _ in flown for s in seeds], threads=threads, done=done
-    )
-    if "fitness" not in rows[0] or "r_min" not in rows[0]:
-        raise ScenarioError([f"{scenario.name}: metrics.kind = '{scenario.measures.name}' has no fitness and no r_min"])
-    keys = ("fitness", "r_min", "n_coll")
-    table = {key: np.array([row[key] for row in rows]).reshape(len(plans), -1) for key in keys}
-    found = []
-    for i, (step, parameters) in enumerate(plans):
-        mean, _, low, high = interval((table["fitness"][0] - table["fitness"][i]).tolist())
-        won, _, least, most = interval((table["r_min"][i] - table["r_min"][0]).tolist())
-        means = {key: float(values[i].mean()) for key, values in table.items()}
-        found.append(
-            Measured(step.name, step.reason, parameters, **means, cost=(mean, low, high), gain=(won, least, most))
-        )
+    trial = _Trial(scenario, recipe(scenario, steps)[0], seeds, cost, threads, done)
+    found = [trial.first]
+    short_of_walls = trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0)
+    for step in sorted(steps, key=lambda step: step.name not in WALLS) if short_of_walls else steps:
+        found += trial.tried(step)
+    found.append(trial.on_fresh_seeds())
     return found
 
 
-def cautious(scenario: Scenario, r_coll: float = 1.5, delay: float = 1.0) -> dict[str, float]:
-    """Settings of workaround (i): a radius of collision and a delay so many times as large."""
-    return {"metrics.r_coll": scenario.metrics.r_coll * r_coll, "radio.delay": scenario.radio.delay * delay}
+class _Trial:
+    """Parameters that were kept so far, and their flights; each step is judged against them and the optimum."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        optimum: tuple[Step, dict[str, float]],
+        seeds: Sequence[int],
+        cost: float,
+        threads: int | None,
+        done: Callable[[], None] | None,
+    ):
+        self.scenario, self.cost, self.threads, self.done = scenario, cost, threads, done
+        self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
+        self.optimum = self.table = self._fly(optimum[1], self.seeds)
+        self.kept = [optimum]
+        self.first = against(self.optimum, self.optimum, *optimum)
+        if float(self.optimum["fitness"].max()) < ZERO:
+            told = {name: values.tolist() for name, values in self.optimum.items()}
+            rows = [dict(zip(told, row, strict=True)) for row in zip(*told.values(), strict=True)]
+            raise ScenarioError([f"{scenario.name}: does not fly, so there is nothing to harden{why_zero(rows)}"])
+
+    def _fly(self, parameters: Mapping[str, float], seeds: Sequence[int]) -> Table:
+        return flown(self.scenario, [parameters], seeds, self.threads, self.done)[0]
+
+    def tried(self, step: Step) -> list[Measured]:
+        """The step and, where it breaks something or costs too much, half of it."""
+        found = []
+        for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
+            parameters = moved(self.scenario, self.kept[-1][1], step, part)
+            if parameters == self.kept[-1][1]:
+                break
+            table = self._fly(parameters, self.seeds)
+            broken = self._broken(self.optimum, table)
+            gains = _gains(self.table, table)
+            verdict = broken or ("kept" if gains else "undone: gains neither distance nor room at walls")
+            kept = verdict == "kept"
+            named = replace(step, name=name)
+            found.append(replace(against(self.optimum, table, named, parameters), kept=kept, verdict=verdict))
+            if kept:
+                self.kept.append((named, parameters))
+                self.table = table
+            if not broken:
+                break
+        return found
+
+    def on_fresh_seeds(self) -> Measured:
+        """What was kept, on seeds that chose nothing; the last step is undone until everything that held holds."""
+        before = self._fly(self.kept[0][1], self.fresh)
+        while True:
+            step, parameters = self.kept[-1]
+            after = before if len(self.kept) == 1 else self._fly(parameters, self.fresh)
+            broken = self._broken(before, after)
+            if not broken:
+                break
+            self.kept.pop()
+        left = [step.name for step, _ in self.kept[1:]]
+        said = f"kept: {', '.join(left)}" if left else "nothing was kept: the optimum as it was"
+        return replace(
+            against(before, after, Step("on fresh seeds", {}, said), parameters), verdict=said, kept=bool(left)
+        )
+
+    def _broken(self, before: Table, after: Table) -> str:
+        """What a step breaks or costs too much, in words; empty if nothing."""
+        for name in SAFETY:
+            if name in before:
+                drop, _, low, _ = interval((before[name] - after[name]).tolist())
+                if drop > SLACK and low > 0.0:
+                    return f"undone: {name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
+        for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
+            if name in before:
+                was, now = float((before[name] > 0.0).mean()), float((after[name] > 0.0).mean())
+                if now - was > SLACK:
+                    return f"undone: {100.0 * now:.0f} % of flights {what}, before {100.0 * was:.0f} %"
+        price = float((before["fitness"] - after["fitness"]).mean())
+        return f"undone: costs {price:.3g} of fitness, more than {self.cost:g}" if price > self.cost else ""
 
 
-def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], search: Mapping[str, Any]) -> Study:
-    """Study of workaround (i): the scenario's space, searched under the stricter settings."""
-    own: dict[str, Any] = {"law": scenario.model, "measures": scenario.measures, "vehicle": scenario.vehicle}
-    found = make(scenario.document, f"{scenario.name}, stricter", settings, **own)
-    return replace(make_study({}, found.name, search=search, scenario=found), space=space)
-
-
-def evolved_again(
-    scenario: Scenario,
-    study: Study,
-    settings: Mapping[str, float],
-    folder: Path,
-    seeds: Sequence[int],
-    threads: int | None = None,
-    watch: Watch | None = None,
-    note: Callable[[bool], None] | None = None,
-) -> list[Measured]:
-    """Workaround (i): run the stricter study, then measure its result where the optimum was found.
-
-    folder : of that study; one that is there already is continued
-    watch, note : told of flights of the search and after it, as by `run`
-    """
-    open_folder(folder, study, resume=(folder / STUDY).exists())
-    result = run(study, folder, executor_for(study, threads=threads), watch, note)
-    known = declared(scenario)
-    before = {key: float(known[key][1] or 0.0) for key in result.parameters}
-    told = ", ".join(f"{key} = {value:g}" for key, value in settings.items())
-    plans = [
-        (Step("optimum", {}, "where hardening begins"), before),
-        (Step("evolved again", {}, f"workaround (i): evolved with {told}"), result.parameters),
-    ]
-    return measured(scenario, plans, seeds, threads)
+def _gains(before: Table, after: Table) -> bool:
+    """Whether distances grew or excursions shrank, both with 95 % confidence."""
+    wider = interval((after["r_min"] - before["r_min"]).tolist())[2] > 0.0
+    if "phi_wall" not in before:
+        return wider
+    return wider or interval((before["phi_wall"] - after["phi_wall"]).tolist())[2] > 0.0
 
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def _algorithm(name: str, dimension: int, objectives: int, population: int, seed
         from pymoo.core.termination import NoTermination
         from pymoo.util.ref_dirs import get_reference_directions
     except ModuleNotFoundError as fault:
-        raise StudyError(f"{name} needs the package pymoo: pip install 'airflock[evolve]'") from fault
+        raise StudyError(f"{name} needs pymoo: pip install 'airflock[evolve]'") from fault
     if name == "nsga2":
         algorithm: Any = NSGA2(pop_size=population, eliminate_duplicates=False)
     else:

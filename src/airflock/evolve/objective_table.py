@@ -23,13 +23,13 @@ def read_objectives(
     trust : whether the file of functions that objective.own names may run
     """
     if not isinstance(table, Mapping):
-        return (), [f"objective = {table!r} is no table; write objective.maximise = {table!r}"]
+        return (), [f"objective = {table!r} is not a table; write objective.maximise = {table!r}"]
     faults = []
     for key in table:
         if key not in KEYS:
             near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
             hint = f"did you mean objective.{near[0]}?" if near else f"known: {', '.join(KEYS)}"
-            faults.append(f"objective.{key} is no key; {hint}")
+            faults.append(f"objective.{key}: unknown key; {hint}")
     over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
     if not isinstance(over, str) or over not in OVER_SEEDS:
         faults.append(f"objective.over_seeds = {over!r} is none of {', '.join(OVER_SEEDS)}")
@@ -43,7 +43,7 @@ def read_objectives(
         named = table.get(key, [])
         names = [named] if isinstance(named, str) else named
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            faults.append(f"objective.{key} = {named!r} is no name and no list of names")
+            faults.append(f"objective.{key} = {named!r} is neither a name nor a list of names")
             continue
         how = (key == "maximise", str(over), float(quantile))
         found += [Objective(n, *how, own.get(n), text if n in own else "") for n in names]

@@ -164,7 +164,7 @@ def score_of(study: Study) -> Score:
 def check_timeout(timeout: float | None) -> None:
     """Refuse a time limit in which no flight could fly."""
     if timeout is not None and not timeout > 0.0:
-        raise StudyError(f"timeout = {timeout:g} s is not positive")
+        raise StudyError(f"timeout = {timeout:g} s must be above 0")
 
 
 def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from airflock.errors import StudyError
 from airflock.evolve.executors import Executor, Flight
 from airflock.evolve.fitness import losses
+from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
@@ -79,7 +80,8 @@ def total_flights(study: Study) -> int:
 def search(study: Study, store: Store, executor: Executor, watch: Watch | None = None) -> list[NDArray[np.float64]]:
     """Run a study to its end, or to Ctrl-C; returns the final mean (axis,) of each run whose algorithm has one."""
     tally = Tally(total_flights(study), watch)
-    centres = []
+    centres: list[NDArray[np.float64]] = []
+    seen: list[float | None] = []
     for run in range(study.whole("restarts") + 1):
         seed = (study.whole("seed") << 16) + run
         shape = (len(study.space.axes), len(study.objectives), study.population(run))
@@ -91,6 +93,9 @@ def search(study: Study, store: Store, executor: Executor, watch: Watch | None =
             rows = evaluate(study, store, executor, batch, points, tally.note)
             state.tell(points, losses(rows, study.objectives))
             tally.generation_over([row[0] for row in rows], study.objectives[0].maximise)
+            seen += [row[0] for row in rows]
+            if run == 0:
+                refuse_flat(study, store, generation, seen)
         centre = state.centre()
         if centre is not None:
             centres.append(np.clip(centre, 0.0, 1.0))

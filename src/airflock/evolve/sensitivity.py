@@ -37,7 +37,7 @@ def sensitivity(
         from SALib.sample import morris as sample_morris
         from SALib.sample import sobol as sample_sobol
     except ModuleNotFoundError as fault:
-        raise StudyError("sensitivity needs the package SALib: pip install 'airflock[evolve]'") from fault
+        raise StudyError("sensitivity needs SALib: pip install 'airflock[evolve]'") from fault
     if method not in METHODS:
         raise StudyError(f"method = {method!r} is none of {', '.join(METHODS)}")
     n = len(study.space.axes)

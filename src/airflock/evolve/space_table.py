@@ -25,7 +25,7 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
             hint = f"; did you mean space.{near[0]}?" if near else ""
             if key.startswith("aero.") and not scenario.descends:
                 hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
-            faults.append(f"space.{key} is no number of {scenario.name}{hint}")
+            faults.append(f"space.{key} is not a number of {scenario.name}{hint}")
             continue
         more = _entry_faults(key, entry, known[key][0], known)
         faults += more
@@ -57,10 +57,10 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
     found: dict[str, Mapping[str, Any]] = {}
     faults = []
     if not isinstance(table, Mapping):
-        return {}, [f"space = {table!r} is no table of keys"]
+        return {}, [f"space = {table!r} is not a table of keys"]
     for section, entries in table.items():
         if not isinstance(entries, Mapping):
-            faults.append(f"space.{section} = {entries!r} is no table; write {{ low = ..., high = ... }}")
+            faults.append(f"space.{section} = {entries!r} is not a table; write {{ low = ..., high = ... }}")
         elif "." in section or (entries and set(entries) <= set(ENTRY)):
             found[section] = entries
         else:
@@ -68,7 +68,9 @@ def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
                 if isinstance(entry, Mapping):
                     found[f"{section}.{name}"] = entry
                 else:
-                    faults.append(f"space.{section}.{name} = {entry!r} is no table; write {{ low = ..., high = ... }}")
+                    faults.append(
+                        f"space.{section}.{name} = {entry!r} is not a table; write {{ low = ..., high = ... }}"
+                    )
     return found, faults
 
 
@@ -79,7 +81,9 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if name not in ENTRY:
             near = get_close_matches(name, ENTRY, n=1, cutoff=0.5)
-            faults.append(f"space.{key}.{name} is no key; {f'did you mean {near[0]}?' if near else ', '.join(ENTRY)}")
+            faults.append(
+                f"space.{key}.{name}: unknown key; {f'did you mean {near[0]}?' if near else ', '.join(ENTRY)}"
+            )
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
             faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
         elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
@@ -94,7 +98,9 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
             faults.append(f"space.{key}.integer = {value!r} is none of true, false")
         elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
             near = get_close_matches(str(value), known, n=1, cutoff=0.5)
-            faults.append(f"space.{key}.{name} = {value!r} is no number{f'; did you mean {near[0]}?' if near else ''}")
+            faults.append(
+                f"space.{key}.{name} = {value!r} is not a number{f'; did you mean {near[0]}?' if near else ''}"
+            )
     if faults or "fixed" in entry or "tied" in entry:
         return faults
     return _range_faults(_axis(key, entry, how))

@@ -227,5 +227,5 @@ def values_of(text: Any) -> dict[str, Any]:
 def _point(text: Any) -> list[float]:
     found = json_value(text)
     if not isinstance(found, list) or not all(isinstance(x, (int, float)) and math.isfinite(x) for x in found):
-        raise FormatError("is no list of finite numbers")
+        raise FormatError("is not a list of finite numbers")
     return [float(x) for x in found]

@@ -14,10 +14,11 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.bounds import usual_space
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_objectives
 from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
-from airflock.evolve.space import Space, full_space
+from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
 from airflock.scenarios import formats, schema
 from airflock.scenarios.files import load, tells_of_study
@@ -82,6 +83,7 @@ class Study:
     search: Search
     title: str = ""
     device: str = "cpu"  # cpu or cuda: they agree to rounding, and a study's identity is to the bit
+    notes: tuple[str, ...] = ()  # where its bounds come from, for a person to read
 
     def whole(self, name: str) -> int:
         """A whole number of the search."""
@@ -156,7 +158,7 @@ def load_study(
     tables: Mapping[str, Any] | None = None,
     trust: bool = False,
 ) -> Study:
-    """Study from a file, from a shipped study's name, or of a scenario as it is, over all its model's ranges.
+    """Study from a file, from a shipped study's name, or of a scenario as it is, between bounds of its own.
 
     settings : keys of the scenario to change, such as "duration"
     search   : keys of the table [search] to change, such as "population"
@@ -194,15 +196,16 @@ def make_study(
     for key in document:
         if key not in KEYS:
             near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
-            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
+            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
     if scenario is None:
         scenario = _scenario(document, where, settings or {}, folder, trust)
     space: Space | None
+    notes: list[str] = []
     if "space" in document:
         space, more = read_space(document["space"], scenario)
         faults += more
     else:
-        space = full_space(scenario)
+        space, notes = usual_space(scenario)
     objectives, more = read_objectives(document.get("objective", {}), scenario, folder, trust=trust)
     faults += more
     table = document.get("search", {})
@@ -215,7 +218,7 @@ def make_study(
         faults += _search_faults(found, len(objectives))
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    return Study(scenario, space, objectives, found, str(document.get("title", "")))
+    return Study(scenario, space, objectives, found, str(document.get("title", "")), notes=tuple(notes))
 
 
 def _scenario(
@@ -223,7 +226,7 @@ def _scenario(
 ) -> Scenario:
     named, keys = document.get("scenario"), document.get("set", {})
     if not isinstance(named, str) or not isinstance(keys, Mapping):
-        wrong = f"scenario = {named!r} is missing or no name" if not isinstance(named, str) else "set is no table"
+        wrong = f"scenario = {named!r} is missing or not a name" if not isinstance(named, str) else "set is not a table"
         raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
     beside = folder / named if folder is not None else None
     return load(beside if beside is not None and is_file(beside) else named, {**keys, **settings}, trust=trust)
@@ -273,10 +276,10 @@ def _shown(value: Any) -> str:
     return "missing" if value is None else str(value) if len(str(value)) < 60 else f"{str(value)[:57]}..."
 
 
-def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
+def same_or_refuse(folder: Path, old: Mapping[str, Any], new: Mapping[str, Any], kind: str = "study") -> None:
     """Raise StudyError, naming what differs, if a folder holds another study than the one that is asked for."""
     found = differences(old, new)
     if not found:
         return
     shown = found[:8] + ([f"and {len(found) - 8} more"] if len(found) > 8 else [])
-    raise StudyError(f"{folder}: holds another study: {'; '.join(shown)}; give another --out")
+    raise StudyError(f"{folder}: holds another {kind}: {'; '.join(shown)}; give another --out")

@@ -55,7 +55,7 @@ def _fitness(text: Any, count: int) -> list[float]:
     found = json_value(text)
     sound = isinstance(found, list) and len(found) == count
     if not sound or not all(value is None or isinstance(value, (int, float)) for value in found):
-        raise FormatError(f"fitness is no list of {count} numbers")
+        raise FormatError(f"fitness is not a list of {count} numbers")
     return [math.nan if value is None else float(value) for value in found]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, reason
 
 KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",
@@ -50,7 +50,7 @@ def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as wrong:
-        raise ScenarioError([f"{path}: {wrong.strerror}"]) from wrong
+        raise ScenarioError([f"{path}: {reason(wrong)}"]) from wrong
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as wrong:
         raise ScenarioError([f"{path}: {wrong}"]) from wrong
     found, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]

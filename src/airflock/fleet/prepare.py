@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
+from shapely.geometry import Polygon
+
 from airflock.body.motion import Parameters as Multirotor
 from airflock.core.parameters import Parameters
 from airflock.core.silence import Parameters as Silence
@@ -13,7 +15,7 @@ from airflock.onboard.card import VERSION
 from airflock.onboard.safety import Safety
 from airflock.scenarios.scenario import Scenario
 from airflock.world import arena
-from airflock.world.place import counter_clockwise, inward
+from airflock.world.place import inward
 
 HEIGHT = 20.0  # m; our choice: above trees and people, below most limits
 MARGIN = 30.0  # m; our choice: a flock turns some metres beyond the law's soft walls
@@ -44,8 +46,8 @@ def card_document(
             [f"{scenario.name}: the law {scenario.model.name} is not in the package; a card names laws only"]
         )
     limits = replace(limits_of(scenario), **(safety or {}))
-    half = 0.5 * scenario.world.height if scenario.dimensions == 3 else 0.0
-    height = max(HEIGHT, half + limits.base) if height is None else height
+    low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
+    height = max(HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
     held = scenario.radio.kind == "constant" and as_simulated
@@ -73,7 +75,7 @@ def card_document(
         "fence": {
             "corners": outline(scenario.world, margin),
             "low": min(2.0, 0.5 * limits.base),
-            "high": max(height + half, top) + SPARE,
+            "high": max(height + high, top) + SPARE,
         },
         "height": height,
         "period": period,
@@ -98,13 +100,16 @@ def _speed(scenario: Scenario) -> float:
 
 
 def outline(world: arena.Parameters, margin: float) -> list[list[float]]:
-    """Corners of a convex fence around an arena, margin (m) outside its walls."""
+    """Corners of a fence around an arena, margin (m) outside its walls."""
     if world.arena == "circle":
         reach = (world.radius + margin) / math.cos(math.pi / CIRCLE)
         angles = [2.0 * math.pi * k / CIRCLE for k in range(CIRCLE)]
         return [[reach * math.cos(a), reach * math.sin(a)] for a in angles]
+    if world.arena == "polygon":
+        wider = Polygon(world.corners).buffer(margin, join_style="mitre")
+        return [[x, y] for x, y in wider.exterior.coords[:-1]]
     h = 0.5 * world.side
-    ring: Any = [(-h, -h), (h, -h), (h, h), (-h, h)] if world.arena == "square" else counter_clockwise(world.corners)
+    ring = [(-h, -h), (h, -h), (h, h), (-h, h)]
     sides = [inward(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
     corners = []
     for one, two in zip([sides[-1], *sides[:-1]], sides, strict=True):  # each corner moves with its two sides

@@ -15,6 +15,7 @@ from airflock.core.agent import State
 from airflock.core.contract import Body
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
+from airflock.errors import RuleError
 from airflock.fleet import telemetry
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
@@ -37,7 +38,7 @@ VELOCITY_IGNORED = 0x0038
 LOCAL_NED, BODY_NED = 1, 8
 GROUND = 0.15  # m; lower is landed
 FRESH = 0.5  # s between setpoints that still are one stream
-GIVEN = (*(letter + axis for letter in "vmcgw" for axis in "xyz"), "dt", "b")  # what a body may ask for
+GIVEN = (*(letter + axis for letter in "vmcgw" for axis in "xyz"), "dt", "b", "memory")  # what a body may ask for
 SINK = 1.0  # m/s, of a landing
 
 Vector = tuple[float, float, float]
@@ -67,8 +68,12 @@ class Vehicle:
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.lifting = False
+        for name in asks(body.move, "move", body.name):
+            if name not in GIVEN:
+                raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
         self._asked = tuple(GIVEN.index(name) for name in asks(body.move, "move", body.name))
         self._old = choices(b).get("integration", body.integration) == "old"
+        self.memory = body.Memory() if body.Memory is not None else None
         self.frozen: State | None = None  # a navigation that stands still, if it does
 
     def frame(self, message: Any) -> bytes:
@@ -257,11 +262,13 @@ class Vehicle:
         self.steps += 1
         if not self.armed:
             self.state = State(*self.state[:3], 0.0, 0.0, 0.0)
+            self.memory = type(self.memory)() if self.memory is not None else None
             return
         s, c = self.state, self.wish()
         command = c if self.motor else (s.vx, s.vy, s.vz - 5.0)
-        known = (*s[3:], *self.measured[3:], *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b)
-        velocity = self.body.move(*(known[k] for k in self._asked))
+        known = (*s[3:], *self.measured[3:], *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
+        moved = self.body.move(*(known[k] for k in self._asked))
+        velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         vx, vy, vz = s[3:] if self._old else velocity
         self.state = State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity)
         if self.state.z <= 0.0 and c[2] <= 0.0:

@@ -272,4 +272,4 @@ def read_heard(path: Any) -> pd.DataFrame:
     try:
         return packets.checked(pd.read_csv(path, skipinitialspace=True))
     except (OSError, ValueError, pd.errors.ParserError) as fault:
-        raise RecordingError(f"{path}: is no table of packets: {str(fault).splitlines()[0]}") from fault
+        raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault

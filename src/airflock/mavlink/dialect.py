@@ -15,7 +15,7 @@ def common() -> Any:
     try:
         from pymavlink.dialects.v20 import common as found
     except ImportError as fault:
-        raise LinkError("MAVLink needs pymavlink, which is not installed: pip install 'airflock[fly]'") from fault
+        raise LinkError("MAVLink needs pymavlink: pip install 'airflock[fly]'") from fault
     return found
 
 

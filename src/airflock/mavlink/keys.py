@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from airflock.errors import LinkError
+from airflock.errors import LinkError, reason
 
 LENGTH = 32  # bytes
 
@@ -22,8 +22,10 @@ def read_key(path: Path) -> bytes:
     """Key from its file; refused if others can read it."""
     try:
         mode, text = path.stat().st_mode, path.read_text(encoding="ascii").strip()
-    except (OSError, UnicodeDecodeError) as fault:
-        raise LinkError(f"{path}: no key can be read: {getattr(fault, 'strerror', None) or 'not a text'}") from fault
+    except OSError as fault:
+        raise LinkError(f"{path}: the key cannot be read: {reason(fault)}") from fault
+    except UnicodeDecodeError as fault:
+        raise LinkError(f"{path}: is not a key; give {2 * LENGTH} hexadecimal digits") from fault
     if mode & 0o077:
         raise LinkError(f"{path}: is readable by others (mode {mode & 0o777:04o}); chmod 600 {path}")
     try:

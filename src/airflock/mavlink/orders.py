@@ -102,7 +102,5 @@ def _ed25519() -> _Ed25519:
         from cryptography.exceptions import InvalidSignature
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
     except ImportError as fault:
-        raise LinkError(
-            "orders of the operator need cryptography, which is not installed: pip install 'airflock[fly]'"
-        ) from fault
+        raise LinkError("orders of the operator need cryptography: pip install 'airflock[fly]'") from fault
     return _Ed25519(Ed25519PrivateKey, Ed25519PublicKey, InvalidSignature)

@@ -19,7 +19,8 @@ class Parameters(Record):
         meaning="which order parameters, or a file of your own that ends in .py. vasarhelyi: of Vásárhelyi et al. 2018 "
         "with fitness; kidger: flocked, sub-swarms, avoidance; dimock: power of a flock of wings (Dimock & Selig "
         "2003); zapotecatl: extension, polarization and quality of Zapotecatl et al. 2016; groups: these with "
-        "sub-groups told apart; order: only polarisation, milling, speed and shape",
+        "sub-groups told apart; contacts: with walls and obstacles as well as with each other; order: only "
+        "polarisation, milling, speed and shape",
     )
     stop: str = choice(
         "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",
@@ -53,8 +54,9 @@ class Parameters(Record):
         meaning="an agent is flocked within this distance of the flock's centre",
     )  # fmt: skip
     r_body: float = quantity(
-        0.5, "m", low=0.0, high=1e3, source="our choice", meaning="radius of an agent that must not touch the scene"
-    )
+        0.5, "m", low=0.0, high=1e3, source="our choice",
+        meaning="radius of an agent that must not touch walls, obstacles or the scene",
+    )  # fmt: skip
     r_cluster: float | None = quantity(
         None,
         "m",

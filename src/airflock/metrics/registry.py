@@ -11,6 +11,7 @@ from airflock.errors import RuleError
 from airflock.metrics import (
     avoidance,
     collisions,
+    contacts,
     correlation,
     environment,
     excursion,
@@ -38,8 +39,8 @@ METRICS: dict[str, Metric] = {
     for found in map(
         metric,
         (
-            avoidance, collisions, correlation, environment, excursion, flocked, groups, marks, milling, nearest,
-            polarisation, power, quality, rotation, shape, speed, steadiness, swarms,
+            avoidance, collisions, contacts, correlation, environment, excursion, flocked, groups, marks, milling,
+            nearest, polarisation, power, quality, rotation, shape, speed, steadiness, swarms,
         ),
     )
 }  # fmt: skip
@@ -71,6 +72,11 @@ SETS: dict[str, MetricSet] = {
             "zapotecatl", QUALITY, parameters.Parameters, _counted(QUALITY), best="quality", faults=quality.faults
         ),
         MetricSet("groups", GROUPS, parameters.Parameters, _counted(GROUPS), best="quality", faults=quality.faults),
+        MetricSet(
+            "contacts",
+            _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
+            parameters.Parameters,
+        ),
         MetricSet("order", _named("speed", "polarisation", "milling", "shape"), parameters.Parameters),
         MetricSet(
             "kidger",

@@ -20,12 +20,13 @@ from airflock.core.agent import State
 from airflock.core.contract import Model, model
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, ParameterError
+from airflock.errors import AirflockError, CardError, ParameterError, reason
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
+from airflock.onboard.fence import Fence
 from airflock.onboard.safety import Safety
 from airflock.world import arena
-from airflock.world.place import Place, Shapes, counter_clockwise, inward, polygon_fault
+from airflock.world.place import Place, Shapes, polygon_fault
 from airflock.world.shapes import COLUMNS
 
 VERSION = 1
@@ -46,7 +47,7 @@ class Card:
     mission  : number of the mission; expires: Unix time, s
     site     : origin of local coordinates; members: system ids, in the order of their layers
     operator : public key of who may give orders, 32 bytes; empty: nobody may
-    fence    : sides as distance functions `a x + b y + d` (m); low, high: heights above the site, m
+    fence    : corners; low, high: heights above the site, m
     height   : at which the flock flies, m above the site; in space, of the arena's centre
     hash     : SHA-256 of the document without its own entry
     """
@@ -67,7 +68,7 @@ class Card:
     delay: float
     silence: Silence
     safety: Safety
-    fence: tuple[tuple[float, float, float, float], ...]
+    fence: Fence
     low: float
     high: float
     height: float
@@ -91,13 +92,12 @@ class Card:
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
         """Distance (m, negative beyond) and inward normal of the fence's sides and of obstacles, for the limiter."""
-        found = [(a * own.x + b * own.y + c * own.z + d, a, b, c) for a, b, c, d in self.fence]
+        found = self.fence.sides(own.x, own.y)
         return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solids(*self.law_state(own)[:3])]
 
     def outside(self, own: State) -> float:
         """Distance beyond the fence or its heights, m; negative inside."""
-        out = max(-(a * own.x + b * own.y + d) for a, b, _, d in self.fence)
-        return max(out, own.z - self.high)
+        return max(self.fence.outside(own.x, own.y), own.z - self.high)
 
     def law_state(self, own: State) -> State:
         """A local state as the law counts heights: from the arena's centre, or from the ground of a scene."""
@@ -123,7 +123,7 @@ def read_card(path: Path) -> Card:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as fault:
-        raise CardError([f"{path}: {fault.strerror}"]) from fault
+        raise CardError([f"{path}: {reason(fault)}"]) from fault
     except (ValueError, RecursionError) as fault:
         raise CardError([f"{path}: is not JSON: {fault}"]) from fault
     return card_of(document, str(path))
@@ -189,14 +189,13 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
         look=1e30 if law.wall_reach is None else float(law.wall_reach(parameters)), casts=law.sight is not None,
     )  # fmt: skip
-    ring = counter_clockwise(corners)
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
         silence=silence, safety=safety,
-        fence=tuple(inward(a, b) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)),
+        fence=Fence(corners),
         low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
         period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
     )  # fmt: skip
@@ -212,11 +211,11 @@ def _geometry_faults(card: Card) -> list[str]:
             f"fence: layers from {card.safety.base:g} to {top:g} m do not lie between fence.low = {card.low:g} m and "
             f"fence.high = {card.high:g} m; raise fence.high or lower safety.layer"
         )
-    half = 0.0 if card.flat else 0.5 * world.height
-    if card.height - half < card.low or card.height + half > card.high:
+    low, high = (0.0, 0.0) if card.flat else arena.heights_of(world)
+    if card.height + low < card.low or card.height + high > card.high:
         faults.append(
-            f"height = {card.height:g} m ± {half:g} m does not lie between fence.low = {card.low:g} m and "
-            f"fence.high = {card.high:g} m"
+            f"height = {card.height:g} m from {low:+g} m to {high:+g} m does not lie between fence.low = {card.low:g} "
+            f"m and fence.high = {card.high:g} m"
         )
     for x, y in _outline(world):
         if card.outside(State(x, y, card.height, 0.0, 0.0, 0.0)) > 1e-6:

@@ -56,7 +56,7 @@ class Paper:
         """Claims as of `run`, and by part what is behind them; of all parts also the sentences that nothing tests."""
         known = (*self.long, *self.parts)
         if only is not None and only not in known:
-            raise AirflockError(f"only = {only!r} is no part; known: {', '.join(known)}")
+            raise AirflockError(f"only = {only!r}: unknown part; known: {', '.join(known)}")
         statements = load(self.package)  # a fault in it is told before anything flies
         if progress is None:
             with progress_bar() as bar:

@@ -16,8 +16,9 @@ from airflock.plots.slices import slices
 from airflock.plots.through import through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
+from airflock.plots.wash import wash
 
 __all__ = [
     "KINDS", "convergence", "exposure", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "rotations",
-    "rules", "save_figure", "series", "slices", "stood", "through", "trajectories", "transfer",
+    "rules", "save_figure", "series", "slices", "stood", "through", "trajectories", "transfer", "wash",
 ]  # fmt: skip

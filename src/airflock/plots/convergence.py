@@ -1,19 +1,21 @@
 """Convergence of a study: best so far and mean of each generation against its evaluations."""
 
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.plots import style
 
 
-def convergence(table: pd.DataFrame, objective: str, *, maximise: bool = True, what: str = "") -> Figure:
+def convergence(
+    table: pd.DataFrame, objective: str, *, maximise: bool = True, what: str = "", ax: Axes | None = None
+) -> Figure:
     """Fitness over generations.
 
     table     : one row a candidate: run, generation, and the column `objective` (nan: failed)
-    objective : what is drawn; what : title
+    objective : what is drawn; what : title; ax : axes to draw into, instead of a new figure
     """
-    figure = style.Picture(5.6, 3.4)
-    axes = figure.subplots()
+    figure, axes = style.place(ax, 5.6, 3.4)
     for i, (run, rows) in enumerate(table.groupby("run")):
         groups = rows.groupby("generation")[objective]
         color = style.LINES[i % len(style.LINES)]

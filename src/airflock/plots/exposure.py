@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -11,7 +12,18 @@ from scipy.ndimage import gaussian_filter
 
 from airflock.plots import style
 from airflock.plots.save import positive
-from airflock.plots.scene import Paths, details_of, extent, name_of, paths_of, speed_range, view_of, walls, world_of
+from airflock.plots.scene import (
+    Paths,
+    details_of,
+    extent,
+    name_of,
+    paths_of,
+    speed_range,
+    through_face,
+    view_of,
+    walls,
+    world_of,
+)
 
 Array = NDArray[Any]
 WINDOW = 30.0  # s
@@ -25,12 +37,18 @@ LAMP = LinearSegmentedColormap.from_list("lamp", ["#FF5A1F", "#FFA23A", "#FFE3B0
 
 
 def exposure(
-    recording: xr.Dataset, *, start: float | None = None, stop: float | None = None, fading: float | None = None
+    recording: xr.Dataset,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    fading: float | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Light trails of all agents, brighter where they linger or meet, coloured by speed; 3-D recordings obliquely.
 
     start, stop : window of time, s; by default the last 30 s
     fading      : time after which a trail has faded to 37 %, s; by default half the window
+    ax          : axes to draw into, instead of a new figure
     """
     shown = paths_of(recording, start, stop, last=WINDOW)
     world = world_of(recording)
@@ -40,11 +58,12 @@ def exposure(
     tau = fading if fading is not None else max(0.5 * length, 1e-6)
     positive(fading=tau)
     x, y = view(shown.position)
-    picture = develop(light(shown, x, y, box, tau))
-    width = 6.4
-    figure = style.Picture(width, width * picture.shape[0] / picture.shape[1], style.NIGHT)
-    figure.set_layout_engine("none")
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    ways = np.stack([shown.position[:-1], shown.position[1:]], axis=2).transpose(
+        0, 3, 2, 1
+    )  # (frame, agent, end, axis)
+    leaps = through_face(ways.reshape(-1, 2, ways.shape[3]), world).reshape(ways.shape[:2])
+    picture = develop(light(shown, x, y, box, tau, leaps))
+    figure, axes = _sky(picture) if ax is None else style.place(ax, 0.0, 0.0)
     axes.imshow(picture, extent=box, origin="lower", interpolation="lanczos", zorder=0)
     for corners, obstacle in walls(world):
         wx, wy = view(corners)
@@ -58,9 +77,25 @@ def exposure(
     return figure
 
 
-def light(shown: Paths, x: Array, y: Array, box: tuple[float, float, float, float], fading: float) -> Array:
+def _sky(picture: Array) -> tuple[Figure, Any]:
+    """A figure that the picture fills."""
+    width = 6.4
+    figure = style.Picture(width, width * picture.shape[0] / picture.shape[1], style.NIGHT)
+    figure.set_layout_engine("none")
+    return figure, figure.add_axes((0.0, 0.0, 1.0, 1.0))
+
+
+def light(
+    shown: Paths,
+    x: Array,
+    y: Array,
+    box: tuple[float, float, float, float],
+    fading: float,
+    leaps: Array | None = None,
+) -> Array:
     """Light that falls on each pixel (row, column, colour): one unit per agent and second, faded since.
 
+    leaps : (frame, agent), whether the way to the next frame leads through a periodic face and is dark
     x, y : positions in the picture (time, agent), m; box : its left, right, bottom, top, m; fading : s
     """
     left, right, bottom, top = box
@@ -76,7 +111,8 @@ def light(shown: Paths, x: Array, y: Array, box: tuple[float, float, float, floa
         times, last = np.array([shown.times[0] - 1.0, shown.times[0]]), 1
     else:
         times = shown.times
-    moved = np.hypot(np.diff(px, axis=0), np.diff(py, axis=0))
+    dark = np.zeros((last, x.shape[1]), bool) if leaps is None or len(leaps) != last else leaps
+    moved = np.where(dark, 0.0, np.hypot(np.diff(px, axis=0), np.diff(py, axis=0)))
     flashes = int(np.clip(np.ceil(np.nanmax(moved, initial=0.0) / STEP), 1, 2000))
     share = (np.arange(flashes) + 0.5)[:, None, None] / flashes
     for a in range(0, last, CHUNK):
@@ -85,7 +121,7 @@ def light(shown: Paths, x: Array, y: Array, box: tuple[float, float, float, floa
         gap = (times[a + 1 : b + 1] - times[a:b])[:, None]
         age = times[-1] - times[a:b, None] - share * gap
         weight = np.broadcast_to(np.exp(-age / fading) * gap / flashes, fx.shape)
-        seen = np.isfinite(fx) & np.isfinite(fy)
+        seen = np.isfinite(fx) & np.isfinite(fy) & ~dark[a:b]
         color = LAMP(np.nan_to_num(ft[seen]))[:, :3].T
         _spread(film, fx[seen], fy[seen], weight[seen] * color, rows, columns)
     return np.moveaxis(film.reshape(3, rows, columns), 0, -1)

@@ -20,13 +20,21 @@ UNITS = {"phi_vel": "m/s", "r_min_mean": "m", "r_min": "m", "phi_wall": "m"}
 WRITTEN = 120  # cells; in a larger map the numbers would not be legible
 
 
-def heatmap(table: pd.DataFrame, keys: Sequence[str], value: str, *, scenario: Scenario | None = None) -> Figure:
+def heatmap(
+    table: pd.DataFrame,
+    keys: Sequence[str],
+    value: str,
+    *,
+    scenario: Scenario | None = None,
+    ax: Axes | None = None,
+) -> Figure:
     """One order parameter over one or two swept keys.
 
     table    : tidy, one row per flight: a column for each key, one for `value`, usually `seed`
     keys     : one or two swept keys; the first is the horizontal axis
     value    : order parameter drawn: its mean over the rows of a point; with one key also ±1 standard deviation
     scenario : what was swept, for the title and for the units of its model's keys
+    ax       : axes to draw into, instead of a new figure
     """
     missing = [name for name in (*keys, value) if name not in table.columns]
     if missing:
@@ -35,9 +43,7 @@ def heatmap(table: pd.DataFrame, keys: Sequence[str], value: str, *, scenario: S
         raise AirflockError(
             f"a sweep of {len(keys)} keys with {len(table)} rows cannot be drawn; give 1 or 2 keys and rows"
         )
-    figure = style.Picture(5.2, 3.4) if len(keys) == 1 else style.Picture(5.6, 4.4)
-    figure.set_layout_engine("constrained")
-    axes = figure.subplots()
+    figure, axes = style.place(ax, *((5.2, 3.4) if len(keys) == 1 else (5.6, 4.4)), layout="constrained")
     labels = [_label(key, scenario) for key in keys]
     shown = f"{value} ({UNITS.get(value, '1')})"
     flights = table.groupby(list(keys), sort=True)[value].count()

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.errors import AirflockError
@@ -16,13 +17,15 @@ from airflock.plots.series import series
 from airflock.plots.through import through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
+from airflock.plots.wash import wash
 from airflock.recordings.files import load_recording
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
-KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked")
+KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash")
+ONE_PANEL = ("trajectories", "exposure", "scene", "space", "rays", "wash")  # pictures that can be drawn into axes
 OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
 What = Scenario | xr.Dataset | str | os.PathLike[str]
 
@@ -37,6 +40,7 @@ def plot(
     settings: Mapping[str, Any] | None = None,
     law: Any = None,
     trust: bool = False,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw a flight, a recording, or the rules of a model.
 
@@ -45,8 +49,8 @@ def plot(
     what : Scenario, xarray.Dataset, str or path
         A scenario or the name of one, which is flown; or a recording or a file (.nc) of one.
     kind : str
-        trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; rules of a
-        model; transfer, the partial fitnesses.
+        trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; wash of a
+        formation of wings; rules of a model; transfer, the partial fitnesses.
     seed : int
         Seed of the flight, where a scenario is flown.
     start, stop : float, optional
@@ -57,11 +61,14 @@ def plot(
         A flocking law of your own, or one by its name or file, that flies instead of the file's, as in `airflock.load`.
     trust : bool
         Whether code that the scenario file names may run.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw into, instead of a new figure; for pictures of one panel. Trajectories in space need axes with
+        projection="3d".
 
     Returns
     -------
     matplotlib.figure.Figure
-        `airflock.plots.save_figure(figure, "flight.png")` writes it.
+        The figure, also that of `ax`; `airflock.plots.save_figure(figure, "flight.png")` writes it.
 
     Raises
     ------
@@ -77,24 +84,28 @@ def plot(
     """
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}")
+    if ax is not None and kind not in ONE_PANEL:
+        raise AirflockError(f"ax: kind = {kind!r} has panels of its own; only {', '.join(ONE_PANEL)} take axes")
     if kind in OF_A_SCENARIO:
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario) if kind == "rules" else transfer(scenario)
-    return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop)
+    return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop, ax)
 
 
-def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None) -> Figure:
+def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
     if kind in ("scene", "space"):
-        return through(recording, start=start, stop=stop, space=kind == "space")
+        return through(recording, start=start, stop=stop, space=kind == "space", ax=ax)
     if kind == "rays":
-        return rays(recording, start=start)
+        return rays(recording, start=start, ax=ax)
+    if kind == "wash":
+        return wash(recording, start=start, ax=ax)
     if kind == "flocked":
         return flocked(recording, start=start, stop=stop)
     if kind == "series":
         return series(recording, start=start, stop=stop)
     if kind == "exposure":
-        return exposure(recording, start=start, stop=stop)
-    return trajectories(recording, start=start, stop=stop)
+        return exposure(recording, start=start, stop=stop, ax=ax)
+    return trajectories(recording, start=start, stop=stop, ax=ax)
 
 
 def _is_file(what: Any) -> bool:

@@ -1,41 +1,18 @@
 """Rays of one agent at one instant: which were cast, which met something, and which one it flew along."""
 
-from typing import Any, NamedTuple
-
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from airflock.core.agent import Heard, State, decide
-from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
+from airflock.core.agent import Heard, State
+from airflock.engine.place import Course, Place
 from airflock.errors import RecordingError
 from airflock.plots import style
 from airflock.plots.scene import details_of, flown_with, name_of, paths_of
 from airflock.plots.through import ground_plans, nearby
-
-
-class Ray(NamedTuple):
-    """A cast: its direction, how far it was free and how far it looked, m."""
-
-    x: float
-    y: float
-    z: float
-    free: float
-    length: float
-
-
-class Watched(Senses):
-    """Senses that keep every cast."""
-
-    cast_rays: list[Ray]
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance along the unit vector u, m."""
-        free = super().cast(ux, uy, uz, length, radius)
-        self.cast_rays.append(Ray(ux, uy, uz, free, length))
-        return free
+from airflock.stage.rays import Ray, cast_rays
 
 
 def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], tuple[float, float, float]]:
@@ -56,22 +33,15 @@ def cast_at(recording: xr.Dataset, agent: int, frame: int) -> tuple[list[Ray], t
         course.advance(k * elapsed, elapsed, flock(k))
     now = flock(frame)
     place.appear(frame * elapsed, now)
-    senses = Watched.of(place, course, now[agent], frame * elapsed, 0, 0, agent)
-    assert isinstance(senses, Watched)
-    senses.cast_rays = []
     heard = [Heard(j, state, 0.0) for j, state in enumerate(now) if j != agent]
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
-    made = decide(
-        scenario.model, scenario.parameters, now[agent], heard, (), None,
-        time=frame * elapsed, period=period, index=agent, percept=senses,
-    )  # fmt: skip
-    return senses.cast_rays, made.command
+    return cast_rays(scenario, place, course, now[agent], heard, frame * elapsed, agent)
 
 
-def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -> Figure:
+def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0, ax: Axes | None = None) -> Figure:
     """Rays of one agent from above: red where they met something, green the first free one, black what was flown.
 
     start : instant, s; by default the one at which this agent cast most rays in the flight's first 20 s
+    ax    : axes to draw into, instead of a new figure
     """
     count = recording.sizes["individual"]
     if not 0 <= agent < count:
@@ -87,8 +57,7 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -
     assert scenario is not None
     x, y = (float(c) for c in shown.position[frame, :2, agent])
     reach = 1.3 * max(ray.length for ray in found)
-    figure = style.Picture(6.0, 5.6)
-    axes: Any = figure.add_subplot()
+    figure, axes = style.place(ax, 6.0, 5.6)
     ground_plans(axes, nearby(scenario, shown))
     lines = [[(x, y), (x + ray.free * ray.x, y + ray.free * ray.y)] for ray in found]
     colours = [style.GREEN if ray.free >= ray.length else style.RED for ray in found]
@@ -103,5 +72,5 @@ def rays(recording: xr.Dataset, *, start: float | None = None, agent: int = 0) -
     axes.set_aspect("equal")
     style.dress(axes, "east (m)", "north (m)", grid=False)
     words = f"agent {agent} at {times[frame]:.4g} s · {len(found)} rays cast"
-    style.overall(figure, name_of(recording), f"{words} · {details_of(recording)}")
+    style.heading(axes, name_of(recording), f"{words} · {details_of(recording)}")
     return figure

@@ -19,6 +19,7 @@ from airflock.plots import style
 from airflock.plots.save import positive
 from airflock.plots.scene import name_of
 from airflock.scenarios.scenario import Scenario
+from airflock.stage.arrows import vectors
 
 Array = NDArray[Any]
 POINTS = 400
@@ -86,20 +87,6 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
     if "dv" in names and dv == 0.0:
         given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
     return model.neighbour(*(given[name] for name in names))
-
-
-def vectors(record: Any) -> dict[str, tuple[str, str]]:
-    """Vectors among the fields of a NamedTuple: name → fields of its x and y component.
-
-    Sums(x, y, z) is one vector without a name; Sums(away_x, away_y, away_z, n) one called away.
-    """
-    fields = record._fields
-    found = {}
-    for field in fields:
-        stem = field[:-1]
-        if field.endswith("x") and f"{stem}y" in fields:
-            found[stem.strip("_")] = (field, f"{stem}y")
-    return found
 
 
 def repulsion(model: Model, p: Any, r: Array) -> list[Response]:

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings import attributes
 from airflock.recordings.layout import DIMENSIONS, check
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.geometry import ground_plan
@@ -81,19 +82,19 @@ def window(times: Array, start: float | None, stop: float | None, last: float | 
 
 
 def flown_with(recording: xr.Dataset) -> Scenario | None:
-    """Scenario that a recording was flown with; None for a flight log."""
+    """Scenario that a recording was flown with; None for tracks."""
     return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
 
 
 def world_of(recording: xr.Dataset) -> arena.Parameters:
-    """World of a recording; open for a flight log."""
+    """World of a recording; open for tracks."""
     scenario = flown_with(recording)
     return scenario.world if scenario else arena.Parameters(arena="none")
 
 
 def name_of(what: xr.Dataset | Scenario) -> str:
-    """Short name of a scenario or recording: that of the preset or file."""
-    name = what.name if isinstance(what, Scenario) else str(what.attrs.get("airflock_name", "flight log"))
+    """Short name of a scenario or recording: that of the preset or file, or of the file of its tracks."""
+    name = what.name if isinstance(what, Scenario) else attributes.name_of(what)
     return Path(name).stem if name.endswith((".toml", ".nc")) else name
 
 
@@ -115,6 +116,13 @@ class Outline(NamedTuple):
     obstacle: bool
 
 
+def _ends(world: arena.Parameters) -> list[tuple[float, float]]:
+    """Lowest and highest height of each outline of a 3-D arena, m."""
+    whole = arena.heights_of(world)
+    found = [] if world.arena == "none" else [whole]
+    return found + [(h[0], h[1]) for h in world.heights or [whole] * len(world.obstacles)]
+
+
 def outlines(world: arena.Parameters) -> list[Outline]:
     """Ground plans of the arena (first, if there is one) and of the obstacles, as closed polygons in the plane."""
     plan = ground_plan(world)
@@ -129,11 +137,10 @@ def walls(world: arena.Parameters) -> list[Outline]:
     if world.dimensions == "2":
         return outlines(world)
     found = []
-    half = 0.5 * world.height
-    for corners, obstacle in outlines(world):
-        found += [Outline(_raised(corners, z), obstacle) for z in (-half, half)]
+    for (corners, obstacle), (low, high) in zip(outlines(world), _ends(world), strict=True):
+        found += [Outline(_raised(corners, z), obstacle) for z in (low, high)]
         step = max(1, (len(corners) - 1) // 8) if len(corners) > 17 else 1  # a circle gets eight uprights
-        found += [Outline(np.array([[x, y, -half], [x, y, half]]), obstacle) for x, y in corners[:-1:step]]
+        found += [Outline(np.array([[x, y, low], [x, y, high]]), obstacle) for x, y in corners[:-1:step]]
     return found
 
 
@@ -156,9 +163,11 @@ class View(NamedTuple):
     up: Array
 
     def __call__(self, points: Array, axis: int = 1) -> tuple[Array, Array]:
-        """Picture coordinates of points whose given axis holds their components; both m."""
+        """Picture coordinates of points whose given axis holds their components; both m. A plane lies at height 0."""
         moved = np.moveaxis(points, axis, -1)
-        return moved @ self.right, moved @ self.up
+        known = min(moved.shape[-1], len(self.right))
+        moved = moved[..., :known]
+        return moved @ self.right[:known], moved @ self.up[:known]
 
 
 def view_of(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> View:

@@ -3,16 +3,20 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from airflock.errors import AirflockError
 from airflock.plots import style
 from airflock.plots.scene import details_of, name_of, window
 from airflock.recordings.scores import over_time, scenario_of
 
 CORR, VEL, LAP = r"$\phi^{\mathrm{corr}}$", r"$\phi^{\mathrm{vel}}/v^{\mathrm{flock}}$", r"$\phi^{\mathrm{LAP}}$"
+STEADY = 1e-4  # share of its value by which a steady value differs
+SHARE = 200.0  # of a course that is shown, its smoothing window
 NEAREST, NEAREST_MEAN = r"min $r_{ij}^{\mathrm{min}}$", r"mean $r_{ij}^{\mathrm{min}}$"
 
 
@@ -21,11 +25,14 @@ def series(
     *,
     start: float | None = None,
     stop: float | None = None,
+    smooth: float | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> Figure:
     """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
     start, stop : window of time, s; by default the whole flight
+    smooth      : means over so many seconds (of the nearest pair the least value), told in the title; 0 draws instants
+    alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
     """
     course = _window(over_time(recording, settings), start, stop)
@@ -34,38 +41,76 @@ def series(
 
         return flocked(recording, start=start, stop=stop, settings=settings)
     if not {"phi_corr", "phi_vel", "phi_lap"} <= set(course):
-        return _each(recording, course)
+        return _each(recording, course, smooth)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0
     figure = style.Picture(7.0, 4.2)
     figure.set_layout_engine("constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-    handles = upper.plot(course.index, course["phi_corr"], color=style.BLUE, linewidth=0.9, label=CORR)
-    handles += upper.plot(course.index, course["phi_vel"] / v_flock, color=style.GREEN, linewidth=0.9, label=VEL)
+    pen = Pen(course, smooth)
+    handles = pen.draw(upper, course["phi_corr"], style.BLUE, CORR)
+    handles += pen.draw(upper, course["phi_vel"] / v_flock, style.GREEN, VEL)
     style.dress(upper, y=f"{CORR},  {VEL}   (1)")
     highest = float(max(1.0, (course["phi_vel"] / v_flock).max()))
     upper.set_ylim(min(0.0, float(course["phi_corr"].min())) - 0.02, 1.05 * highest)
     if recording.sizes["individual"] > 1:
         right = style.second_axis(upper, "nearest neighbour (m)", style.RED)
-        handles += right.plot(course.index, course["r_min_mean"], color=style.RED, linewidth=0.9, label=NEAREST_MEAN)
-        handles += right.plot(course.index, course["r_min"], color=style.ORANGE, linewidth=0.9, label=NEAREST)
+        handles += pen.draw(right, course["r_min_mean"], style.RED, NEAREST_MEAN)
+        handles += pen.draw(right, course["r_min"], style.ORANGE, NEAREST, least=True)
         right.set_ylim(0.0, 1.35 * float(course["r_min_mean"].max()))
     style.legend(upper, handles, columns=4, above=True)
-    _rotation(lower, course, style.PURPLE, LAP)
+    _rotation(lower, course, style.PURPLE, LAP, pen)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
-    style.overall(figure, name_of(recording), details_of(recording))
+    style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
     return figure
 
 
-def _each(recording: xr.Dataset, course: pd.DataFrame) -> Figure:
+class Pen:
+    """Draws courses smoothed, with every instant faint behind.
+
+    course : order parameters over time, s; smooth : window, s; None for a two-hundredth of the course, 0 for none
+    """
+
+    def __init__(self, course: pd.DataFrame, smooth: float | None):
+        times = course.index.to_numpy(float)
+        period = float(times[1] - times[0]) if len(times) > 1 else 0.0
+        span = float(times[-1] - times[0]) if len(times) else 0.0
+        if smooth is not None and smooth < 0.0:
+            raise AirflockError(f"smooth = {smooth:g} s must not be below 0")
+        wanted = float(f"{span / SHARE:.1g}") if smooth is None else smooth
+        self.count = round(wanted / period) if period > 0.0 else 0
+        self.window = self.count * period
+
+    @property
+    def told(self) -> str:
+        """What a title says of the window."""
+        return f" · means over {self.window:.3g} s" if self.count > 1 else ""
+
+    def draw(self, axes: Axes, values: pd.Series, color: str, label: str, *, least: bool = False) -> list[Any]:
+        """Draw one course: its mean (or its least value) over the window around each instant. Returns its line."""
+        if self.count <= 1:
+            return axes.plot(values.index, values, color=color, linewidth=0.9, label=label)
+        axes.plot(values.index, values, color=color, linewidth=0.6, alpha=0.25)
+        around = values.rolling(self.count, center=True, min_periods=1)
+        return axes.plot(
+            values.index, around.min() if least else around.mean(), color=color, linewidth=1.1, label=label
+        )
+
+
+def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None) -> Figure:
     """Every value of a metric set that has no picture of its own, one below the other."""
     figure = style.Picture(7.0, 0.6 + 1.1 * len(course.columns))
     figure.set_layout_engine("constrained")
     panels = figure.subplots(len(course.columns), 1, sharex=True, squeeze=False)[:, 0]
+    pen = Pen(course, smooth)
     for number, (name, axes) in enumerate(zip(course.columns, panels, strict=True)):
         values = course[name].dropna()  # values of the collision clock stand at its instants only
-        axes.plot(values.index, values, color=style.LINES[number % len(style.LINES)], linewidth=0.9)
+        own = pen if len(values) == len(course) else Pen(course.loc[values.index], smooth)
+        own.draw(axes, values, style.LINES[number % len(style.LINES)], name)
         style.dress(axes, "time (s)" if axes is panels[-1] else "", name)
-    style.overall(figure, name_of(recording), details_of(recording))
+        middle, spread = float(values.mean()), float(np.ptp(values)) if len(values) else 0.0
+        if spread < STEADY * abs(middle):  # rounding is no course
+            axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
+    style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
     return figure
 
 
@@ -79,14 +124,14 @@ def rotations(flights: Mapping[str, xr.Dataset], *, start: float | None = None, 
     axes = figure.subplots()
     for number, (label, recording) in enumerate(flights.items()):
         course = _window(over_time(recording), start, stop)
-        _rotation(axes, course, style.LINES[number % len(style.LINES)], label)
+        _rotation(axes, course, style.LINES[number % len(style.LINES)], label, Pen(course, 0.0))
     style.legend(axes, columns=len(flights), above=True)
     return figure
 
 
-def _rotation(axes: Axes, course: pd.DataFrame, color: str, label: str) -> None:
+def _rotation(axes: Axes, course: pd.DataFrame, color: str, label: str, pen: Pen) -> None:
     axes.axhline(0.0, color=style.GREY, linewidth=0.6)
-    axes.plot(course.index, course["phi_lap"], color=color, linewidth=0.9, label=label)
+    pen.draw(axes, course["phi_lap"], color, label)
     style.dress(axes, "time (s)", f"{LAP} (1)")
     most = max(1.05, 1.05 * float(course["phi_lap"].abs().max()))
     axes.set_ylim(-most, most)

@@ -7,11 +7,14 @@ import io
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+
+from airflock.stage.colours import WHEEL
 
 # Okabe & Ito, "Color universal design" (2008)
 BLUE, GREEN, RED, ORANGE, SKY, PURPLE = "#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#CC79A7"
@@ -23,6 +26,7 @@ LINES = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY)
 SPEED = LinearSegmentedColormap.from_list(
     "speed", ["#2B1155", "#3B3C8F", "#2F6C9E", "#23938C", "#3FB76A", "#9CCB3B"], N=256
 )
+COMPASS = LinearSegmentedColormap.from_list("compass", np.vstack([WHEEL, WHEEL[:1]]) / 255.0, N=256)
 TEXT, SMALL, HEAD = 9.0, 8.0, 11.0  # points
 RESOLUTION = 200  # dots per inch of pixel formats
 
@@ -39,6 +43,16 @@ class Picture(Figure):
         stream = io.BytesIO()
         self.savefig(stream, format="png", dpi=110)
         return stream.getvalue()
+
+
+def place(ax: Axes | None, width: float, height: float, layout: str = "") -> tuple[Figure, Any]:
+    """The axes that are given, in their figure; or a new figure of a size in inches with axes of its own."""
+    if ax is not None:
+        return ax.get_figure(root=True), ax  # type: ignore[return-value]
+    figure = Picture(width, height)
+    if layout:
+        figure.set_layout_engine(layout)  # type: ignore[arg-type]
+    return figure, figure.add_subplot()
 
 
 def dress(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:

@@ -4,52 +4,161 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import Paths, details_of, flown_with, name_of, paths_of, speed_range
+from airflock.plots.scene import (
+    Paths,
+    View,
+    details_of,
+    flown_with,
+    name_of,
+    paths_of,
+    speed_range,
+    through_face,
+    view_of,
+)  # fmt: skip
+from airflock.plots.solid import Rendering, ground, render
 from airflock.scenarios.scenario import Scenario
+from airflock.stage.scene import Solid, stage_of
 from airflock.world.shapes import BOX, CYLINDER, SEGMENT, TRIANGLE
 
 MARGIN = 40.0  # m of scenery shown around the paths
 MOST = 4000  # shapes drawn in space
+ELEVATION = 42.0  # deg; from which a city is seen
+FAINT = 0.18  # opacity of a path behind a building
+HEIGHT = LinearSegmentedColormap.from_list("height", ["#F2F2F2", "#8A8A8A"], N=256)
 
 
 def through(
-    recording: xr.Dataset, *, start: float | None = None, stop: float | None = None, space: bool = False
+    recording: xr.Dataset,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    space: bool = False,
+    ax: Axes | None = None,
 ) -> Figure:
     """Paths through what stands in the scene, coloured by speed; stars mark the goals.
 
-    start, stop : window of time, s; by default the whole flight; space : in three dimensions instead of from above
+    start, stop : window of time, s; by default the whole flight
+    space       : solid and lit, obliquely from above, instead of ground plans; what a solid hides is drawn faintly
+    ax          : axes to draw into, instead of a new figure
     """
     scenario, shown = flown_with(recording), paths_of(recording, start, stop)
     if scenario is None:
-        raise RecordingError("recording: a flight log has no scene; plot its trajectories")
+        raise RecordingError("recording: tracks have no scene; plot its trajectories")
     if space and shown.position.shape[1] == 2:
         raise RecordingError("recording: was flown in a plane; look at it from above")
-    figure = style.Picture(7.0, 6.0)
-    axes: Any = figure.add_subplot(projection="3d") if space else figure.add_subplot()
-    rows = nearby(scenario, shown)
-    (_solid if space else ground_plans)(axes, rows)
+    figure, axes = style.place(ax, 7.4, 5.4 if space else 6.0)
     scale = Normalize(*speed_range(shown))
-    _paths(axes, shown, scale, space)
-    _frame(axes, rows, shown, space)
-    points = _goals(scenario, space)
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    points = points[((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)]
-    if len(points):
-        axes.scatter(*points.T, marker="*", s=90.0, color=style.ORANGE, edgecolors=style.INK, linewidths=0.5, zorder=6)
-    from matplotlib.cm import ScalarMappable
-
+    goals = scenario.waypoints()
+    if space:
+        in_space(axes, scenario, shown, scale, goals)
+    else:
+        rows = nearby(scenario, shown)
+        heights = ground_plans(axes, rows)
+        _paths(axes, shown, scale)
+        _frame(axes, shown)
+        low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+        _stars(axes, goals[:, :2][((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)])
+        if heights is not None and shown.position.shape[1] == 3:
+            style.colour_bar(figure, heights, axes, "height of what stands (m)", shrink=0.8)
     bar = ScalarMappable(scale, style.SPEED)
-    style.colour_bar(figure, bar, axes, "speed (m/s)", shrink=0.6 if space else 0.8, pad=0.1 if space else 0.02)
-    style.overall(figure, name_of(recording), details_of(recording, shown))
+    style.colour_bar(figure, bar, axes, "speed (m/s)", shrink=0.6 if space else 0.8)
+    style.legend(axes, above=True)
+    style.heading(axes, name_of(recording), details_of(recording, shown))
     return figure
+
+
+def in_space(axes: Any, scenario: Scenario, shown: Paths, scale: Normalize, goals: NDArray[Any]) -> None:
+    """Solids, paths, goals and a scale of three axes, obliquely from above."""
+    rendering = built(scenario, shown)
+    left, right, bottom, top = rendering.box
+    axes.imshow(rendering.colour, extent=rendering.box, interpolation="antialiased", zorder=0)
+    stride = max(1, len(shown.times) * shown.agents // 60_000)
+    where, speed = shown.position[::stride], shown.speed[::stride]
+    pieces = np.stack([where[:-1], where[1:]], axis=1).transpose(0, 3, 1, 2).reshape(-1, 2, 3)
+    pace = (0.5 * (speed[:-1] + speed[1:])).ravel()
+    kept = np.isfinite(pieces).all(axis=(1, 2)) & ~through_face(pieces, scenario.world)
+    pieces, pace = pieces[kept], pace[kept]
+    hidden = rendering.hides(pieces.mean(axis=1))
+    for part, alpha in ((hidden, FAINT), (~hidden, 1.0)):
+        flat = np.stack(rendering.view(pieces[part], axis=2), axis=-1)
+        lines = LineCollection(list(flat), norm=scale, cmap=style.SPEED, linewidths=0.9, alpha=alpha, zorder=3)
+        lines.set_array(pace[part])
+        axes.add_collection(lines)
+    ends = np.stack(rendering.view(shown.position[-1].T), axis=-1)
+    axes.scatter(*ends.T, s=14.0, color=style.INK, edgecolors="white", linewidths=0.4, zorder=5, label="at the end")
+    _stars(axes, np.stack(rendering.view(goals), axis=-1) if len(goals) else np.zeros((0, 2)))
+    _triad(axes, rendering.view, (left, right, bottom, top))
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    axes.set_axis_off()
+
+
+def built(scenario: Scenario, shown: Paths, margin: float = 0.02) -> Rendering:
+    """What stands around the paths, rendered."""
+    low, high = (
+        bound(shown.position, axis=(0, 2)) + edge for bound, edge in ((np.nanmin, -MARGIN), (np.nanmax, MARGIN))
+    )
+    flat = np.zeros((1, 3))
+    flat[0] = 0.5 * (low + high)
+    solids = [part for solid in stage_of(scenario, flat).solids if (part := _within(solid, low, high)) is not None]
+    plan = [solid.vertices[solid.faces.astype(int)].reshape(-1, 3)[:, :2] for solid in solids]
+    edges = np.vstack([low[:2], high[:2], *plan])
+    low, high = np.append(edges.min(axis=0), low[2]), np.append(edges.max(axis=0), high[2])
+    tops = max([float(high[2]) - MARGIN, *(float(solid.vertices[:, 2].max()) for solid in solids)])
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (0.0, tops)])
+    view = view_of(3, elevation_deg=ELEVATION)
+    x, y = view(corners)
+    edge = margin * max(float(np.ptp(x)), float(np.ptp(y)))
+    box = (float(x.min()) - edge, float(x.max()) + edge, float(y.min()) - edge, float(y.max()) + edge)
+    return render([ground(low, high), *solids], view, box)
+
+
+def _within(solid: Solid, low: NDArray[Any], high: NDArray[Any]) -> Solid | None:
+    """The pieces of a solid that reach over a box of the plan, whole; None without any."""
+    faces, size = solid.faces.astype(int), len(solid.vertices)
+    joined = coo_array((np.ones(2 * len(faces)), (faces[:, [0, 0]].ravel(), faces[:, [1, 2]].ravel())), (size, size))
+    piece = connected_components(joined, directed=False)[1]
+    over = ((solid.vertices[:, :2] >= low[:2]) & (solid.vertices[:, :2] <= high[:2])).all(axis=1)
+    kept = np.isin(piece[faces[:, 0]], piece[over])
+    return solid._replace(faces=solid.faces[kept]) if kept.any() else None
+
+
+def _stars(axes: Any, points: NDArray[Any]) -> None:
+    """Goals."""
+    if len(points):
+        look: dict[str, Any] = {"s": 90.0, "color": style.ORANGE, "edgecolors": style.INK, "linewidths": 0.5}
+        axes.scatter(*points.T, marker="*", zorder=6, label="goal", **look)
+
+
+def _triad(axes: Any, view: View, box: tuple[float, float, float, float]) -> None:
+    """Arrows of a round length to the east, north and up, at the lower left."""
+    left, right, bottom, top = box
+    span = 0.16 * (right - left)
+    power = 10.0 ** np.floor(np.log10(span))
+    length = float(max(k * power for k in (1, 2, 5) if k * power <= span))
+    tips = np.stack(view(np.eye(3) * length), axis=-1)
+    corner = np.array([left + 0.02 * (right - left), bottom + 0.02 * (top - bottom)])
+    foot = corner - np.minimum(tips.min(axis=0), 0.0)
+    for tip, name in zip(tips, ("east", "north", "up"), strict=True):
+        axes.annotate(
+            "",
+            foot + tip,
+            foot,
+            arrowprops={"arrowstyle": "-|>", "color": style.GREY, "lw": 0.9, "shrinkA": 0, "shrinkB": 0},
+        )
+        axes.annotate(name, foot + 1.08 * tip, fontsize=style.SMALL, color=style.GREY, ha="center", va="center")
+    axes.annotate(f"{length:g} m", foot + [0.0, -0.035 * (top - bottom)], fontsize=style.SMALL, color=style.GREY)
 
 
 def nearby(scenario: Scenario, shown: Paths) -> NDArray[np.float64]:
@@ -61,33 +170,23 @@ def nearby(scenario: Scenario, shown: Paths) -> NDArray[np.float64]:
     return np.asarray(shapes[inside & np.isin(shapes[:, 6], (BOX, CYLINDER, SEGMENT, TRIANGLE))])
 
 
-def _goals(scenario: Scenario, space: bool) -> NDArray[np.float64]:
-    return np.asarray(scenario.waypoints()[:, : 3 if space else 2])
-
-
-def ground_plans(axes: Any, rows: NDArray[np.float64]) -> None:
-    """Ground plans; a higher solid is darker."""
+def ground_plans(axes: Any, rows: NDArray[np.float64]) -> PatchCollection | None:
+    """Ground plans; a higher solid is darker. Returns what a colour bar of heights (m) needs, where there are any."""
+    solid = None
     boxes, trunks = rows[rows[:, 6] == BOX], rows[rows[:, 6] == CYLINDER]
     patches: list[Any] = [Rectangle((r[0], r[1]), r[3] - r[0], r[4] - r[1]) for r in boxes]
     patches += [Circle((r[7], r[8]), r[9]) for r in trunks]
     if patches:
         height = np.minimum(np.concatenate([boxes[:, 5], trunks[:, 5]]), 1000.0)
-        grey = Normalize(0.0, 1.6 * max(float(height.max()), 1.0))
-        solid = PatchCollection(patches, cmap="Greys", norm=grey, edgecolors=style.GREY, linewidths=0.3, zorder=1)
+        grey = Normalize(0.0, max(float(height.max()), 1.0))
+        solid = PatchCollection(patches, cmap=HEIGHT, norm=grey, edgecolors=style.GREY, linewidths=0.3, zorder=1)
         solid.set_array(height)
         axes.add_collection(solid)
     walls, faces = rows[rows[:, 6] == SEGMENT], rows[rows[:, 6] == TRIANGLE]
     lines = [outline_from_above(row) for row in (*walls, *faces)]
     if lines:
         axes.add_collection(LineCollection(lines, colors=style.GREY, linewidths=0.8, zorder=1))
-
-
-def _solid(axes: Any, rows: NDArray[np.float64]) -> None:
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-    lines = outlines_in_space(rows)
-    if lines:
-        axes.add_collection(Line3DCollection(lines, colors=style.GREY, linewidths=0.35, alpha=0.6))
+    return solid
 
 
 def outlines_in_space(rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -116,7 +215,7 @@ def outline_from_above(row: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def scenery(recording: xr.Dataset, shown: Paths) -> list[NDArray[np.float64]]:
-    """Outlines of what stands around the paths, as lines (point, axis) in m; none for a flight log."""
+    """Outlines of what stands around the paths, as lines (point, axis) in m; none for tracks."""
     scenario = flown_with(recording)
     if scenario is None or scenario.scene.kind == "none":
         return []
@@ -124,32 +223,22 @@ def scenery(recording: xr.Dataset, shown: Paths) -> list[NDArray[np.float64]]:
     return outlines_in_space(rows) if shown.position.shape[1] == 3 else [outline_from_above(r) for r in rows]
 
 
-def _paths(axes: Any, shown: Paths, scale: Normalize, space: bool) -> None:
-    kind: Any = LineCollection
-    if space:
-        from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-        kind = Line3DCollection
-    dims = 3 if space else 2
+def _paths(axes: Any, shown: Paths, scale: Normalize) -> None:
     stride = max(1, len(shown.times) * shown.agents // 60_000)
-    where, speed = shown.position[::stride, :dims], shown.speed[::stride]
+    where, speed = shown.position[::stride, :2], shown.speed[::stride]
     for agent in range(shown.agents):
         line = where[:, :, agent]
-        pieces = kind(np.stack([line[:-1], line[1:]], axis=1), norm=scale, cmap=style.SPEED, linewidths=0.9, zorder=3)
+        segments = np.stack([line[:-1], line[1:]], axis=1)
+        pieces = LineCollection(list(segments), norm=scale, cmap=style.SPEED, linewidths=0.9, zorder=3)
         pieces.set_array(speed[:-1, agent])
         axes.add_collection(pieces)
-    axes.scatter(*shown.position[-1, :dims], s=14.0, color=style.INK, edgecolors="white", linewidths=0.4, zorder=5)
+    look: dict[str, Any] = {"s": 14.0, "color": style.INK, "edgecolors": "white", "linewidths": 0.4}
+    axes.scatter(*shown.position[-1, :2], zorder=5, label="at the end", **look)
 
 
-def _frame(axes: Any, rows: NDArray[np.float64], shown: Paths, space: bool) -> None:
+def _frame(axes: Any, shown: Paths) -> None:
     points = shown.position.transpose(0, 2, 1).reshape(-1, shown.position.shape[1])
     low, high = np.nanmin(points, axis=0) - MARGIN, np.nanmax(points, axis=0) + MARGIN
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    if not space:
-        axes.set_aspect("equal")
-        style.dress(axes, "east (m)", "north (m)", grid=False)
-        return
-    top = max([float(high[2]) - MARGIN, *np.minimum(rows[:, 5], 100.0).tolist()])
-    axes.set(zlim=(0.0, top), xlabel="east (m)", ylabel="north (m)", zlabel="up (m)")
-    axes.set_box_aspect((high[0] - low[0], high[1] - low[1], top))
-    axes.view_init(elev=35.0, azim=-60.0)
+    axes.set_aspect("equal")
+    style.dress(axes, "east (m)", "north (m)", grid=False)

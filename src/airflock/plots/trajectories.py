@@ -4,17 +4,20 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
+from airflock.errors import AirflockError, RecordingError
 from airflock.plots import style
 from airflock.plots.scene import (
     Paths,
     details_of,
     extent,
+    flown_with,
     name_of,
     paths_of,
     speed_range,
@@ -23,10 +26,14 @@ from airflock.plots.scene import (
     walls,
     world_of,
 )  # fmt: skip
+from airflock.plots.through import through
 from airflock.world import arena
 
 WINDOW = 60.0  # s; longer paths cover each other
 MOST = 200_000  # segments; beyond, frames are skipped so that a picture stays quick to draw
+INK_MOST = 150.0  # how often all paths together would cross the picture at most
+EQUAL = 0.02  # share of their speed by which agents that fly equally fast may differ
+COLOURS = ("auto", "speed", "heading", "agent")
 MANY = 20_000  # segments; beyond, vector formats hold them as pixels
 
 
@@ -37,24 +44,42 @@ def trajectories(
     stop: float | None = None,
     agent: int | None = None,
     highlight: bool = True,
+    colour: str = "auto",
+    ax: Axes | None = None,
 ) -> Figure:
     """Paths from above, or in space for a 3-D recording; dots mark where agents are at the end.
 
-    start, stop : window of time, s; by default the last 60 s
+    Where a city, forest or mesh stands, the paths through it, from above.
+
+    start, stop : window of time, s; by default the last 60 s, or fewer where so many paths would cover each other
     agent       : number of the agent highlighted in grey scale; by default one drawn at random, the same for a seed
     highlight   : False highlights none
+    colour      : speed, heading (in the plane) or agent; auto: speed, unless all fly equally fast
+    ax          : axes to draw into, in space with projection="3d", instead of a new figure
     """
+    if colour not in COLOURS:
+        raise AirflockError(f"colour = {colour!r} is none of {', '.join(COLOURS)}")
+    scenario = flown_with(recording)
+    if scenario is not None and scenario.scene.kind != "none":
+        return through(recording, start=start, stop=stop, ax=ax)
     shown = paths_of(recording, start, stop, last=WINDOW)
+    if start is None:
+        shown = paths_of(recording, None, stop, last=_legible(shown))
     world = world_of(recording)
     chosen = _chosen(recording, shown.agents, agent) if highlight else -1
     space = shown.position.shape[1] == 3
-    figure = style.Picture(6.8, 4.6) if space else style.Picture(6.4, 5.6)
-    axes: Any = figure.add_subplot(projection="3d") if space else figure.add_subplot()
-    pieces = _pieces(shown, world)
-    scale = Normalize(*speed_range(shown))
+    if space and ax is None:
+        figure: Figure = style.Picture(6.8, 4.6)
+        axes: Any = figure.add_subplot(projection="3d")
+    else:
+        figure, axes = style.place(ax, 6.4, 5.6)
+    way = _way(shown) if colour == "auto" else colour
+    scale, cmap, values = _tones(shown, way)
+    pieces = _pieces(shown, world, values, 0.5 if way == "speed" else 0.0)  # headings have no mean of this kind
     for number in [*(i for i in range(shown.agents) if i != chosen), *([chosen] if chosen >= 0 else [])]:
-        segments, speed = pieces[number]
-        _draw(axes, segments, speed, scale, len(segments) * shown.agents > MANY, number == chosen)
+        segments, tone = pieces[number]
+        pixels = len(segments) * shown.agents > MANY
+        _draw(axes, segments, tone, scale, cmap, pixels, number == chosen)
     ends = shown.position[-1]
     size = 14.0 if shown.agents <= 150 else 5.0
     dots: dict[str, Any] = {"depthshade": False} if space else {}
@@ -62,12 +87,49 @@ def trajectories(
     _draw_world(axes, world)
     if space:
         _in_space(axes, shown, world)
-        style.overall(figure, name_of(recording), details_of(recording, shown))
     else:
         _from_above(axes, shown, world)
-        style.heading(axes, name_of(recording), details_of(recording, shown))
-    style.colour_bar(figure, _bar(scale), axes, "speed (m/s)", shrink=0.6 if space else 0.8, pad=0.1 if space else 0.02)
+    said = details_of(recording, shown) + (" · each agent in a colour of its own" if way == "agent" else "")
+    if space and ax is None:
+        style.overall(figure, name_of(recording), said)
+    else:
+        style.heading(axes, name_of(recording), said)
+    if way != "agent":
+        bar = style.colour_bar(
+            figure, ScalarMappable(scale, cmap), axes, "heading" if way == "heading" else "speed (m/s)",
+            shrink=0.6 if space else 0.8, pad=0.1 if space else 0.02,
+        )  # fmt: skip
+        if way == "heading":
+            bar.set_ticks([0.0, 90.0, 180.0, 270.0, 360.0], labels=["east", "north", "west", "south", "east"])
     return figure
+
+
+def _legible(shown: Paths) -> float:
+    """Window of time in which all paths together are not so long that they cover each other, s."""
+    length = float(np.nanmean(shown.speed)) * shown.agents
+    extent = float(np.max(np.nanmax(shown.position, axis=(0, 2)) - np.nanmin(shown.position, axis=(0, 2))))
+    window = INK_MOST * extent / max(length, 1e-12)
+    return WINDOW if window >= WINDOW else float(f"{max(window, 1e-9):.1g}")
+
+
+def _way(shown: Paths) -> str:
+    """What colours say most: speed, or where all fly equally fast the heading; in space who it is."""
+    speed = shown.speed[np.isfinite(shown.speed)]
+    low, high = np.quantile(speed, (0.05, 0.95)) if speed.size else (0.0, 0.0)
+    if high - low > EQUAL * max(float(high), 1e-12):
+        return "speed"
+    return "heading" if shown.position.shape[1] == 2 else "agent"
+
+
+def _tones(shown: Paths, way: str) -> tuple[Normalize, Any, NDArray[Any]]:
+    """Scale and colours, and the value of each agent at each frame (time, agent)."""
+    if way == "heading":
+        angle = np.degrees(np.arctan2(shown.velocity[:, 1], shown.velocity[:, 0])) % 360.0
+        return Normalize(0.0, 360.0), style.COMPASS, angle
+    if way == "agent":
+        share = np.arange(shown.agents) * 0.6180339887 % 1.0
+        return Normalize(0.0, 1.0), style.COMPASS, np.broadcast_to(share, shown.speed.shape)
+    return Normalize(*speed_range(shown)), style.SPEED, shown.speed
 
 
 def _chosen(recording: xr.Dataset, agents: int, agent: int | None) -> int:
@@ -79,44 +141,47 @@ def _chosen(recording: xr.Dataset, agents: int, agent: int | None) -> int:
     return agent
 
 
-def _pieces(shown: Paths, world: arena.Parameters) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Of each agent: segments (segment, end, axis) in m and their mean speeds, m/s; none through a periodic face."""
+def _pieces(
+    shown: Paths, world: arena.Parameters, values: NDArray[Any], middle: float
+) -> list[tuple[NDArray[Any], NDArray[Any]]]:
+    """Of each agent: segments (segment, end, axis) in m, and the value on them; none through a periodic face.
+
+    values : (time, agent); middle : 0.5 for the value half-way, 0 for that at the beginning
+    """
     count = len(shown.times)
     stride = max(1, -(-(count - 1) * shown.agents // MOST))
     kept = np.unique(np.append(np.arange(0, count, stride), count - 1))
-    where, speed = shown.position[kept], shown.speed[kept]
+    where, speed = shown.position[kept], values[kept]
+    step = np.diff(speed, axis=0)
     found = []
     for number in range(shown.agents):
         line = where[:, :, number]
-        segments, mean = np.stack([line[:-1], line[1:]], axis=1), 0.5 * (speed[:-1, number] + speed[1:, number])
+        segments, mean = np.stack([line[:-1], line[1:]], axis=1), speed[:-1, number] + middle * step[:, number]
         inside = ~through_face(segments, world)
         found.append((segments[inside], mean[inside]))
     return found
 
 
-def _draw(axes: Any, segments: NDArray[Any], speed: NDArray[Any], scale: Normalize, pixels: bool, grey: bool) -> None:
+def _draw(
+    axes: Any, segments: NDArray[Any], values: NDArray[Any], scale: Normalize, cmap: Any, pixels: bool, chosen: bool
+) -> None:
     if not len(segments):
         return
-    space = segments.shape[2] == 3
     kind: Any = LineCollection
-    if space:
+    if segments.shape[2] == 3:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
         kind = Line3DCollection
-    look: dict[str, Any] = {"linewidths": 0.7, "alpha": 0.85, "cmap": style.SPEED, "zorder": 2}
-    if grey:
+    look: dict[str, Any] = {"linewidths": 0.7, "alpha": 0.85, "cmap": cmap, "zorder": 2, "norm": scale}
+    if chosen:
         axes.add_collection(kind(segments, colors="white", linewidths=3.6, zorder=3.0, capstyle="round", label="_halo"))
-        look = {"linewidths": 2.0, "cmap": "gray", "zorder": 3.5, "capstyle": "round"}
-    lines = kind(segments, norm=Normalize(scale.vmin, 1.3 * float(scale.vmax or 1.0)) if grey else scale, **look)
-    lines.set_array(speed)
+        dark = Normalize(scale.vmin, 1.3 * float(scale.vmax or 1.0))
+        look = {"linewidths": 2.0, "cmap": "gray", "zorder": 3.5, "capstyle": "round", "norm": dark}
+        values = values if cmap is style.SPEED else np.full(len(segments), scale.vmin)
+    lines = kind(segments, **look)
+    lines.set_array(values)
     lines.set_rasterized(pixels)
     axes.add_collection(lines)
-
-
-def _bar(scale: Normalize) -> Any:
-    from matplotlib.cm import ScalarMappable
-
-    return ScalarMappable(scale, style.SPEED)
 
 
 def _draw_world(axes: Any, world: arena.Parameters) -> None:

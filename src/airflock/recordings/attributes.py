@@ -34,17 +34,25 @@ def whole_number(recording: xr.Dataset, name: str, usual: int | None = None, whe
     if isinstance(value, (float, np.floating)) and np.isfinite(value) and value == int(value):
         value = int(value)
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not -(2**64) < int(value) < 2**64:
-        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is no whole number"
+        told = "is missing" if value is None else f"= {bounded(repr(value), 60)} is not a whole number"
         raise RecordingError(f"{where}: attribute {name} {told}")
     return int(value)
 
 
 def scenario_document(recording: xr.Dataset) -> dict[str, Any] | None:
-    """The scenario that a recording was flown with; None for a flight log; RecordingError if damaged."""
+    """The scenario that a recording was flown with; None for tracks; RecordingError if damaged."""
     found = _object(recording, "airflock_scenario")
     if found is not None and not isinstance(found.get("model", {}), Mapping):
-        raise RecordingError("recording: attribute airflock_scenario is damaged: model is no table")
+        raise RecordingError("recording: attribute airflock_scenario is damaged: model is not a table")
     return found
+
+
+def name_of(recording: xr.Dataset) -> str:
+    """What to call a recording: its scenario's name, or that of the file that its tracks came from."""
+    files = str(recording.attrs.get("source_file") or "").split(", ")
+    first = files[0].rpartition("/")[2].rpartition(".")[0] or files[0]
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    return str(recording.attrs.get("airflock_name") or f"{bounded(first, 60) or 'recording'}{more}")
 
 
 def measured_by(recording: xr.Dataset) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def check(found: xr.Dataset, where: str = "recording") -> None:
             faults.append(f"space has {sizes['space']} components, not 2 or 3")
         times = found["time"].values if "time" in found.coords else np.zeros(0, "U")
         if times.ndim != 1 or times.dtype.kind not in "fiu" or not (np.diff(times.astype(float)) > 0).all():
-            faults.append("time is no increasing coordinate, s")
+            faults.append("time is not an increasing coordinate, s")
         for name in ("position", "velocity"):
             if name in found and found[name].dtype.kind not in "fiu":
                 faults.append(f"{name} is of kind {found[name].dtype}, not numbers")

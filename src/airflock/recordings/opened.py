@@ -39,7 +39,7 @@ class Opening:
             raise RecordingError(f"{self.path}: no such file")
         if self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
-                f"{self.path}: holds tracks, but is no recording yet: airflock import {self.path.name} --save FILE.nc"
+                f"{self.path}: holds tracks, not yet a recording: airflock import {self.path.name} --save FILE.nc"
             )
         self.limit = LEAST_TIME + self.path.stat().st_size / PACE if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
@@ -82,7 +82,7 @@ class Opening:
                 raise RecordingError(f"{self.path}: its names and attributes take {length / 1e6:.0f} MB")
             about = json.loads(self._take(bytearray(length)))
             if "fault" in about:
-                raise RecordingError(f"{self.path}: is no netCDF recording: {about['fault']}")
+                raise RecordingError(f"{self.path}: is not a netCDF recording: {about['fault']}")
             return self._dataset(about)
 
     def _dataset(self, about: dict[str, Any]) -> Any:

@@ -129,5 +129,5 @@ def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
     if each and asked not in known:
         near = get_close_matches(asked, known, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-        raise ScenarioError([f"--show {asked}: no such order parameter; {hint}"])
+        raise ScenarioError([f"--show {asked}: unknown order parameter; {hint}"])
     return asked

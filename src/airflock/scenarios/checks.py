@@ -30,7 +30,7 @@ def body_of(
     else:
         near = get_close_matches(str(kind), BODIES, n=1, cutoff=0.4)
         hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}, or a file that ends in .py"
-        return BODIES[usual], [f"body.kind = {kind!r} is no body; {hint}"]
+        return BODIES[usual], [f"body.kind = {kind!r}: unknown body; {hint}"]
     faults = carries(carried, found, kind)
     return BODIES[usual] if faults else carried, faults
 
@@ -43,6 +43,18 @@ def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
         f"body.kind = {kind!r} takes a {carried.accepts}, but model {found.name} commands {found.command}; "
         f"body.kind = {body_for(found.command)!r} takes it"
     ]
+
+
+def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) -> list[str]:
+    """What of a scenario its body cannot fly: too long a step, too slow a law."""
+    b, p, flight = parts["body"], parts.get("parameters"), parts["flight"]
+    if b is None or flight is None or found is None or p is None:
+        return []
+    speed = float(found.preferred_speed(p)) if found.preferred_speed is not None else 0.0
+    begin, wing = parts["start"], parts["wing"]
+    if begin is None or wing is None:
+        return []
+    return carried.lacks(b=b, dt=flight.dt, speed=speed, start=begin.speed, wing=wing)
 
 
 def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:

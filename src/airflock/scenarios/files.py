@@ -16,6 +16,7 @@ from airflock.metrics.registry import as_set
 from airflock.scenarios import checks, formats, geometry, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
+from airflock.scenarios.ground import file_faults, with_ground
 from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -102,6 +103,8 @@ def load(
         document, base = extended(document, where, folder, _read)
         document, own = _given(document, metrics, body)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
+        document, settings, told = with_ground(document, settings or {}, folder)
+        own["notes"] += told
         if law is None:
             return make(document, where, settings, folder=folder, trust=trust, **own)
         flown = given_law(law)
@@ -116,7 +119,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
         near = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else f"; presets: {', '.join(known)}"
+        hint = f"; did you mean {near[0]}?" if near else "; airflock presets lists the presets"
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     with from_outside(name):
         document = read_toml(path)
@@ -159,7 +162,9 @@ def given_law(law: Any) -> Model:
         return find_model(str(law), told="law", trust=True)
     if isinstance(law, Mapping) or hasattr(law, "__dict__"):
         return model(law)
-    raise ScenarioError([f"law = {law!r} is no law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"])
+    raise ScenarioError(
+        [f"law = {law!r} is not a law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
+    )
 
 
 def loaded(what: Any) -> Scenario:
@@ -168,7 +173,9 @@ def loaded(what: Any) -> Scenario:
         return what
     if isinstance(what, (str, os.PathLike)):
         return load(what)
-    raise ScenarioError([f"{type(what).__name__} is no scenario; give a Scenario, a preset's name or a scenario file"])
+    raise ScenarioError(
+        [f"{type(what).__name__} is not a scenario; give a Scenario, a preset's name or a scenario file"]
+    )
 
 
 def tells_of_study(document: Mapping[str, Any]) -> bool:
@@ -196,6 +203,7 @@ def make(
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
+    document, left_out = _with_body(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -224,7 +232,7 @@ def make(
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, measures)
+    faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     published = _published(merged.get("published", {}))
@@ -235,7 +243,7 @@ def make(
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    notes = (*notes, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    notes = (*notes, *left_out, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
     return replace(scenario, notes=notes)
 
 
@@ -246,6 +254,17 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
+def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body, where the settings name a body of another kind; and a note of it."""
+    given = document.get("body", {})
+    if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
+        return document, ()
+    known = set(given) - {"kind"}
+    kind = given.get("kind", "multirotor")
+    note = f"body.kind = {settings['body.kind']!r}: the numbers of the file's {kind} are left out"
+    return {**document, "body": {}}, (note,) if known else ()
+
+
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """A copy of a document with keys like "model.p_rep" set, and the keys that nobody knows."""
     merged: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
@@ -253,7 +272,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
     for key, value in settings.items():
         section, _, name = key.partition(".")
         if name and not isinstance(merged.setdefault(section, {}), dict):
-            faults.append(f"{key} is no key")
+            faults.append(f"{key}: unknown key")
         elif name:
             merged[section][name] = value
         else:
@@ -261,7 +280,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
     for key in merged:
         if key not in TOP:
             near = get_close_matches(key, TOP, n=1, cutoff=0.5)
-            faults.append(f"{key} is no key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
+            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
     return merged, faults
 
 
@@ -269,7 +288,7 @@ def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str
     table = merged.get("model", {})
     if isinstance(table, Mapping):
         return table, []
-    return {}, [f"model = {table!r} is no table; write model.kind = {table!r}"]
+    return {}, [f"model = {table!r} is not a table; write model.kind = {table!r}"]
 
 
 def _parts(
@@ -301,6 +320,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
     if flight is not None and flight.agents != int(flight.agents):
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
+    faults += file_faults(parts["world"])
     if parts["world"] is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0
         if separation is None and found is not None and parts.get("parameters") is not None:
@@ -318,14 +338,14 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
 def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
     """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
     if not isinstance(kind, str):
-        raise ScenarioError([f"{told} = {kind!r} is missing or no name; known: {', '.join(MODELS)}"])
+        raise ScenarioError([f"{told} = {kind!r} is missing or not a name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
         return model(own_code(told, kind, folder, trust=trust), Path(kind).stem)
     near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
-    raise ScenarioError([f"{told} = {kind!r} is no model; {hint}"])
+    raise ScenarioError([f"{told} = {kind!r}: unknown model; {hint}"])
 
 
 def _published(table: Any) -> dict[str, tuple[float, float | None]]:
@@ -373,8 +393,8 @@ def _notes(scenario: Scenario) -> list[str]:
     period, delay = scenario.sensors.period, scenario.radio.delay
     if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
         notes.append(
-            f"radio.delay = {delay:g} s is no multiple of sensors.period = {period:g} s: decisions use the states of "
-            "exactly that long ago, taken between two measurements"
+            f"radio.delay = {delay:g} s is not a multiple of sensors.period = {period:g} s: decisions use the states "
+            "of exactly that long ago, taken between two measurements"
         )
     notes += wings.notes(scenario)
     p = scenario.parameters

@@ -18,7 +18,7 @@ def current(document: Mapping[str, Any], where: str) -> Mapping[str, Any]:
     """A document of any format known here as one of today's, without its key `format`."""
     found = document.get(KEY, 1)
     if isinstance(found, bool) or not isinstance(found, int) or found < 1:
-        raise ScenarioError([f"{where}: {KEY} = {found!r} is no number of a format; leave it out, or give {FORMAT}"])
+        raise ScenarioError([f"{where}: {KEY} = {found!r} is not a number of a format; leave it out, or give {FORMAT}"])
     if found > FORMAT:
         raise ScenarioError([f"{where}: {KEY} = {found} is newer than this Airflock, which reads up to {FORMAT}"])
     for step in MIGRATIONS[found - 1 :]:

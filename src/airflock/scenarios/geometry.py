@@ -1,14 +1,15 @@
-"""Checks of a world that need more than one number: convexity, containment, room for all agents."""
+"""Checks of a world that need more than one number: simple polygons, containment, room for all agents."""
 
 import math
 from typing import Any
 
 from shapely.geometry import Point, Polygon, box
+from shapely.validation import explain_validity
 
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import arena, start
+from airflock.world.place import half_sizes
 
-FAR_HEIGHT = 1e9  # half height of an arena that is flown in a plane, m
 MOST_JITTER = 5.8  # standard deviations; no normal number of `core.random` is larger
 JAMMED = 0.5  # covered share at which random sequential placement of discs comes to a halt (it jams at 0.547)
 
@@ -24,30 +25,17 @@ def ground_plan(world: arena.Parameters) -> Any:
 
 
 def polygon_fault(corners: Any) -> str:
-    """Why a list of corners is no convex polygon; empty if it is one."""
+    """Why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
+    twice = [a for a, b in zip(corners, (*corners[1:], corners[0]), strict=True) if tuple(a) == tuple(b)]
+    if twice:
+        return f"gives corner [{twice[0][0]:g}, {twice[0][1]:g}] twice in succession"
     shape = Polygon(corners)
-    if not shape.is_valid or shape.area <= 0.0:
-        return "crosses itself or has no area"
-    if shape.convex_hull.area > shape.area * (1.0 + 1e-9):
-        return "is not convex; split it into convex parts"
-    return ""
-
-
-def counter_clockwise(corners: Any) -> tuple[tuple[float, ...], ...]:
-    """The corners in counter-clockwise order."""
-    ring = Polygon(corners).exterior
-    points = tuple(tuple(c) for c in list(ring.coords)[:-1])
-    return points if ring.is_ccw else points[::-1]
-
-
-def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
-    """Half sizes of an arena, m: of a box, or radius and half height; a plane is taken as very high."""
-    z = 0.5 * world.height if world.dimensions == "3" else FAR_HEIGHT
-    if world.arena == "circle":
-        return world.radius, world.radius, z
-    return 0.5 * world.side, 0.5 * world.side, z
+    if not shape.is_valid:
+        where = [f"{float(c):.4g}" for c in explain_validity(shape).partition("[")[2].rstrip("]").split()]
+        return "crosses or touches itself" + (f" near [{', '.join(where)}]" if where else "")
+    return "" if shape.area > 0.0 else "has no area"
 
 
 def largest_extension(world: arena.Parameters) -> float:
@@ -65,14 +53,16 @@ def largest_extension(world: arena.Parameters) -> float:
 
 
 def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
-    """Why a formation does not fit into the arena. Its ends decide: it is made of straight lines, arenas are convex."""
+    """Why a formation does not fit into the arena. Of straight lines in a convex arena the ends decide."""
     plan = ground_plan(world)
     if plan is None or world.edges == "periodic":
         return []
     margin = MOST_JITTER * begin.jitter if world.edges == "bounce" else 0.0  # it puts whoever is outside onto a face
-    for agent in dict.fromkeys((0, max(agents - 2, 0), agents - 1)):
+    ends = (0, max(agents - 2, 0), agents - 1)
+    for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
         x, y, z = FORMATIONS[begin.kind](agent, begin.spacing_x, begin.spacing_y, begin.spacing_z)
-        high = abs(z) + margin > half_sizes(world)[2] and world.dimensions == "3"
+        low, top = arena.heights_of(world)
+        high = not low + margin <= z <= top - margin and world.dimensions == "3"
         if high or not plan.covers(Point(x, y).buffer(margin) if margin else Point(x, y)):
             spot = f"[{x:g}, {y:g}" + (f", {z:g}]" if world.dimensions == "3" else "]")
             return [
@@ -90,7 +80,7 @@ def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) 
         found += formation_faults(world, begin, agents)
     elif begin.kind != "arena" and world.arena != "none":
         reach = begin.radius if begin.kind == "ball" else 0.5 * begin.side
-        x, y, z = half_sizes(world)
+        z = min(-arena.heights_of(world)[0], arena.heights_of(world)[1]) if world.dimensions == "3" else math.inf
         plan = ground_plan(world)
         round_ = Point(0.0, 0.0).buffer(reach * 0.999, quad_segs=64)
         region = round_ if begin.kind == "ball" else box(-reach, -reach, reach, reach)
@@ -114,12 +104,35 @@ def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[float, fl
     if begin.kind == "box":
         return begin.side**2, begin.side
     plan = ground_plan(world)
-    return (plan.area if plan is not None else math.inf), world.height
+    low, high = arena.heights_of(world)
+    return (plan.area if plan is not None else math.inf), high - low
+
+
+def height_faults(world: arena.Parameters) -> list[str]:
+    """What is wrong with floor, ceiling and the heights of obstacles."""
+    found = []
+    given = [key for key in ("floor", "ceiling") if getattr(world, key) is not None]
+    low, high = arena.heights_of(world)
+    if world.dimensions == "2":
+        found += [f"world.{key}: a plane has no heights; set world.dimensions = '3'" for key in given]
+        found += ["world.heights: a plane has no heights; set world.dimensions = '3'"] if world.heights else []
+        return found
+    if given and not low < high:
+        found.append(f"world.floor = {low:g} m does not lie below world.ceiling = {high:g} m")
+    if given and (world.edges != "open" or world.walls == "nearest_per_axis"):
+        key, value = ("edges", world.edges) if world.edges != "open" else ("walls", world.walls)
+        found.append(f"world.{given[0]}: with world.{key} = {value!r} give world.height instead")
+    if world.heights and len(world.heights) != len(world.obstacles):
+        found.append(f"world.heights: {len(world.heights)} pairs for {len(world.obstacles)} obstacles; give one each")
+    for number, (bottom, top) in enumerate(world.heights):
+        if not bottom < top:
+            found.append(f"world.heights[{number}] = [{bottom:g}, {top:g}] m: the lowest height does not come first")
+    return found
 
 
 def faults(world: arena.Parameters, agents: int, separation: float, begin: start.Parameters) -> list[str]:
     """Everything that is wrong with a world, one line each."""
-    found = []
+    found = height_faults(world)
     if world.arena == "polygon":
         fault = polygon_fault(world.corners)
         if fault:

@@ -40,7 +40,7 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
         )
     spec = util.spec_from_file_location(path.stem, path)
     if spec is None or spec.loader is None:
-        raise ScenarioError([f"{told}: is no Python file"])
+        raise ScenarioError([f"{told}: is not a Python file"])
     module = util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)

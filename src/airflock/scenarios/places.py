@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import SceneError
-from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.scenario import Scenario
 from airflock.scenes.build import Scene, clearance, in_mesh, scene_of
 from airflock.world import scenery, start
+from airflock.world.place import half_sizes
 
 CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
 DRAWN = 64  # positions at which a start region is looked at

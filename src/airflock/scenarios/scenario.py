@@ -113,7 +113,9 @@ class Scenario:
         polygons = self.world.obstacles
         if self.world.arena == "polygon":
             polygons = (self.world.corners, *polygons)
-        return scene_of(self.scene, self.dimensions, polygons if self.model.sight is not None else ())
+        if self.model.sight is None:
+            return scene_of(self.scene, self.dimensions)
+        return scene_of(self.scene, self.dimensions, polygons, self.world.heights)
 
     def waypoints(self) -> Any:
         """Goals in their order (goal, 3), m."""

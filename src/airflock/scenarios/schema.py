@@ -70,7 +70,7 @@ def _holds(interval: Any, value: Any) -> bool:
 def check(section: str, given: Mapping[str, Any], record: type) -> tuple[Any, list[str]]:
     """Record made from a section, or None, and all faults in it."""
     if not isinstance(given, Mapping):
-        return None, [f"{section} = {given!r} is no table of keys"]
+        return None, [f"{section} = {given!r} is not a table of keys"]
     values, faults = plain(section, given, record)
     try:
         clean = schema(record)(**values)
@@ -91,7 +91,7 @@ def _line(section: str, item: Any, record: type) -> str:
     if item["type"] == "extra_forbidden":
         near = get_close_matches(key, known, n=1, cutoff=0.5)
         hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(known)}"
-        return f"{name} is no key; {hint}"
+        return f"{name}: unknown key; {hint}"
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):
         if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -102,7 +102,7 @@ def _line(section: str, item: Any, record: type) -> str:
         hint = f"; did you mean {near[0]}?" if near else ""
         return f"{name} = {value!r} is none of {', '.join(declared.options)}{hint}"
     if isinstance(declared, Text):
-        return f"{name} = {value!r} is no text"
+        return f"{name} = {value!r} is not text"
     assert isinstance(declared, Points)
     if declared.axes > 3:
         return (

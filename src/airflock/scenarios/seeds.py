@@ -28,7 +28,7 @@ def sound_seeds(seeds: int | Iterable[int]) -> list[int]:
         try:
             found = list(range(operator.index(seeds)))
         except TypeError:
-            raise ParameterError(f"seeds = {seeds!r} is no whole number and no list of seeds") from None
+            raise ParameterError(f"seeds = {seeds!r} is neither a whole number nor a list of seeds") from None
     if not found:
         raise ParameterError(f"seeds = {seeds!r}: nothing would be flown; give at least 1")
     return found

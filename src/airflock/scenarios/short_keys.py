@@ -44,5 +44,5 @@ def whole_keys(
         else:
             near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
             full = known.get(near[0], near) if near else []
-            faults.append(f"{key} is no key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
+            faults.append(f"{key}: unknown key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
     return result, notes, faults

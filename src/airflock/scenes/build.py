@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import constrained_delaunay_triangles
+from shapely.geometry import Polygon
 
 from airflock.errors import SceneError
 from airflock.scenes.city import buildings, half_side
 from airflock.scenes.forest import trees
-from airflock.scenes.tree import TALL, Scene, boxes, ground, scene, segments
+from airflock.scenes.tree import TALL, Scene, boxes, ground, scene, segments, triangles
 from airflock.world import bvh, goals, scenery
 from airflock.world.inside import inside
 from airflock.world.shapes import APPEARS, BOX, CYLINDER
@@ -24,9 +26,16 @@ ATTEMPTS = 100_000  # draws of a free point
 
 
 @lru_cache(maxsize=32)
-def scene_of(p: scenery.Parameters, dimensions: int, polygons: Polygons = ()) -> Scene:
-    """Scene as arrays; in a plane every building and tree is its ground plan. polygons : walls besides, m"""
-    walls = [segments([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons]
+def scene_of(
+    p: scenery.Parameters, dimensions: int, polygons: Polygons = (), heights: tuple[tuple[float, ...], ...] = ()
+) -> Scene:
+    """Scene as arrays; in a plane every building and tree is its ground plan.
+
+    polygons : walls besides, m; heights: lowest and highest of the last of them, if they have ends in height, m
+    """
+    tall = len(polygons) - len(heights)
+    walls = [segments([[*a, *b] for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]) for ring in polygons[:tall]]
+    walls += [triangles(_faces(ring, *ends)) for ring, ends in zip(polygons[tall:], heights, strict=True)]
     if p.kind == "none":
         return scene(walls)
     notes: tuple[str, ...] = ()
@@ -48,6 +57,15 @@ def scene_of(p: scenery.Parameters, dimensions: int, polygons: Polygons = ()) ->
     half = half_side(p, rows) + MARGIN
     below = [ground([-half, -half, -DEPTH, half, half, 0.0])] if p.ground == "yes" else []
     return scene([*below, rows, *walls], notes)
+
+
+def _faces(ring: tuple[tuple[float, ...], ...], low: float, high: float) -> list[list[tuple[float, ...]]]:
+    """Triangles (3 corners each, m) of an upright prism over a simple polygon."""
+    pairs = list(zip(ring, ring[1:] + ring[:1], strict=True))
+    found = [[(*a, low), (*b, low), (*b, high)] for a, b in pairs]
+    found += [[(*a, low), (*b, high), (*a, high)] for a, b in pairs]
+    flat = [part.exterior.coords[:3] for part in constrained_delaunay_triangles(Polygon(ring)).geoms]
+    return found + [[(*corner, z) for corner in part] for part in flat for z in (low, high)]
 
 
 def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:

@@ -88,7 +88,7 @@ def read(path: Path) -> Any:
     try:
         import trimesh
     except ModuleNotFoundError as fault:
-        raise SceneError(f"scene.file = {path}: meshes need trimesh; pip install 'airflock[scenes]'") from fault
+        raise SceneError(f"scene.file = {path}: meshes need trimesh: pip install 'airflock[scenes]'") from fault
 
     kind = path.suffix.lower().lstrip(".")
     if not path.is_file():
@@ -114,7 +114,7 @@ def read(path: Path) -> Any:
         )
     if not np.isfinite(corners).all() or faces.max() >= len(corners):
         raise SceneError(
-            f"scene.file = {path}: some corners are no numbers or missing; the file is damaged or cut short"
+            f"scene.file = {path}: some corners are missing or not numbers; the file is damaged or cut short"
         )
     return mesh
 

@@ -15,14 +15,19 @@ WHEEL = np.array([[213, 94, 0], [230, 159, 0], [86, 180, 233], [0, 114, 178], [1
 ALERT = (213, 0, 50)
 CHOSEN = (255, 140, 0)
 INK = "#555555"
+BLUE, RED, GREEN = (0, 114, 178), (213, 94, 0), (0, 158, 115)
+ORANGE, PURPLE, SKY = (230, 159, 0), (204, 121, 167), (86, 180, 233)  # Okabe and Ito 2008
+TERMS = (GREEN, SKY, PURPLE, BLUE, (120, 94, 240), (120, 120, 120))
 LINES = {
     "links": ((170, 180, 195), 1.0),
-    "heard": ((230, 159, 0), 2.0),
-    "ghosts": ((204, 121, 167), 3.0),
-    "command": ((213, 94, 0), 4.0),
-    "terms": ((0, 158, 115), 2.5),
-    "collisions": ((213, 0, 50), 5.0),
-}  # kinds of lines: colour, width in pixels
+    "heard": (ORANGE, 2.0),
+    "ghosts": (PURPLE, 3.0),
+    "measured": (BLUE, 3.0),
+    "command": (RED, 4.0),
+    "terms": (GREEN, 3.0),
+    "rays": ((150, 150, 150), 1.0),
+    "wake": (SKY, 1.5),
+}  # kinds of lines about agents: colour, width in pixels
 
 WAYS = ("speed", "heading", "height", "agent")
 

@@ -4,9 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import constrained_delaunay_triangles
+from shapely.geometry import Polygon
 
 from airflock.scenarios.geometry import ground_plan
 from airflock.scenarios.scenario import Scenario
+from airflock.world.arena import heights_of
 from airflock.world.shapes import BOX, CYLINDER, SEGMENT, TRIANGLE
 
 BLOCK = (176, 182, 190)
@@ -53,12 +56,12 @@ class Stage(NamedTuple):
 def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
     """What stands in the world of a scenario; position (agent, 3) in m says where the flock is, for an open world."""
     world, flat = scenario.world, scenario.dimensions == 2
-    half = 0.5 * world.height
+    bottom, top = heights_of(world)
     solids, lines = [], []
     plan = ground_plan(world)
     if plan is not None:
         corners = np.array(plan.exterior.coords)
-        lines.append(Lines("arena", _frame(corners, 0.0, 0.0) if flat else _frame(corners, -half, half), ARENA))
+        lines.append(Lines("arena", _frame(corners, 0.0, 0.0) if flat else _frame(corners, bottom, top), ARENA))
     shapes = _shapes(scenario)
     points = [np.array(plan.exterior.coords)] if plan is not None else []
     points += [rows[:, c : c + 2] for rows in shapes.values() for c in (0, 3) if len(rows)]
@@ -68,7 +71,8 @@ def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
     span = max(0.55 * float(np.max(high - low)), 1e-3)
     tall = 0.12 * span
     for number, outline in enumerate(world.obstacles):
-        flatly = (0.0, tall) if flat else (-half, half)
+        ends = world.heights[number] if world.heights else (bottom, top)
+        flatly = (0.0, tall) if flat else (ends[0], ends[1])
         solids.append(prism(f"obstacle_{number}", np.array(outline)[:, :2], *flatly, OBSTACLE))
     solids += _scenery(shapes, tall if flat else None)
     goals = scenario.waypoints()
@@ -77,7 +81,7 @@ def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
         cross = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 3]]], float) * size
         lines.append(Lines("goals", (goals[:, None, None] + cross).reshape(-1, 2, 3), GOAL))
     tops = [0.0, *(float(rows[:, 5].max()) for rows in shapes.values() if len(rows))]
-    span_z = (-half, half) if plan is not None else (min(0.0, float(position[:, 2].min())), max(*tops, 1.0, 1.0))
+    span_z = (bottom, top) if plan is not None else (min(0.0, float(position[:, 2].min())), max(*tops, 1.0, 1.0))
     middle = np.array([*(0.5 * (low + high)), 0.0 if flat else 0.5 * (span_z[0] + span_z[1])])
     return Stage(solids, lines, span, middle, (0.0, 0.0) if flat else span_z)
 
@@ -124,7 +128,7 @@ def _box(x0: float, y0: float, z0: float, x1: float, y1: float, z1: float) -> tu
 
 
 def prism(name: str, corners: NDArray[Any], low: float, high: float, colour: tuple[int, int, int]) -> Solid:
-    """Upright prism over a convex ground plan (corner, 2), m."""
+    """Upright prism over a ground plan (corner, 2), m."""
     return Solid(name, *_raised(corners, low, high), colour)
 
 
@@ -133,8 +137,15 @@ def _raised(corners: NDArray[Any], low: float, high: float) -> tuple[NDArray[Any
     n = len(corners)
     vertices = np.array([[x, y, z] for z in (low, high) for x, y in corners], np.float32)
     faces = [t for i in range(n) for t in ((i, (i + 1) % n, n + i), ((i + 1) % n, n + (i + 1) % n, n + i))]
-    faces += [(n, n + i, n + i + 1) for i in range(1, n - 1)]
+    faces += [(n + a, n + b, n + c) for a, b, c in _roof(corners)]
     return vertices, np.array(faces, np.uint32)
+
+
+def _roof(corners: NDArray[Any]) -> list[tuple[int, int, int]]:
+    """Triangles that fill a simple polygon, by the numbers of its corners."""
+    place = {(float(x), float(y)): number for number, (x, y) in enumerate(corners)}
+    found = constrained_delaunay_triangles(Polygon(corners)).geoms
+    return [tuple(place[corner] for corner in triangle.exterior.coords[:3]) for triangle in found]  # type: ignore[misc]
 
 
 def _together(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[Any], NDArray[Any]]:

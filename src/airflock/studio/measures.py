@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from airflock.engine.flight import Flight
-from airflock.metrics.registry import reports
 
 KEPT = 600  # points of a chart
-MOST_LINKS = 4000
+MOST_LINKS = 2500
+BINS = 40  # of a histogram
 
 
 class Instant(NamedTuple):
@@ -42,16 +42,35 @@ class Pairs:
         else:
             self._tree = cKDTree(self.position)
 
+    def apart(self) -> NDArray[np.float64]:
+        """Distance of each agent to its nearest neighbour, m; none of one agent."""
+        if len(self.position) < 2:
+            return np.zeros(0)
+        return np.asarray(self._tree.query(self._tree.data, k=2)[0][:, 1])
+
     def nearest(self) -> float:
         """Smallest distance of two agents, m; nan of one agent."""
-        if len(self.position) < 2:
-            return math.nan
-        far, _ = self._tree.query(self._tree.data, k=2)
-        return float(far[:, 1].min())
+        return float(self.apart().min()) if len(self.position) > 1 else math.nan
 
     def within(self, distance: float) -> NDArray[np.intp]:
         """Pairs (pair, 2) nearer than a distance, m."""
         return np.asarray(self._tree.query_pairs(distance, output_type="ndarray"), np.intp)
+
+    def linked(self, distance: float) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Pairs (pair, 2) nearer than a distance, m, and how far apart; none through a periodic face.
+
+        Of more than can be drawn the nearest.
+        """
+        size = len(self.position)
+        far = distance
+        if size * size > 2 * MOST_LINKS:  # a denser flock than can be drawn: as far as so many neighbours reach
+            count = min(size - 1, max(1, 2 * MOST_LINKS // size))
+            far = min(distance, float(np.quantile(self._tree.query(self._tree.data, k=count + 1)[0][:, -1], 0.9)))
+        pairs = self.within(far)
+        length = np.linalg.norm(self.position[pairs[:, 1]] - self.position[pairs[:, 0]], axis=1)
+        order = np.argsort(length, kind="stable")[:MOST_LINKS]
+        order = order[length[order] <= distance]  # others lie beyond a periodic face
+        return pairs[order], length[order]
 
     def neighbours(self, count: int = 3) -> NDArray[Any]:
         """Segments (segment, 2, 3) from each agent to its nearest others; none through a periodic face."""
@@ -79,29 +98,70 @@ def period_of(scenario: Any) -> tuple[float, float, float] | None:
 
 
 class Measures:
-    """What the charts show: instants, and the course of one order parameter of the present window."""
+    """What the charts show of one side: instants, the course of one order parameter of the present window, and how
+    often which speed and which distance to the nearest neighbour was seen in it.
 
-    def __init__(self) -> None:
+    top, far : ends of the histograms, m/s and m
+    """
+
+    def __init__(self, top: float = 1.0, far: float = 1.0) -> None:
         self.instants: deque[Instant] = deque(maxlen=KEPT)
         self.course: deque[tuple[float, float]] = deque(maxlen=KEPT)
         self.name = ""
+        self.speeds, self.distances = Histogram(top), Histogram(far)
+        self._window = -1
 
     def clear(self) -> None:
         """Forget everything: another flight, or an earlier moment of this one."""
         self.instants.clear()
+        self.fresh()
+
+    def fresh(self) -> None:
+        """A new window begins."""
         self.course.clear()
+        self.speeds.clear()
+        self.distances.clear()
 
     def note(self, flight: Flight, velocity: NDArray[Any], pairs: Pairs) -> dict[str, Any]:
-        """Add the present moment; returns the scores of the present window."""
-        speed = np.sqrt((velocity**2).sum(1))
-        self.instants.append(
-            Instant(flight.time, float(speed.mean()), float(speed.min()), float(speed.max()), pairs.nearest())
-        )
+        """Add the present moment, once; returns the scores of the present window."""
+        if len(flight.windows) != self._window:
+            self._window = len(flight.windows)
+            self.fresh()
         scores = flight.scores()
+        if self.instants and self.instants[-1].time == flight.time:
+            return scores
+        speed, apart = np.sqrt((velocity**2).sum(1)), pairs.apart()
+        nearest = float(apart.min()) if len(apart) else math.nan
+        self.instants.append(Instant(flight.time, float(speed.mean()), float(speed.min()), float(speed.max()), nearest))
+        self.speeds.add(speed)
+        self.distances.add(apart)
         value = scores.get(self.name)
         if isinstance(value, (int, float)) and math.isfinite(value):
             self.course.append((flight.time, float(value)))
         return scores
+
+
+class Histogram:
+    """How often values from 0 to `top` were seen, as shares of all; what is larger counts in the last bin."""
+
+    def __init__(self, top: float):
+        self.edges = np.linspace(0.0, top, BINS + 1)
+        self.counts = np.zeros(BINS)
+
+    def clear(self) -> None:
+        """Forget all values."""
+        self.counts[:] = 0.0
+
+    def add(self, values: NDArray[Any]) -> None:
+        """Count values."""
+        width = self.edges[1]
+        self.counts += np.bincount(np.clip((values / width).astype(int), 0, BINS - 1), minlength=BINS)
+
+    @property
+    def steps(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The outline of the bars: values and shares."""
+        share = self.counts / max(self.counts.sum(), 1.0)
+        return np.repeat(self.edges, 2)[1:-1], np.repeat(share, 2)
 
 
 def chosen_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str:
@@ -110,29 +170,3 @@ def chosen_score(names: Mapping[str, Any], published: Mapping[str, Any]) -> str:
         if name in names and (name in published or not published):
             return name
     return next((name for name in names if name in published), next(iter(names), ""))
-
-
-def score_table(flight: Flight, scores: Mapping[str, Any]) -> str:
-    """Order parameters of this window, of the window before, and of the paper, as HTML."""
-    about, published = reports(flight.scenario.measures), flight.scenario.published
-    before = flight.windows[-1].scores if flight.windows else {}
-    heads = ["", "now", *(["before"] if before else []), *(["paper"] if published else [])]
-    rows = ["<tr>" + "".join(f"<th style='text-align:right'>{head}</th>" for head in heads) + "</tr>"]
-    for name, value in scores.items():
-        if not isinstance(value, (int, float)):
-            continue
-        unit, meaning = about.get(name, ("", ""))
-        cells = [_number(value), *([_number(before.get(name))] if before else [])]
-        if published:
-            mean, spread = published.get(name, (None, None))
-            cells.append(_number(mean) + (f" ± {spread:.2g}" if spread is not None else ""))
-        title = f"{name} ({unit})" if unit else name
-        body = "".join(f"<td style='text-align:right;padding-left:0.8em'>{cell}</td>" for cell in cells)
-        rows.append(f"<tr title='{meaning}'><td>{title}</td>{body}</tr>")
-    begin = flight.windows[-1].end if flight.windows else 0.0
-    table = f"<table style='font-size:0.8em;font-variant-numeric:tabular-nums'>{''.join(rows)}</table>"
-    return f"<div style='padding:0 0.75em'><small>since t = {begin:.3g} s</small>{table}</div>"
-
-
-def _number(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, (int, float)) and math.isfinite(value) else "–"

@@ -1,4 +1,4 @@
-"""Moments kept while a flight goes on, to go back to: every few seconds at first, thinner the longer it lasts."""
+"""Moments kept while flights go on, to go back to: every few seconds at first, thinner the longer they last."""
 
 from bisect import bisect_right
 
@@ -9,14 +9,14 @@ COUNT = 400  # moments at most
 
 
 class Moments:
-    """Snapshots of one flight in the order of their time; where there are too many, every second one is dropped.
+    """Snapshots in the order of their time; where there are too many, every second moment is dropped.
 
     every : flight seconds between two of them; doubles whenever they are thinned
     """
 
     def __init__(self, every: float = 2.0):
         self.every = every
-        self._kept: list[Snapshot] = []
+        self._kept: list[tuple[Snapshot, ...]] = []
         self._times: list[float] = []
 
     def __len__(self) -> int:
@@ -26,12 +26,12 @@ class Moments:
         """Whether the next moment should be kept at this time, s."""
         return not self._times or time >= self._times[-1] + self.every - 1e-9
 
-    def keep(self, time: float, snapshot: Snapshot) -> None:
-        """Keep a moment, s; those after it belong to a past that is given up."""
+    def keep(self, time: float, snapshots: tuple[Snapshot, ...]) -> None:
+        """Keep a moment, s, one snapshot a flight; those after it belong to a past that is given up."""
         self.forget_after(time)
-        self._kept.append(snapshot)
+        self._kept.append(snapshots)
         self._times.append(time)
-        if len(self._kept) > COUNT or sum(len(s.bytes) for s in self._kept) > MOST:
+        if len(self._kept) > COUNT or sum(len(s.bytes) for moment in self._kept for s in moment) > MOST:
             self._kept, self._times = self._kept[::2], self._times[::2]
             self.every *= 2.0
 
@@ -40,7 +40,7 @@ class Moments:
         count = bisect_right(self._times, time - 1e-9)
         del self._kept[count:], self._times[count:]
 
-    def at(self, time: float) -> Snapshot | None:
+    def at(self, time: float) -> tuple[Snapshot, ...] | None:
         """The last moment up to a time, s; the first of all if there is none before."""
         if not self._kept:
             return None

@@ -1,36 +1,31 @@
-"""Player: an open flight that is played, tuned, pushed and taken back; it knows no page."""
+"""Player: one or two open flights on one clock, played, tuned, pushed and taken back; it knows no page."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from airflock import atomic
 from airflock.engine.flight import Flight
-from airflock.errors import AirflockError, RecordingError
-from airflock.recordings import attributes
-from airflock.recordings.files import load_recording, save
-from airflock.recordings.scores import scenario_of
+from airflock.errors import AirflockError, StudioError
+from airflock.recordings.files import save
 from airflock.replays import replay
-from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.studio.controls import fields
+from airflock.studio.asked import Asked
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.saving import flown_again, toml_of
+from airflock.studio.side import Origin, Side
 
-LONGEST = 1e6  # s; an open page has no end of its own
 MOST_BUSY = 0.05  # s of real time flown at most before the page is answered again
 
 
 class Player:
-    """One flight after another of a scenario: what a page shows and what its controls do.
+    """One flight after another of a scenario, or of two side by side: what a page shows and what its controls do.
 
     `ask` may be called from any thread; everything else belongs to the thread that calls `tick`.
 
@@ -38,6 +33,7 @@ class Player:
     settings : keys changed from outside
     seed     : of the first flight; a recording brings its own
     law      : a law that flies instead of the file's; trust : whether code that the file names may run
+    against  : what is flown beside it, with the same seed and noise: another preset or file, or keys of this one
     """
 
     def __init__(
@@ -48,55 +44,85 @@ class Player:
         *,
         law: Any = None,
         trust: bool = False,
+        against: str | Mapping[str, Any] | None = None,
     ):
-        self.where, self.given, self.seed = where, dict(settings or {}), seed
-        self.law, self.trust = law, trust
-        self.source = recorded(where) if where.lower().endswith(".nc") else None
-        if self.source is not None:
-            self.seed = int(self.source.attrs["airflock_seed"])
+        first = Origin.of(where, settings, law, trust=trust)
+        self.origins = [first]
+        if isinstance(against, str):
+            self.origins.append(Origin.of(against, settings, trust=trust))
+        elif against:
+            self.origins.append(replace(first, settings={**first.settings, **against}))
+        self.seed = seed if first.recording is None else int(first.recording.attrs["airflock_seed"])
         self.paused, self.note, self.failure = False, "", ""
+        self.hand = 0  # which side the controls act on
         self._rate = 1e4  # motion steps per second, as measured
         self.fault: Callable[[str], None] = lambda line: None  # is told of everything that was refused
-        self._asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._asked = Asked()
         self._open()
 
     def _open(self) -> None:
-        if self.source is None:
-            self.preset = endless(load(self.where, self.given, self.law, trust=self.trust))
-            self.flight = Flight(self.preset, self.seed)
-        else:
-            self.preset = endless(scenario_of(self.source, self.given))
-            same = not self.given and self.seed == int(self.source.attrs["airflock_seed"])
-            events = attributes.events(self.source) if same else []
-            precision = int(self.source.attrs["airflock_precision"])
-            self.flight = Flight(self.preset, self.seed, precision=precision, events=events)
-        self.pace = Pace(self.preset.flight.dt, getattr(self, "pace", Pace(1.0)).speed)
+        sides = [Side(origin, self.seed) for origin in self.origins]
+        if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
+            flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]
+            raise StudioError(f"two flights side by side share one scene: {flown[0]} and {flown[1]} dimensions do not")
+        self.sides, self.hand = sides, min(self.hand, len(sides) - 1)
+        self.pace = Pace(sides[0].preset.flight.dt, getattr(self, "pace", Pace(1.0)).speed)
         self.moments, self.failure = Moments(), ""
-        self.changed: dict[str, Any] = {}
-        self._before: list[dict[str, Any]] = []
 
     def start(self) -> None:
         """Place the agents; compiles what has not been compiled yet."""
-        _ = self.motion
+        for side in self.sides:
+            _ = side.motion
 
     # ------------------------------------------------------------------------------------------------- state
 
     @property
+    def side(self) -> Side:
+        """The side that the controls act on."""
+        return self.sides[self.hand]
+
+    @property
+    def flight(self) -> Flight:
+        """The flight of that side."""
+        return self.side.flight
+
+    @property
     def scenario(self) -> Scenario:
-        """The scenario in force."""
-        return self.flight.scenario
+        """The scenario in force on that side."""
+        return self.side.scenario
+
+    @property
+    def preset(self) -> Scenario:
+        """The scenario that it started from."""
+        return self.side.preset
+
+    @property
+    def changed(self) -> dict[str, Any]:
+        """Keys that differ from it, with their values."""
+        return self.side.changed
+
+    @property
+    def where(self) -> str:
+        """What is flown, in words."""
+        first, *others = self.origins
+        return " | ".join([first.where, *(other.beside(first) for other in others)])
 
     @property
     def motion(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0."""
-        return in_space(self.flight.state, self.scenario.dimensions)
+        """Positions (agent, 3) in m and velocities (agent, 3) in m/s of that side."""
+        return self.side.motion
+
+    @property
+    def time(self) -> float:
+        """The one clock, s."""
+        return self.sides[0].flight.time
 
     @property
     def status(self) -> str:
         """What a page says while it waits, or why it stopped; empty while all is well."""
         if self.failure:
             return self.failure
-        return "compiling …" if self.flight.waiting else self.note
+        return "compiling …" if any(side.flight.waiting for side in self.sides) else self.note
 
     # ------------------------------------------------------------------------------------------------ playing
 
@@ -104,10 +130,14 @@ class Player:
         """Do something before the next frame; from any thread."""
         self._asked.put(action)
 
+    def wait(self, seconds: float) -> bool:
+        """Wait for some seconds of real time, or until something was asked for and done. Whether it was."""
+        return self._asked.rung(seconds) and self._asked.answer(self._safely)
+
     def tick(self, elapsed: float) -> bool:
         """Do what was asked for, then fly what is due after `elapsed` s of real time. Whether anything moved."""
-        asked = self._answer()
-        if self.paused or self.failure or self.flight.over:
+        asked = self._asked.answer(self._safely)
+        if self.paused or self.failure or any(side.flight.over for side in self.sides):
             return asked
         steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
         if not steps:
@@ -115,16 +145,6 @@ class Player:
         began, moved = perf_counter(), self.fly(steps)
         self._rate = steps / max(perf_counter() - began, 1e-6)
         return moved or asked
-
-    def _answer(self) -> bool:
-        done = False
-        while True:
-            try:
-                action = self._asked.get_nowait()
-            except Empty:
-                return done
-            done = True
-            self._safely(action)
 
     def _safely(self, action: Callable[[], None]) -> None:
         """Do something; a fault of the user's is a note on the page and a line in the terminal, and nothing else."""
@@ -136,10 +156,13 @@ class Player:
 
     def fly(self, steps: int) -> bool:
         """Fly so many steps, and keep a moment where one is due; a flight that fails stops and says why."""
-        if self.moments.due(self.flight.time):
-            self.moments.keep(self.flight.time, self.flight.snapshot())
+        if self.moments.due(self.time):
+            self.moments.keep(self.time, tuple(side.flight.snapshot() for side in self.sides))
+        clock = self.sides[0]
+        end = (clock.flight.step + steps) * clock.scenario.flight.dt
         try:
-            self.flight.advance(steps=steps)
+            for side in self.sides:
+                side.fly_to(end)
         except AirflockError as fault:
             self.failure = f"stopped: {fault}"
             self.fault(self.failure)
@@ -149,83 +172,113 @@ class Player:
     def step(self) -> None:
         """Pause, and fly to the next decision: one step of the flock."""
         self.paused = True
-        every = max(1, round(self.scenario.sensors.period / self.scenario.flight.dt))
-        self.fly(every - self.flight.step % every)
+        scenario, flight = self.sides[0].scenario, self.sides[0].flight
+        every = max(1, round(scenario.sensors.period / scenario.flight.dt))
+        self.fly(every - flight.step % every)
 
     def toggle(self) -> None:
         """Pause, or fly on."""
         self.paused = not self.paused
 
     def back(self, time: float) -> None:
-        """Go back to the last moment kept up to a time, s, and wait there."""
+        """Go back to a time, s, and wait there; what came after it is given up. Of a failed flight, to a moment before.
+
+        Before a fork there is one flight again.
+        """
+        time = min(max(time, 0.0), self.time)
         moment = self.moments.at(time)
         if moment is None:
             return
-        self.flight.restore(moment)
-        self.failure, self.note, self.paused = "", f"back at t = {self.flight.time:g} s", True
-        self.changed = _changes(self.flight)
+        del self.sides[len(moment) :]
+        self.hand = min(self.hand, len(self.sides) - 1)
+        for side, kept in zip(self.sides, moment, strict=True):
+            if self.failure:
+                side.restore(kept)
+            else:
+                side.again(kept, time)
+        self.moments.forget_after(time + 1e-6)
+        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s", True
 
     def reset(self, seed: int | None = None, settings: Mapping[str, Any] | None = None) -> None:
-        """Another flight: of the same or another seed, or with other keys, such as the number of agents."""
-        known = self.seed, self.given
+        """Another flight: of the same or another seed, or with other keys, such as the number of agents.
+
+        A fork ends with its flight; two that were opened side by side begin anew.
+        """
+        known = self.seed, self.origins
         self.seed = self.seed if seed is None else seed
-        self.given = {**self.given, **(settings or {})}
+        self.origins = [replace(o, settings={**o.settings, **(settings or {})}) for o in self.origins]
         try:
             self._open()
         except AirflockError:
-            self.seed, self.given = known
+            self.seed, self.origins = known
             raise
         self.note = ""
+
+    # ---------------------------------------------------------------------------------------------- comparing
+
+    def fork(self) -> None:
+        """Fly a second flight beside this one from here on, with the same noise, and let the controls act on it.
+
+        A second flight that there was already ends.
+        """
+        if len(self.sides) > 1:
+            self.moments = Moments()
+        self.origins, self.sides = [self.side.origin], [self.side, self.side.fork()]
+        self.hand = 1
+        self.note = f"forked at t = {self.time:g} s: the controls act on B"
+
+    def join(self) -> None:
+        """End the comparison: the side that the controls act on flies on alone."""
+        self.origins = [self.side.origin]
+        self.sides, self.hand = [self.side], 0
+        self.moments, self.note = Moments(), ""
 
     # ------------------------------------------------------------------------------------------------- tuning
 
     def change(self, key: str, value: Any) -> None:
         """Set a key of the scenario from now on; what must be compiled comes into force when that is done."""
-        self.flight.change({key: value}, wait=False)
-        self._before.append(dict(self.changed))
-        self.changed = {**self.changed, key: value}
+        self.side.change({key: value})
         self.note = ""
 
-    def undo(self) -> dict[str, Any]:
-        """Take the last change back, as a further change. Returns the keys set, with their values."""
-        if not self._before:
-            return {}
-        earlier = self._before.pop()
-        return self._return_to(earlier)
+    # -------------------------------------------------------------------------------------------------- acting
 
-    def to_preset(self) -> dict[str, Any]:
-        """Set everything that was changed back to the preset. Returns the keys set, with their values."""
-        self._before.append(dict(self.changed))
-        return self._return_to({})
-
-    def _return_to(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        keys = [key for key in self.changed if wanted.get(key) != self.changed[key]]
-        values = {key: wanted[key] if key in wanted else value_of(self.preset, key) for key in keys}
-        if values:
-            self.flight.change(values, wait=False)
-        self.changed = dict(wanted)
-        return values
-
-    def push(self, agent: int, speed: float) -> None:
-        """Push an agent sideways, m/s: at a right angle to its velocity, to its left."""
-        _, velocity = self.motion
+    def push(self, agent: int, speed: float, side: int = 0) -> None:
+        """Push an agent of a side sideways, m/s: at a right angle to its velocity, to its left."""
+        pushed = self.sides[side]
+        _, velocity = pushed.motion
         vx, vy = float(velocity[agent, 0]), float(velocity[agent, 1])
         fast = max(float(np.hypot(vx, vy)), 1e-9)
         left = [-vy / fast * speed, vx / fast * speed, 0.0] if fast > 1e-6 else [0.0, speed, 0.0]
-        self.flight.push(agent, left[: self.scenario.dimensions])
+        pushed.flight.push(agent, left[: pushed.scenario.dimensions])
+
+    def gust(self, east: float, north: float, seconds: float) -> None:
+        """Let the wind blow stronger by so much (m/s) for some seconds, on all sides."""
+        for side in self.sides:
+            side.gust(east, north, seconds)
+
+    def throw(self, x: float, y: float, width: float) -> None:
+        """Throw a square obstacle of a width, m, into the worlds of all sides; refused where an agent is."""
+        for name, side in zip("AB", self.sides, strict=False):
+            side.clear_of(x, y, width, name if len(self.sides) > 1 else "")
+        for side in self.sides:
+            side.throw(x, y, width)
+
+    def move_goal(self, number: int, place: Sequence[float]) -> None:
+        """Put a goal somewhere else, m, on all sides that have it."""
+        for side in self.sides:
+            side.move_goal(number, place)
 
     # ------------------------------------------------------------------------------------------------- saving
 
     @property
     def command(self) -> str:
         """The command that opens the present scenario again."""
-        parts = ["airflock watch", self.where, fields({**self.given, **self.changed}), f"--seed {self.seed}"]
-        return " ".join(part for part in parts if part)
+        return self.side.command(self.seed)
 
     def save_toml(self, path: Path) -> Path:
         """Write the preset's file with the keys changed here, its comments and sources kept."""
-        document = None if self.source is None else attributes.scenario_document(self.source)
-        atomic.write(path, toml_of(self.where, {**self.given, **self.changed}, document))
+        origin = self.side.origin
+        atomic.write(path, toml_of(origin.where, self.side.settings, origin.document))
         return path
 
     def save_recording(self, path: Path) -> Path:
@@ -235,40 +288,3 @@ class Player:
     def save_replay(self, path: Path) -> Path:
         """Write the flight up to now as one HTML file that plays it."""
         return replay(flown_again(self.flight)).save(path)
-
-
-def recorded(where: str) -> xr.Dataset:
-    """A recording that can be flown again. Raises RecordingError for any other, and says what shows it."""
-    found = load_recording(where)
-    if "airflock_scenario" not in found.attrs or not int(found.attrs.get("random_start", 1)):
-        raise RecordingError(f"{where}: was not flown from a scenario and a seed; airflock replay {where} shows it")
-    return found
-
-
-def endless(scenario: Scenario) -> Scenario:
-    """The scenario with the longest duration that a flight can have."""
-    longest = min(LONGEST, 0.9 * 2**31 * scenario.flight.dt)
-    document = {**scenario.document, "duration": longest}
-    return replace(scenario, flight=replace(scenario.flight, duration=longest), document=document)
-
-
-def in_space(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Positions and velocities (agent, 3) from a state (component, agent) of two or three dimensions."""
-    found = np.zeros((2, state.shape[1], 3), np.float32)
-    found[0, :, :dimensions], found[1, :, :dimensions] = state[:dimensions].T, state[dimensions : 2 * dimensions].T
-    return found[0], found[1]
-
-
-def value_of(scenario: Scenario, key: str) -> Any:
-    """Value of a key such as model.p_rep."""
-    section, _, name = key.partition(".")
-    return getattr(scenario.parameters if section == "model" else getattr(scenario, section), name)
-
-
-def _changes(flight: Flight) -> dict[str, Any]:
-    """Keys that are changed at the present moment of a flight, with their values."""
-    found: dict[str, Any] = {}
-    for event in flight.events:
-        if event.kind == "change":
-            found |= event.data
-    return found

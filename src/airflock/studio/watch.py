@@ -16,6 +16,7 @@ def watch(
     trust: bool = False,
     host: str = "127.0.0.1",
     port: int = 8080,
+    against: str | os.PathLike[str] | Mapping[str, Any] | None = None,
     say: Callable[[str], None] = print,
 ) -> None:
     """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, save what is found.
@@ -27,6 +28,8 @@ def watch(
     trust    : whether code that the file names, such as a law in a Python file, may run
     host     : address to listen at; 0.0.0.0 lets other machines in
     port     : port to listen at; 0 takes any free one
+    against  : what flies beside it on the same clock, with the same seed and noise: another preset or file, or keys
+               with values, such as {"model.p_rep": 0.2}
     say      : is told each line: notes, the address of the page, faults
 
     Raises ScenarioError for a scenario that cannot be flown, and StudioError for a port in use, one line each.
@@ -40,8 +43,9 @@ def watch(
     >>> import airflock
     >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
     """
-    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust)
-    for note in player.scenario.notes:
+    rival = against if against is None or isinstance(against, Mapping) else str(against)
+    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust, against=rival)
+    for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
         say(f"note: {note}")
     from airflock.studio.page import Page
     from airflock.studio.view import View
@@ -52,9 +56,12 @@ def watch(
     view = View(host, port, player.where)
     try:
         page = Page(player, view)
-        say(f"watch at {view.address}  (Ctrl-C ends)")
-        page.run()
-    except KeyboardInterrupt:
-        say(f"ended at t = {player.flight.time:.1f} s")
+        try:
+            say(f"watch at {view.address}  (Ctrl-C ends)")
+            page.run()
+        except KeyboardInterrupt:
+            say(f"ended at t = {player.time:.1f} s")
+        finally:
+            page.evolving.stop()
     finally:
         view.stop()

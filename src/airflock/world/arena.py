@@ -9,12 +9,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, points, quantity
+from airflock.core.parameters import choice, points, quantity, text
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Where flying is allowed. The arena's centre is the origin; in 3-D it reaches from -height/2 to height/2."""
+    """Where flying is allowed. Positions are relative to the arena's centre; corners are given where they are.
+
+    In 3-D an arena reaches from -height/2 to height/2, or from floor to ceiling.
+    """
 
     dimensions: str = choice("2", ("2", "3"), meaning="flight in a plane or in space")
     arena: str = choice("square", ("square", "circle", "polygon", "none"), meaning="shape of the ground plan")
@@ -23,7 +26,17 @@ class Parameters(Record):
     )
     radius: float = quantity(125.0, "m", low=0.1, high=1e6, meaning="radius of a circular arena")
     height: float = quantity(100.0, "m", low=0.1, high=1e5, meaning="height of a 3-D arena")
-    corners: tuple[tuple[float, ...], ...] = points("m", 2, meaning="corners of a convex polygonal arena, in order")
+    floor: float | None = quantity(
+        None, "m", low=-1e5, high=1e5, meaning="lowest height of a 3-D arena; by default -height/2"
+    )
+    ceiling: float | None = quantity(
+        None, "m", low=-1e5, high=1e5, meaning="highest height of a 3-D arena; by default height/2"
+    )
+    corners: tuple[tuple[float, ...], ...] = points(
+        "m",
+        2,
+        meaning="corners of a polygonal arena in order; any polygon whose edges do not cross, concave ones too",
+    )
     walls: str = choice(
         "every_edge",
         ("every_edge", "nearest_per_axis"),
@@ -37,8 +50,25 @@ class Parameters(Record):
         meaning="beyond a square's faces: nothing happens; clamped with the velocity reversed; or in again opposite",
     )
     obstacles: tuple[tuple[tuple[float, ...], ...], ...] = points(
-        "m", 3, meaning="convex polygons that must not be entered, each a list of corners"
+        "m", 3, meaning="polygons that must not be entered, each a list of corners: trees, houses, holes of the arena"
     )
+    heights: tuple[tuple[float, ...], ...] = points(
+        "m", 2, meaning="lowest and highest height of each obstacle in 3-D, [[low, high], ...]; by default without end"
+    )
+    file: str = text(
+        meaning="GeoJSON or KML file with the arena: its largest polygon gives world.corners, holes and polygons in it "
+        "are obstacles; beside the scenario or absolute"
+    )
+    simplify: float = quantity(
+        0.0, "m", low=0.0, high=1000.0, meaning="file: how far outlines may move to have fewer corners"
+    )
+
+
+def heights_of(world):
+    """Lowest and highest height of a 3-D arena, m."""
+    low = -0.5 * world.height if world.floor is None else world.floor
+    high = 0.5 * world.height if world.ceiling is None else world.ceiling
+    return low, high
 
 
 class Surface(NamedTuple):

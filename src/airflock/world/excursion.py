@@ -6,7 +6,7 @@ the arena needs.
 
 import math
 
-from airflock.world.arena import convex_obstacle
+from airflock.world.polygon import obstacle
 
 
 def beyond_box(x, y, z, half_x, half_y, half_z, edges, corners):
@@ -30,8 +30,8 @@ def beyond_cylinder(x, y, z, half_x, half_y, half_z, edges, corners):
 
 
 def beyond_polygon(x, y, z, half_x, half_y, half_z, edges, corners):
-    """Distance to an upright convex prism: the first `corners` rows of edges, and half height half_z."""
-    er = convex_obstacle(x, y, z, edges, 0, corners).distance
+    """Distance to an upright prism: the polygon of the first `corners` rows of edges, and half height half_z."""
+    er = obstacle(x, y, z, edges, 0, corners).distance
     ez = abs(z) - half_z
     pr = max(er, 0.0)
     pz = max(ez, 0.0)

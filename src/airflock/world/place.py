@@ -3,13 +3,12 @@
 Made from the record of an arena and, where a scene stands in it, from rows of shapes behind their tree.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from airflock.core.maths import FAR
-from airflock.world import arena, bvh, excursion, rays
+from airflock.world import arena, bvh, excursion, polygon, rays
 from airflock.world.arena import Surface
 
 Corners = Sequence[Sequence[float]]
@@ -29,36 +28,113 @@ def counter_clockwise(corners: Corners) -> list[Sequence[float]]:
 
 
 def polygon_fault(corners: Corners) -> str:
-    """Why a list of corners is no convex polygon; empty if it is one."""
+    """Why a list of corners is no simple polygon; empty if it is one."""
     if len(corners) < 3:
         return f"has {len(corners)} corners; a polygon needs at least 3"
-    ring = counter_clockwise(corners)
-    if area(ring) <= 0.0:
-        return "has no area"
-    n, round_ = len(ring), 0.0
+    n = len(corners)
     for k in range(n):
-        a, b, c = ring[k], ring[(k + 1) % n], ring[(k + 2) % n]
-        ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
-        turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
-        if not -1e-9 <= turn < math.pi:
-            return "is not convex; split it into convex parts"
-        round_ += turn
-    return "crosses itself" if round_ > 2.0 * math.pi + 1e-6 else ""
+        if tuple(corners[k][:2]) == tuple(corners[(k + 1) % n][:2]):
+            return f"gives corner [{corners[k][0]:g}, {corners[k][1]:g}] twice in succession"
+    edges = [(corners[k], corners[(k + 1) % n]) for k in range(n)]
+    for k in range(n):
+        if _folds(*edges[k], edges[(k + 1) % n][1]):
+            return f"turns back on itself at [{edges[k][1][0]:g}, {edges[k][1][1]:g}]"
+        for m in range(k + 2, n if k else n - 1):  # neighbours share a corner
+            if _meet(*edges[k], *edges[m]):
+                return f"crosses or touches itself near [{edges[m][0][0]:g}, {edges[m][0][1]:g}]"
+    return "" if area(corners) != 0.0 else "has no area"
+
+
+def is_convex(corners: Corners) -> bool:
+    """Whether a simple polygon turns one way only."""
+    ring = counter_clockwise(corners)
+    n = len(ring)
+    return all(_turn(ring[k], ring[(k + 1) % n], ring[(k + 2) % n]) >= -1e-9 * abs(area(ring)) for k in range(n))
+
+
+def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Twice the signed area of a triangle, m²: positive for a turn to the left at b."""
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _folds(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> bool:
+    """Whether the way a b c goes back over itself."""
+    return _turn(a, b, c) == 0.0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0
+
+
+def _meet(a: Sequence[float], b: Sequence[float], c: Sequence[float], d: Sequence[float]) -> bool:
+    """Whether the segments a b and c d have a point in common."""
+    for k in (0, 1):
+        if max(a[k], b[k]) < min(c[k], d[k]) or max(c[k], d[k]) < min(a[k], b[k]):
+            return False
+    return _turn(a, b, c) * _turn(a, b, d) <= 0.0 and _turn(c, d, a) * _turn(c, d, b) <= 0.0
 
 
 def half_sizes(world: arena.Parameters) -> tuple[float, float, float]:
     """Half sizes of an arena, m: of a box, or radius and half height; a plane is taken as very high."""
-    z = 0.5 * world.height if world.dimensions == "3" else FAR_HEIGHT
+    z = FAR_HEIGHT
+    if world.dimensions == "3":
+        low, high = arena.heights_of(world)
+        z = 0.5 * (high - low)
     if world.arena == "circle":
         return world.radius, world.radius, z
     return 0.5 * world.side, 0.5 * world.side, z
 
 
+def raised(world: arena.Parameters) -> bool:
+    """Whether the middle of an arena between floor and ceiling lies elsewhere than at height 0."""
+    return world.dimensions == "3" and world.arena != "none" and middle(world) != 0.0
+
+
+def middle(world: arena.Parameters) -> float:
+    """Height of the middle of an arena, m."""
+    low, high = arena.heights_of(world)
+    return 0.5 * (low + high) if world.dimensions == "3" else 0.0
+
+
+def obstacle_rule(world: arena.Parameters) -> Callable[..., Any]:
+    """Surface function of the obstacles: convex ones, any polygons, or prisms with ends in height."""
+    if world.heights:
+        return polygon.prism
+    return arena.convex_obstacle if all(map(is_convex, world.obstacles)) else polygon.obstacle
+
+
+def edge_rows(world: arena.Parameters) -> tuple[list[list[float]], int, list[list[int]]]:
+    """Edges of all polygons (rows ax ay bx by), how many are the arena's, and first and last row of each obstacle.
+
+    Behind the edges of the arena stands the height of its middle where it is `raised`, behind those of each obstacle
+    its two heights where obstacles have any.
+    """
+    rows: list[list[float]] = []
+    spans = []
+
+    def add(corners: Corners) -> None:
+        ring = counter_clockwise(corners)
+        rows.extend([*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
+
+    if world.arena == "polygon":
+        add(world.corners)
+    own = len(rows)
+    if raised(world):
+        rows.append([middle(world), 0.0, 0.0, 0.0])
+    for number, corners in enumerate(world.obstacles):
+        first = len(rows)
+        add(corners)
+        spans.append([first, len(rows)])
+        if world.heights:
+            rows.append([*world.heights[number][:2], 0.0, 0.0])
+    return rows, own, spans
+
+
 def walls(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[float, ...]]]:
-    """Surface function of each wall with its four numbers, in the order in which a driver asks them."""
+    """Surface function of each wall with its four numbers, in the order in which a driver asks them.
+
+    The edges of a polygon are no such walls: `Place.surfaces` asks `polygon.wall`.
+    """
     h, z = 0.5 * world.side, 0.5 * world.height
     three = world.dimensions == "3"
-    caps = [(arena.plane, (0.0, 0.0, 1.0, z)), (arena.plane, (0.0, 0.0, -1.0, z))] if three else []
+    low, high = arena.heights_of(world)
+    caps = [(arena.plane, (0.0, 0.0, 1.0, -low)), (arena.plane, (0.0, 0.0, -1.0, high))] if three else []
     if world.arena == "none" or world.edges == "periodic":
         return []
     if world.arena == "circle":
@@ -66,8 +142,9 @@ def walls(world: arena.Parameters) -> Sequence[tuple[Callable[..., Any], tuple[f
     if world.arena == "square" and world.walls == "nearest_per_axis":
         axes = [(1.0, 0.0, 0.0, h), (0.0, 1.0, 0.0, h)] + ([(0.0, 0.0, 1.0, z)] if three else [])
         return [(arena.slab, axis) for axis in axes]
-    square = ((-h, -h), (h, -h), (h, h), (-h, h))
-    corners = square if world.arena == "square" else counter_clockwise(world.corners)
+    if world.arena == "polygon":
+        return caps
+    corners = ((-h, -h), (h, -h), (h, h), (-h, h))
     return [(arena.plane, inward(a, b)) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)] + caps
 
 
@@ -115,21 +192,14 @@ class Place:
         self._scene = found.shapes, found.nodes, found.links
         kind = "none" if world.edges == "periodic" else world.arena
         self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
-        self._edges: list[list[float]] = []
-        if world.arena == "polygon":
-            self._add(world.corners)
-        self._corners = len(self._edges)
-        self._obstacles = [self._add(corners) for corners in world.obstacles]
-
-    def _add(self, corners: Corners) -> tuple[int, int]:
-        first, ring = len(self._edges), counter_clockwise(corners)
-        self._edges += [[*a[:2], *b[:2]] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)]
-        return first, len(self._edges)
+        self._edges, self._corners, self._obstacles = edge_rows(world)
+        self._obstacle, self._middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
 
     def surfaces(self, x: float, y: float, z: float) -> Iterator[Surface]:
         """Distance (m) and unit normal of every wall, every obstacle, and the nearest of the ground and the scene."""
         for function, row in self._walls:
             yield function(x, y, z, *row)
+        yield from self.sides(x, y, z, self._look)
         if not self._casts:
             yield from self.obstacles(x, y, z)
         for ground in (0.0, 1.0)[: self._dims - 1]:
@@ -137,10 +207,21 @@ class Place:
             if found.distance < self._look:
                 yield found
 
+    def sides(self, x: float, y: float, z: float, look: float) -> Iterator[Surface]:
+        """Distance (m) and unit normal of every side of a polygonal arena that acts on a position."""
+        for e in range(self._corners if self._clear is rays.to_polygon else 0):
+            found = polygon.wall(x, y, z, self._edges, e, self._corners, look)
+            if found.distance < look:
+                yield found
+        if self._clear is rays.to_polygon:
+            found = polygon.outside(x, y, z, self._edges, self._corners)
+            if found.distance < 0.0:
+                yield found
+
     def obstacles(self, x: float, y: float, z: float) -> Iterator[Surface]:
         """Distance (m) and unit normal of every obstacle."""
         for first, last in self._obstacles:
-            yield arena.convex_obstacle(x, y, z, self._edges, first, last)
+            yield self._obstacle(x, y, z, self._edges, first, last)
 
     def solids(self, x: float, y: float, z: float) -> Iterator[Surface]:
         """Distance (m) and unit normal of every obstacle and of the nearest of what stands in the scene."""
@@ -149,18 +230,28 @@ class Place:
         if found.distance < AWAY:
             yield found
 
+    def distances(self, x: float, y: float, z: float) -> Iterator[tuple[str, float]]:
+        """Distance (m, negative beyond or within) to the walls, to each obstacle, and to what stands in the scene."""
+        yield "wall", -self._beyond(x, y, z - self._middle, *self._half, self._edges, self._corners)
+        for number, surface in enumerate(self.obstacles(x, y, z)):
+            yield f"obstacle {number}", surface.distance
+        yield "scene", bvh.nearest(x, y, z, AWAY, *self._scene).distance
+
     def excursion(self, x: float, y: float, z: float) -> float:
         """Distance outside the arena or inside an obstacle or a shape, m; negative where flying is allowed."""
-        out = self._beyond(x, y, z, *self._half, self._edges, self._corners)
+        out = self._beyond(x, y, z - self._middle, *self._half, self._edges, self._corners)
         for surface in self.obstacles(x, y, z):
             out = max(out, -surface.distance)
         return float(max(out, -bvh.nearest(x, y, z, AWAY, *self._scene).distance))
 
     def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float) -> float:
         """Free distance (m, at most length) of a thin ray along a unit vector."""
-        free = min(length, self._clear(x, y, z, ux, uy, uz, *self._half, self._edges, self._corners))
+        free = min(length, self._clear(x, y, z - self._middle, ux, uy, uz, *self._half, self._edges, self._corners))
         for first, last in self._obstacles:
-            free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
+            if self._obstacle is polygon.prism:
+                free = min(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, self._edges, first, last))
+            else:
+                free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
 
     def cast(
@@ -172,5 +263,5 @@ class Place:
             sides = (AWAY, AWAY) if self._flat else (self._half[0] - radius, self._half[1] - radius)
             up = self._half[2] - radius if self._dims == 3 else AWAY
             rule = rays.to_box if self._flat else self._clear
-            free = min(free, rule(x, y, z, ux, uy, uz, *sides, up, self._edges, 0))
+            free = min(free, rule(x, y, z - self._middle, ux, uy, uz, *sides, up, self._edges, 0))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, radius, *self._scene)) if self._casts else float(free)

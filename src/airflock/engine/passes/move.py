@@ -80,14 +80,13 @@ def in_formation(build: Builder, put: str = "{}[i]", w: str = "w") -> list[str]:
 
 def beyond(build: Builder) -> str:
     """Call of the excursion of position sx sy sz, obstacles included."""
-    from airflock.world.arena import convex_obstacle
-
     name = "excursion"
     if not any(f"def {name}(" in text for text in build.functions):
         rule = build.source.name(build.plan.excursion)
-        lines = [f"e = {rule}(x, y, z, w.half_x, w.half_y, w.half_z, edges, corners)"]
+        height = "z - edges[corners, 0]" if build.plan.raised else "z"
+        lines = [f"e = {rule}(x, y, {height}, w.half_x, w.half_y, w.half_z, edges, corners)"]
         if build.plan.obstacles:
-            obstacle = build.source.name(convex_obstacle)
+            obstacle = build.source.name(build.plan.obstacle)
             lines += loop(
                 "o in range(obstacles)",
                 [f"e = most(e, -{obstacle}(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)"],

@@ -4,7 +4,7 @@ from airflock.core import random
 from airflock.core.vocabulary import BOUND, Percept
 from airflock.engine.passes import scene
 from airflock.engine.passes.build import Builder, loop
-from airflock.world import bvh, rays
+from airflock.world import bvh, polygon, rays
 
 FIELDS = ("half_x", "half_y", "half_z", "agent", "step", "world", "seed_low", "seed_high", "corners", "obstacles")
 REST = "w.half_x, w.half_y, w.half_z, {}, k_, world, seed_low, seed_high, corners, obstacles, edges, spans"
@@ -48,11 +48,14 @@ def _ray(build: Builder) -> list[str]:
     rule = build.source.name(build.plan.ray)
     lines = ["x = -percept.centre_x; y = -percept.centre_y; z = -percept.centre_z"]
     rest = "percept.half_x, percept.half_y, percept.half_z, percept.edges, percept.corners"
-    lines += [f"t = least(length, {rule}(x, y, z, ux, uy, uz, {rest}))"]
+    height = "z - percept.edges[percept.corners, 0]" if build.plan.raised else "z"
+    lines += [f"t = least(length, {rule}(x, y, {height}, ux, uy, uz, {rest}))"]
     if build.plan.obstacles:
-        edge = build.source.name(rays.to_edges)
+        prisms = build.plan.obstacle is polygon.prism
+        edge = build.source.name(polygon.ray_to_prism if prisms else rays.to_edges)
+        given = "x, y, z, ux, uy, uz" if prisms else "x, y, ux, uy"
         spans = "percept.edges, percept.spans[o, 0], percept.spans[o, 1]"
-        lines += loop("o in range(percept.obstacles)", [f"t = least(t, {edge}(x, y, ux, uy, {spans}))"])
+        lines += loop("o in range(percept.obstacles)", [f"t = least(t, {edge}({given}, {spans}))"])
     if build.plan.scene:
         tree = build.source.name(bvh.cast)
         given = "x, y, z, ux, uy, uz, t, ZERO, percept.shapes, percept.nodes, percept.links"

@@ -57,7 +57,8 @@ def cast(build: Builder) -> list[str]:
         rule = build.source.name(rays.to_box if plan.ray is rays.to_polygon else plan.ray)
         sides = "LIMIT, LIMIT" if plan.ray is rays.to_polygon else "percept.half_x - radius, percept.half_y - radius"
         height = "percept.half_z - radius" if plan.dimensions == 3 else "LIMIT"
-        lines += [f"t = least(t, {rule}(x, y, z, ux, uy, uz, {sides}, {height}, percept.edges, 0))"]
+        level = "z - percept.edges[percept.corners, 0]" if plan.raised else "z"
+        lines += [f"t = least(t, {rule}(x, y, {level}, ux, uy, uz, {sides}, {height}, percept.edges, 0))"]
     if sees(build):
         near, tree = build.source.name(bvh.cast_near), build.source.name(bvh.cast)
         given = "x, y, z, ux, uy, uz, t, radius, percept.shapes"

@@ -13,6 +13,16 @@ def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
     return flock.velocity[a][i] + flock.own_drift[a][i] if plan.noisy and a < plan.dimensions else flock.velocity[a][i]
 
 
+def fields(record: Any) -> range:
+    """Numbers of the fields of a record; none where there is no record."""
+    return range(len(getattr(record, "_fields", ())))
+
+
+def remembered(i: int, flock: Flock, *, plan: Plan) -> Any:
+    """What the body of agent i remembers."""
+    return plan.body.Memory(*[flock.body[c][i] for c in fields(plan.body.Memory)])  # type: ignore[misc]
+
+
 def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan) -> None:
     """Velocities by the rule of the body."""
     v, command = flock.velocity, flock.command
@@ -21,10 +31,12 @@ def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, w
             plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
             mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
             gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
-            dt=numbers.c.dt, b=numbers.b,
+            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers.b, wing=numbers.wing,
         )  # fmt: skip
         for a in range(plan.dimensions):
             v[a][i] = t[a]
+        for c in fields(plan.body.Memory):
+            flock.body[c][i] = t[3][c]
 
 
 def move(

@@ -44,6 +44,7 @@ class Flock:
     own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
     sent_error, sent_drift               : the same of what is sent to others
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
+    body                                 : what the body remembers, by field of its Memory
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
 
     take       : the row of a name in the driver
@@ -62,7 +63,7 @@ class Flock:
         self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
-        self.sums, self.walls = Columns("sum", take), Columns("wall", take)
+        self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
         self._take = take
 

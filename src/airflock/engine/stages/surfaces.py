@@ -7,7 +7,7 @@ from airflock.core.contract import Model
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
-from airflock.world import arena, bvh
+from airflock.world import bvh, polygon
 
 
 def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> None:
@@ -23,23 +23,11 @@ def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model:
         flock.walls[c][i] += t[c]
 
 
-def boundaries(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, edges: Any, spans: Any, scene: Any,
-    *, plan: Plan, model: Model,
-) -> None:  # fmt: skip
-    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
-
-    Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
-    """
+def faced(
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, *, plan: Plan, model: Model
+) -> None:
+    """Walls whose surface is a function of four numbers, by family."""
     x = flock.measured_position
-    if plan.scene:
-        shapes = scene[0]
-        nodes = scene[1]
-        links = scene[2]
-        look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
-    for i in agents:
-        for c in live(model.Walls, plan.dimensions):
-            flock.walls[c][i] = ZERO
     bounds = (0, whole.faces_0, whole.faces_0 + whole.faces_1)
     for family, distance_to in enumerate(plan.surfaces):
         for e in range(bounds[family], bounds[family + 1]):
@@ -50,10 +38,49 @@ def boundaries(
             for i in agents:
                 f = distance_to(x[X][i], x[Y][i], x[Z][i], ea, eb, ec, ed)
                 feel(i, f, flock, numbers, plan=plan, model=model)
+
+
+def sides(
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, edges: Any, look: Any, *, plan: Plan, model: Model
+) -> None:
+    """Edges of a polygonal arena: those that an agent can see and, for an agent outside, the nearest point."""
+    x = flock.measured_position
+    for e in range(whole.corners):
+        for i in agents:
+            f = polygon.wall(x[X][i], x[Y][i], x[Z][i], edges, e, whole.corners, look)
+            if f.distance < look:
+                feel(i, f, flock, numbers, plan=plan, model=model)
+    for i in agents:
+        f = polygon.outside(x[X][i], x[Y][i], x[Z][i], edges, whole.corners)
+        if f.distance < ZERO:
+            feel(i, f, flock, numbers, plan=plan, model=model)
+
+
+def boundaries(
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, edges: Any, spans: Any, scene: Any,
+    *, plan: Plan, model: Model,
+) -> None:  # fmt: skip
+    """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
+
+    Of the scene two surfaces are felt: the ground, and the nearest point of what stands on it.
+    """
+    x = flock.measured_position
+    if plan.polygon or plan.scene:
+        look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
+    if plan.scene:
+        shapes = scene[0]
+        nodes = scene[1]
+        links = scene[2]
+    for i in agents:
+        for c in live(model.Walls, plan.dimensions):
+            flock.walls[c][i] = ZERO
+    faced(agents, flock, numbers, whole, faces, plan=plan, model=model)
+    if plan.polygon:
+        sides(agents, flock, numbers, whole, edges, look, plan=plan, model=model)
     if plan.obstacles and model.sight is None:  # who casts meets them in the scene
         for o in range(whole.obstacles):
             for i in agents:
-                f = arena.convex_obstacle(x[X][i], x[Y][i], x[Z][i], edges, spans[o, 0], spans[o, 1])
+                f = plan.obstacle(x[X][i], x[Y][i], x[Z][i], edges, spans[o, 0], spans[o, 1])
                 feel(i, f, flock, numbers, plan=plan, model=model)
     if plan.scene:
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:

@@ -25,27 +25,33 @@ ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
 RETRIES = 2  # further tries of a flight that took too long
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
-_compiling = Lock()
+compiling = Lock()  # held while a worker compiles: its threads wait for the first
 
 
 class Cluster:
     """Workers of a dask scheduler."""
 
     def __init__(
-        self, study: Study, address: str, *, timeout: float | None = None, task: Any = None, answer: float = ANSWER
+        self,
+        study: Study | None,
+        address: str,
+        *,
+        timeout: float | None = None,
+        task: Any = None,
+        answer: float = ANSWER,
     ):
         """Connect.
 
         timeout : s that one flight may take; answer : s to wait for the scheduler
-        task    : what is run on a worker instead of a flight, for tests
+        task    : what is run on a worker instead of a flight of a study
 
         Raises StudyError if nobody answers at the address, or nobody works there.
         """
         try:
             from distributed import Client
         except ModuleNotFoundError as fault:
-            raise StudyError("--scheduler needs the package distributed: pip install 'airflock[cluster]'") from fault
-        self.task, self.timeout = task or Task.of(study), timeout
+            raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
+        self.task, self.timeout = Task.of(study) if task is None and study is not None else task, timeout
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)
             self.client.wait_for_workers(1, timeout=answer)
@@ -182,7 +188,7 @@ class Task:
         from airflock.engine.simulate import compile_for, score_flight
 
         scenario = rebuild(self.text, self.where)
-        with _compiling:  # threads of a worker wait for the first to compile
+        with compiling:  # threads of a worker wait for the first to compile
             compile_for(scenario, precision=self.precision)
         return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
 

@@ -50,7 +50,7 @@ def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
     with path.open("rb") as file:
         start = file.read(6)
     if start != b"\x93NUMPY" and start[:2] != b"PK":
-        raise RecordingError(f"{path}: is no array that NumPy wrote")
+        raise RecordingError(f"{path}: is not an array that NumPy wrote")
     try:
         with open(path, "rb") as file:
             loaded = np.load(file, allow_pickle=False)
@@ -61,7 +61,7 @@ def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:
         text = str(fault).splitlines()[0]
         if "allow_pickle" in text or "pickle" in text.lower():
             raise RecordingError(_pickled(path)) from fault
-        raise RecordingError(f"{path}: is no array of numbers: {text}") from fault
+        raise RecordingError(f"{path}: is not an array of numbers: {text}") from fault
     return read_array(loaded, options, str(path))
 
 

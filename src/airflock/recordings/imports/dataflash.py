@@ -22,7 +22,7 @@ def read_dataflash(path: Path, options: Options, findings: Findings) -> list[Tra
     try:
         log = reader.DFReader_binary(str(path))
     except Exception as fault:  # pymavlink raises struct.error, ValueError and others for other files
-        raise RecordingError(f"{path}: is no DataFlash log: {type(fault).__name__}: {fault}") from fault
+        raise RecordingError(f"{path}: is not a DataFlash log: {type(fault).__name__}: {fault}") from fault
     rows: dict[str, list[Any]] = {"PSCN": [], "PSCE": [], "PSCD": []}
     origin, clock = None, []
     kinds = [*rows, "ORGN", "GPS"]
@@ -86,7 +86,7 @@ def read_tlog(path: Path, options: Options, findings: Findings) -> list[Track]:
     try:
         log = mavutil.mavlink_connection(str(path))
     except Exception as fault:
-        raise RecordingError(f"{path}: is no telemetry log: {type(fault).__name__}: {fault}") from fault
+        raise RecordingError(f"{path}: is not a telemetry log: {type(fault).__name__}: {fault}") from fault
     states: dict[int, list[Any]] = {}
     wishes: dict[int, list[Any]] = {}
     origins: dict[int, tuple[float, float, float]] = {}

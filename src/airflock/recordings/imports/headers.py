@@ -97,5 +97,5 @@ def factor(target: str, unit: str, where: str, options: Options) -> float:
             raise RecordingError(f"{where}: {target} is in pixels; say how many metres one is: --scale 0.0005")
         return options.scale
     if unit and unit not in kind:
-        raise RecordingError(f"{where}: {unit} is no unit of {target}; known: {', '.join(kind)}")
+        raise RecordingError(f"{where}: {unit}: unknown unit of {target}; known: {', '.join(kind)}")
     return kind[unit] if unit else 1.0

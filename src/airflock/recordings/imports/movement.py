@@ -23,7 +23,7 @@ def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]
         with xr.open_dataset(path, engine="h5netcdf") as opened:
             dataset = opened.load()
     except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
-        raise RecordingError(f"{path}: is no netCDF file: {str(fault).splitlines()[0]}") from fault
+        raise RecordingError(f"{path}: is not a netCDF file: {str(fault).splitlines()[0]}") from fault
     return read_dataset(dataset, options, str(path))
 
 
@@ -32,7 +32,7 @@ def _of_movement(path: Path) -> bool:
         with h5py.File(path, "r") as file:
             return "position" in file
     except OSError as fault:
-        raise RecordingError(f"{path}: is no HDF5 file: {str(fault).splitlines()[0]}") from fault
+        raise RecordingError(f"{path}: is not a HDF5 file: {str(fault).splitlines()[0]}") from fault
 
 
 def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:
@@ -92,7 +92,7 @@ def _seconds(found: xr.Dataset, options: Options, where: str) -> Any:
         return times / rate
     factors = {**headers.TIMES, "seconds": 1.0, "second": 1.0, "milliseconds": 1e-3, "microseconds": 1e-6}
     if unit not in factors:
-        raise RecordingError(f"{where}: {unit} is no unit of time; known: {', '.join(headers.TIMES)}, frames")
+        raise RecordingError(f"{where}: {unit}: unknown unit of time; known: {', '.join(headers.TIMES)}, frames")
     return times * factors[unit]
 
 

@@ -37,5 +37,5 @@ def read(path: Path, options: Options, findings: Findings) -> list[Track]:
         arrays.refuse_pickle(path)
     if ending not in READERS:
         known = ", ".join(READERS)
-        raise RecordingError(f"{path}: {ending or 'a name without an ending'} is no format read here; known: {known}")
+        raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
     return READERS[ending][1](path, options, findings)

@@ -49,7 +49,7 @@ def read_parquet(path: Path, options: Options, findings: Findings) -> list[Track
     try:
         file = parquet.ParquetFile(path)
     except (OSError, ValueError) as fault:
-        raise RecordingError(f"{path}: is no Parquet table: {str(fault).splitlines()[0]}") from fault
+        raise RecordingError(f"{path}: is not a Parquet table: {str(fault).splitlines()[0]}") from fault
     total = max(file.metadata.num_rows, 1)
 
     def parts(columns: list[str] | None) -> Iterator[tuple[int, pd.DataFrame]]:
@@ -82,7 +82,7 @@ def _sniff(path: Path, options: Options) -> tuple[str, str, list[str]]:
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     elif b"\0" in start:
-        raise RecordingError(f"{path}: is no text; known formats: .csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy")
+        raise RecordingError(f"{path}: is not text; known formats: .csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy")
     else:
         encoding = "utf-8-sig"
     try:
@@ -205,7 +205,9 @@ def _numbers(column: Any, where: str, name: str, at: int) -> Any:
         raise RecordingError(
             f"{where}: column {name}, row {at + bad[0]}: {text} has a decimal comma; write --decimal ,"
         )
-    raise RecordingError(f"{where}: column {name}, row {at + bad[0]}: {text!r} is no number; leave missing cells empty")
+    raise RecordingError(
+        f"{where}: column {name}, row {at + bad[0]}: {text!r} is not a number; leave missing cells empty"
+    )
 
 
 def _since_1970(column: Any) -> Any:

@@ -26,7 +26,7 @@ def read_ulog(path: Path, options: Options, findings: Findings) -> list[Track]:
     try:
         log = ULog(str(path), TOPICS)
     except Exception as fault:  # pyulog raises TypeError, struct.error, IndexError and others for damaged files
-        raise RecordingError(f"{path}: is no ULog that can be read: {type(fault).__name__}: {fault}") from fault
+        raise RecordingError(f"{path}: is not a ULog that can be read: {type(fault).__name__}: {fault}") from fault
     topics = {data.name: data.data for data in reversed(log.data_list) if data.multi_id == 0}
     options.done(0.8)
     if LOCAL not in topics:

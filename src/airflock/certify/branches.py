@@ -1,0 +1,207 @@
+"""Branches: flights of a scenario as lineages, for splitting; and what it found, with a line that flies it again."""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.certify.bounds import per_hour
+from airflock.certify.campaign import Campaign
+from airflock.certify.counting import Count
+from airflock.certify.seeds import COUNT, SPLIT, seed
+from airflock.certify.splitting import Estimate, Falls, Lineage, Particle, estimate, repetition
+from airflock.engine.events import Event
+from airflock.errors import ScenarioError
+from airflock.evolve.executors import Executor, Flight, Landed
+from airflock.evolve.store import Batch, Store
+from airflock.scenarios.scenario import Scenario
+
+REPETITIONS = 5
+SIZE = 100  # flights of a level
+FEWEST = 2000  # flights from which repetitions start, each from its share of them
+START = 100  # flights with which a repetition goes on: the nearest ones of its share
+BACK = 4.0  # s, mean time before the first crossing from which noise is drawn anew
+WORST = 5
+
+
+def refuse(campaign: Campaign) -> None:
+    """Refuse what cannot be split, before anything flies."""
+    faults = []
+    if not any(limit.score == "r_min" for limit in campaign.limits):
+        faults.append("--split: is for limits on r_min; there is none")
+    if campaign.scenario.world.edges == "periodic":
+        faults.append("--split: distances across the edges of a periodic world are not followed")
+    if campaign.uncertain:
+        faults.append("--split: all flights are of one scenario; leave out --uncertain")
+    if faults:
+        raise ScenarioError(faults)
+
+
+def split(
+    campaign: Campaign,
+    store: Store,
+    executor: Executor,
+    counted: Count,
+    budget: float,
+    threads: int | None = None,
+    note: Callable[[str], None] | None = None,
+    where: str = "",
+) -> dict[str, Any]:
+    """Estimate how often r_min falls to the smallest limit, starting from the flights that were counted.
+
+    where : file of the scenario, by which flights are flown again
+    Returns plain values: target, statements, probability with its interval or why it is refused, worst flights.
+    """
+    target = min(limit.value for limit in campaign.limits if limit.score == "r_min")
+    until = time.monotonic() + budget
+    own = [seed(campaign.hash, COUNT, i) for i in range(len(counted.rows))]
+    values = [float(row["r_min"]) for row in counted.rows]
+    try:
+        seeds, least = _topped_up(campaign, store, executor, own, values, until)
+    except TimeOver:
+        return _told(campaign, target, "time was over before there were flights enough to start from")
+    share, runs = len(least) // REPETITIONS, []
+    for number in range(REPETITIONS):
+        flyer = Flyer(campaign, store, number, threads, until)
+        mine = range(number * share, (number + 1) * share)
+        lineages = [Lineage(seeds[i]) for i in sorted(mine, key=lambda i: least[i])[:START]]
+        try:
+            start = [Particle(x, falls) for x, falls in zip(lineages, flyer(-1, lineages), strict=True)]
+            rng = np.random.default_rng([int(campaign.hash[:12], 16), number])
+
+            def say(level: float, p: float, number: int = number) -> None:
+                if note:
+                    note(f"splitting {number + 1}/{REPETITIONS}: r_min<{level:.3g} at {p:.2g}")
+
+            per_sample = BACK / _period(campaign.scenario)
+            runs.append(repetition(start, share, target, flyer, per_sample, rng, size=SIZE, say=say))
+        except TimeOver:
+            return _told(campaign, target, f"time was over in repetition {number + 1} of {REPETITIONS}")
+    return _found(campaign, estimate(runs, target, least), where or campaign.scenario.name)
+
+
+def _topped_up(
+    campaign: Campaign, store: Store, executor: Executor, seeds: list[int], least: list[float], until: float
+) -> tuple[list[int], list[float]]:
+    """Seeds and smallest distances of FEWEST flights at least: those that were counted, and more on other seeds."""
+    place = Batch("split-start", 0, 0)
+    flown = {number: values for (_, number), values in store.flown(place).items()}
+    for first in range(0, max(0, FEWEST - len(seeds)), FEWEST // 10):
+        part = range(first, min(first + FEWEST // 10, FEWEST - len(seeds)))
+        missing = [number for number in part if number not in flown]
+        if missing and time.monotonic() > until:
+            raise TimeOver
+        flights = [Flight(0, number, {}, seed(campaign.hash, SPLIT, number)) for number in missing]
+        for landed in executor.fly(flights):
+            store.land(place, landed)
+            flown[landed.flight.repeat] = landed.values
+    more = [number for number in range(max(0, FEWEST - len(seeds))) if flown.get(number) is not None]
+    found = [float((flown[number] or {})["r_min"]) for number in more]
+    return [*seeds, *(seed(campaign.hash, SPLIT, number) for number in more)], [*least, *found]
+
+
+class TimeOver(Exception):
+    """The budget was spent while flights were to be flown."""
+
+
+class Flyer:
+    """Flies lineages of one repetition, and keeps how their distances fell."""
+
+    def __init__(self, campaign: Campaign, store: Store, number: int, threads: int | None, until: float):
+        self.campaign, self.store, self.number, self.threads, self.until = campaign, store, number, threads, until
+
+    def __call__(self, batch: int, lineages: list[Lineage]) -> list[Falls]:
+        """How the smallest distance fell in each flight; batch -1 is the start. Raises TimeOver."""
+        from airflock.engine.threads import in_threads
+
+        place = Batch("split", self.number, batch + 1)
+        flown = {i: values for (i, _), values in self.store.flown(place).items() if values is not None}
+        missing = [i for i in range(len(lineages)) if i not in flown]
+        if missing and time.monotonic() > self.until:
+            raise TimeOver
+
+        def job(lineage: Lineage) -> Callable[[], Falls]:
+            return lambda: falls(self.campaign.scenario, lineage, self.campaign.precision, self.campaign.device)
+
+        alone = 1 if self.campaign.device != "cpu" else self.threads
+        for i, found in zip(missing, in_threads([job(lineages[i]) for i in missing], alone), strict=True):
+            values = {"falls": found, "branches": [list(b) for b in lineages[i].branches]}
+            self.store.land(place, Landed(Flight(i, 0, {}, lineages[i].seed), values))
+            flown[i] = values
+        return [flown[i]["falls"] for i in range(len(lineages))]
+
+
+def falls(scenario: Scenario, lineage: Lineage, precision: int = 32, device: str = "cpu") -> list[list[float]]:
+    """Sample and smallest distance of two agents (m), each time that it fell below all before."""
+    from airflock.engine.flight import Flight as Open
+
+    flight = Open(
+        scenario, lineage.seed, precision=precision, record=True, device=device, events=events(scenario, lineage)
+    )
+    flight.finish()
+    nearest = least_distances(flight.frames[:, : scenario.dimensions])
+    running = np.minimum.accumulate(nearest)
+    fell = np.flatnonzero(np.diff(running, prepend=np.inf) < 0.0)
+    return [[int(k), float(running[k])] for k in fell]
+
+
+def events(scenario: Scenario, lineage: Lineage) -> list[Event]:
+    """What is done to a flight so that it is that of a lineage."""
+    every = max(1, round(_period(scenario) / scenario.flight.dt))
+    return [Event(sample * every, "branch", {"world": world}) for sample, world in lineage.branches]
+
+
+def least_distances(positions: NDArray[Any]) -> NDArray[np.float64]:
+    """Smallest distance of two agents (time,), m, from positions (time, axis, agent)."""
+    found = np.full(len(positions), np.inf)
+    for i in range(positions.shape[2] - 1):
+        apart = positions[:, :, i + 1 :] - positions[:, :, i : i + 1]
+        np.minimum(found, (apart * apart).sum(axis=1).min(axis=1), out=found)
+    nearest: NDArray[np.float64] = np.sqrt(found)
+    return nearest
+
+
+def _period(scenario: Scenario) -> float:
+    """Time between two samples, s."""
+    from airflock.engine.tables import clock
+
+    return float(clock(scenario)["sample_every"] * scenario.flight.dt)
+
+
+def _told(campaign: Campaign, target: float, refused: str) -> dict[str, Any]:
+    return {"target": target, "refused": refused, "statements": [f"splitting: r_min<{target:g}: no number: {refused}"]}
+
+
+def _found(campaign: Campaign, found: Estimate, where: str) -> dict[str, Any]:
+    made: dict[str, Any] = (
+        _told(campaign, found.target, found.refused)
+        if found.refused
+        else {
+            "target": found.target, "probability": found.probability, "low": found.low, "high": found.high,
+            "per_hour": per_hour(found.probability, campaign.hours), "statements": [],
+        }
+    )  # fmt: skip
+    flights = sum(r.flights for r in found.repetitions)
+    made |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in found.repetitions]}
+    if not found.refused:
+        made["statements"] = [
+            f"splitting, an estimate that shows nothing: r_min<{found.target:g} in {found.probability:.2g} of flights "
+            f"({found.low:.2g} to {found.high:.2g}), {made['per_hour']:.2g} per flock hour, from {flights:,} flights"
+        ]
+    last = sorted((p for r in found.repetitions for p in r.last), key=lambda p: p.least)
+    nearest: dict[int, Particle] = {}
+    for particle in last:
+        nearest.setdefault(particle.lineage.seed, particle)
+    made["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
+    if made["worst"] and math.isfinite(made["worst"][0]["r_min"]):
+        made["statements"].append(f"nearest that splitting found: {made['worst'][0]['replay']}")
+    return made
+
+
+def _worst(scenario: Scenario, particle: Particle, where: str) -> dict[str, Any]:
+    done = [event.plain() for event in events(scenario, particle.lineage)]
+    line = f"airflock.open({where!r}, {particle.lineage.seed}, events={done})"
+    return {"seed": particle.lineage.seed, "r_min": particle.least, "events": done, "replay": line}

@@ -1,0 +1,159 @@
+"""Check: a certificate read again, one flight in a hundred flown again, and its bounds computed again."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from airflock import __version__
+from airflock.certify.bounds import look
+from airflock.certify.campaign import Campaign
+from airflock.certify.certificate import FORMAT, digest, seal
+from airflock.certify.flights import score_of
+from airflock.certify.limits import read_all
+from airflock.certify.seeds import COUNT, seed
+from airflock.doors import from_outside, read_toml
+from airflock.errors import StudyError
+from airflock.evolve.folder import versions
+from airflock.scenarios.files import make
+from airflock.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check found.
+
+    flown : flights that were flown again; faults: what does not hold, one line each; notes: what may explain it
+    """
+
+    flown: int
+    total: int
+    faults: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def same(self) -> bool:
+        """Whether everything agrees."""
+        return not self.faults
+
+    def __repr__(self) -> str:
+        said = "; ".join(self.faults) or "all bits agree, all bounds are right"
+        return f"<check: {self.flown} of {self.total:,} flights flown again: {said}>"
+
+
+def check(
+    path: str | os.PathLike[str],
+    *,
+    threads: int | None = None,
+    trust: bool = False,
+    done: Callable[[], None] | None = None,
+) -> Checked:
+    """Check a certificate file.
+
+    Raises StudyError where the file is no certificate, of another format, version or scenario than it says.
+    """
+    with from_outside(path, StudyError):
+        document = read_toml(Path(path))
+    return checked(document, str(path), threads=threads, trust=trust, done=done)
+
+
+def checked(
+    document: Mapping[str, Any],
+    where: str,
+    *,
+    scenario: Scenario | None = None,
+    threads: int | None = None,
+    trust: bool = False,
+    done: Callable[[], None] | None = None,
+) -> Checked:
+    """Check the content of a certificate; `scenario` stands in for the one that it holds. Raises like `check`."""
+    if not {"seal", "format", "limit", "flights", "scenario"} <= set(document):
+        raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
+    if document["format"] != FORMAT:
+        raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {FORMAT}")
+    with from_outside(f"{where}: is damaged", StudyError):
+        flown = document["flown"]
+        if flown["airflock"] != __version__:
+            raise StudyError(
+                f"{where}: made by airflock {flown['airflock']}, this is {__version__}; check it with that"
+            )
+        faults = (
+            ["was changed after it was written (its checksum differs)"] if seal(document) != document["seal"] else []
+        )
+        campaign = _campaign(document, where, scenario, trust)
+        faults += _sums(document, campaign)
+        rules = campaign.document()["rules"]
+        if rules != flown["rules"]:
+            raise StudyError(f"{where}: its flights followed other rules (text {flown['rules']}, here {rules})")
+        found, notes = _flown_again(document, campaign, threads, done), _differences(flown)
+    return Checked(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
+
+
+def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:
+    told = dict(document["scenario"])
+    name = str(told.pop("name"))
+    if scenario is None:
+        scenario = make(told, name, folder=Path(where).parent, trust=trust)
+    flights, flown = document["flights"], document["flown"]
+    campaign = Campaign(
+        scenario,
+        read_all([entry["text"] for entry in document["limit"]], scenario),
+        float(document["confidence"]),
+        int(flown["precision"]),
+        int(flights["count"]) if str(flights["looks"]).startswith("fixed") else None,
+        bool(flights["uncertain"]),
+        str(flown["device"]),
+    )
+    if campaign.hash != flights["identity"]:
+        raise StudyError(f"{where}: its flights were those of another scenario than the one that it holds")
+    return campaign
+
+
+def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
+    """Bounds and verdicts that do not follow from the counts."""
+    faults = []
+    if document["flights"]["first_seed"] != seed(campaign.hash, COUNT, 0):
+        faults.append("its seeds are not those that the scenario fixes")
+    for entry, limit in zip(document["limit"], campaign.limits, strict=True):
+        told = [(int(x["flights"]), int(x["events"]), float(x["above"]), float(x["below"])) for x in entry["looks"]]
+        again = [look(*each) for each in told]
+        high, low = min((x.high for x in again), default=1.0), max((x.low for x in again), default=0.0)
+        paid = max(sum(x.above for x in again), sum(x.below for x in again))
+        probability = campaign.probability(limit)
+        shown = high < 1.0 if probability is None else high <= probability
+        right = abs(high - entry["high"]) <= 1e-9 * high and abs(low - entry["low"]) <= 1e-9 and shown == entry["shown"]
+        if not right or paid > campaign.alpha * (1.0 + 1e-9):
+            faults.append(f"limit '{limit.text}': its bounds do not follow from its counts")
+    return faults
+
+
+def _flown_again(
+    document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
+) -> list[str]:
+    from airflock.engine.simulate import compile_for
+    from airflock.engine.threads import in_threads
+
+    wanted, every = document["check"]["digests"], int(document["check"]["every"])
+    numbers = [every * i for i in range(len(wanted))]
+    score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)
+    if campaign.device == "cpu" and numbers:
+        compile_for(campaign.flown, precision=campaign.precision)
+
+    def job(number: int) -> Callable[[], str]:
+        own = seed(campaign.hash, COUNT, number)
+        return lambda: digest(score(campaign.parameters(own), own))
+
+    flown = in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
+    other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]
+    return [f"flight {number}, seed {seed(campaign.hash, COUNT, number)}: other bits" for number in other[:5]] + (
+        [f"and {len(other) - 5} further flights with other bits"] if len(other) > 5 else []
+    )
+
+
+def _differences(flown: Mapping[str, Any]) -> tuple[str, ...]:
+    """Versions that differ from those of the certificate: what may explain other bits."""
+    now = versions()
+    return tuple(
+        f"{name}: {flown[name]} then, {value} now" for name, value in now.items() if flown.get(name, value) != value
+    )

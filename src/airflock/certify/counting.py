@@ -1,0 +1,209 @@
+"""Counting: fly until a limit is shown, is refuted, or time is over; every flight is stored, every look is paid for."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+from airflock.certify.bounds import Look, look, needed, schedule, share
+from airflock.certify.campaign import Campaign
+from airflock.certify.limits import Limit
+from airflock.certify.seeds import COUNT, seed
+from airflock.errors import StudyError
+from airflock.evolve.executors import Executor, Flight
+from airflock.evolve.store import Batch, Store
+
+BATCH = Batch("count", 0, 0)
+CHUNK = 2.0  # s of flights that are handed out together
+FIRST = 16  # flights before the first guess of how many there will be time for
+MARGIN = 1.5  # a limit is given up beforehand only if it needs so many times the flights that there is time for
+
+
+@dataclass
+class Verdict:
+    """What counting says of one limit.
+
+    probability : the limit per flight; None: it is only to be bounded
+    looks    : in their order; all their bounds hold together
+    needs    : flights without an event that would show it, where there is no time for so many; else 0
+    could    : the limit that there was time to show instead
+    """
+
+    limit: Limit
+    probability: float | None
+    looks: list[Look] = field(default_factory=list)
+    needs: int = 0
+    could: float = 1.0
+
+    @property
+    def low(self) -> float:
+        """Lower bound of the probability per flight."""
+        return max((found.low for found in self.looks), default=0.0)
+
+    @property
+    def high(self) -> float:
+        """Upper bound of the probability per flight."""
+        return min((found.high for found in self.looks), default=1.0)
+
+    @property
+    def shown(self) -> bool:
+        """Whether the limit is shown; without a rate, whether it has been bounded."""
+        return self.high < 1.0 if self.probability is None else self.high <= self.probability
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the contrary is shown: the event happens more often."""
+        return self.probability is not None and not self.shown and self.low > self.probability
+
+    @property
+    def flights(self) -> int:
+        """Flights at the last look."""
+        return self.looks[-1].flights if self.looks else 0
+
+    @property
+    def events(self) -> int:
+        """Events among them."""
+        return self.looks[-1].events if self.looks else 0
+
+
+@dataclass
+class Count:
+    """Flights that were counted.
+
+    rows  : scores of flight 0, 1, 2, ...; seconds : of this process; rate : flights per second, 0 where unknown
+    """
+
+    verdicts: list[Verdict]
+    rows: list[Mapping[str, Any]]
+    seconds: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far counting is: flights (those of the store included), flights that decide, events of each limit so far."""
+
+    done: int
+    total: int
+    events: tuple[int, ...]
+    rate: float
+
+
+Watch = Callable[[Progress], None]
+
+
+def count(campaign: Campaign, store: Store, executor: Executor, budget: float, watch: Watch | None = None) -> Count:
+    """Count events over the seeds of a campaign, in their order, for at most `budget` seconds.
+
+    Raises StudyError for a flight that fails: a certificate leaves none out.
+    """
+    counting = _Counting(campaign, store, executor, budget, watch)
+    while counting.goes_on():
+        counting.fly()
+    counting.told.seconds = time.monotonic() - counting.began
+    return counting.told
+
+
+class _Counting:
+    """Counting under way.
+
+    found : scores by number of the flight, in whatever order they landed; only a prefix without holes counts
+    """
+
+    def __init__(self, campaign: Campaign, store: Store, executor: Executor, budget: float, watch: Watch | None):
+        self.campaign, self.store, self.executor, self.budget, self.watch = campaign, store, executor, budget, watch
+        self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
+        self.found: dict[int, Mapping[str, Any]] = {}
+        for (_, number), values in store.flown(BATCH).items():
+            if values is None:
+                raise StudyError(f"{store.path}: {_failure(campaign, number, _reason(store, number))}")
+            self.found[number] = values
+        self.events = [0] * len(campaign.limits)
+        self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
+        self.aims: list[int] = []
+
+    def goes_on(self) -> bool:
+        """Take in what has landed; whether more flights can decide anything, and there is time for them."""
+        rows, verdicts = self.told.rows, self.told.verdicts
+        while len(rows) in self.found:
+            rows.append(self.found[len(rows)])
+            for i, verdict in enumerate(verdicts):
+                self.events[i] += verdict.limit.happened(rows[-1])
+                due = _next(self.campaign, verdict)
+                if due is not None and due[0] == len(rows):
+                    verdict.looks.append(look(len(rows), self.events[i], *due[1:]))
+        still = [verdict for verdict in verdicts if _open(self.campaign, verdict)]
+        self.aims = [due[0] for verdict in still if (due := _next(self.campaign, verdict))]
+        self._note()
+        left = self.budget - (time.monotonic() - self.began)
+        if not still or left <= 0.0:
+            return False
+        if self.fresh < FIRST or math.isinf(left):
+            self.chunk = max(FIRST, math.ceil(CHUNK * self.told.rate))
+            return True
+        able = len(rows) + left * self.told.rate
+        for verdict in still:
+            first = self._first(verdict)  # a limit with an event may yet be refuted
+            hopeless = first > MARGIN * able and not self.events[verdicts.index(verdict)]
+            verdict.needs, verdict.could = (first, smallest(able, self.campaign.alpha)) if hopeless else (0, 1.0)
+        self.chunk = max(FIRST, math.ceil(min(CHUNK, left) * self.told.rate))
+        return not all(verdict.needs for verdict in still)
+
+    def _first(self, verdict: Verdict) -> int:
+        """Flights without an event that would show a limit; 0 where an upper bound is there already."""
+        if verdict.probability is None or verdict.high < 1.0:
+            return 0
+        return needed(verdict.probability, self.campaign.alpha * share(1))
+
+    def fly(self) -> None:
+        """Fly the next few flights that the store does not hold."""
+        done = len(self.told.rows)
+        flights = []
+        for number in range(done, min(max(self.aims), done + self.chunk)):
+            if number not in self.found:
+                own = seed(self.campaign.hash, COUNT, number)
+                flights.append(Flight(0, number, self.campaign.parameters(own), own))
+        for landed in self.executor.fly(flights):
+            self.store.land(BATCH, landed)
+            if landed.values is None:
+                raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
+            self.found[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
+            self.told.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
+            self._note()
+
+    def _note(self) -> None:
+        if self.watch:
+            total = max([*self.aims, len(self.found)])
+            self.watch(Progress(len(self.found), total, tuple(self.events), self.told.rate))
+
+
+def _open(campaign: Campaign, verdict: Verdict) -> bool:
+    """Whether further flights could decide."""
+    if campaign.flights:
+        return not verdict.looks
+    return not verdict.shown and not verdict.refuted
+
+
+def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
+    """Flights at the coming look, and what its upper and its lower bound pay."""
+    if campaign.flights:
+        return None if verdict.looks else (campaign.flights, campaign.alpha, campaign.alpha)
+    if verdict.probability is None:  # `run` gives every campaign without a rate a number of flights
+        return None
+    return next(islice(schedule(verdict.probability, campaign.alpha), len(verdict.looks), None))
+
+
+def smallest(flights: float, alpha: float) -> float:
+    """Smallest limit per flight that so many flights without an event show at the first look."""
+    return -math.expm1(math.log(alpha * share(1)) / max(flights, 1.0))
+
+
+def _reason(store: Store, number: int) -> str:
+    found = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
+    return str(found[0][0]) if found else ""
+
+
+def _failure(campaign: Campaign, number: int, reason: str) -> str:
+    return f"{campaign.scenario.name}: flight {number}, seed {seed(campaign.hash, COUNT, number)}, failed: {reason}"

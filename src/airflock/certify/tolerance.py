@@ -1,0 +1,173 @@
+"""Tolerance: how far each number of the environment may move until a limit can no longer be shown.
+
+Every value that is tried flies the same seeds, so that values differ by nothing but themselves. A value is safe where
+the upper bound falls below the limit, and not shown where it does not within MOST flights, or where the lower bound
+exceeds it. Rare limits would need too many flights at each value: they are screened at LEVEL per flight.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from itertools import takewhile
+from typing import Any
+
+from airflock.certify.bounds import Look, look, needed, schedule, share
+from airflock.certify.campaign import Campaign
+from airflock.certify.counting import Count
+from airflock.certify.seeds import TOLERANCE, seed
+from airflock.core.parameters import Quantity
+from airflock.errors import ScenarioError
+from airflock.evolve.executors import Executor, Flight
+from airflock.evolve.space import declared
+from airflock.evolve.store import Batch, Store
+from airflock.scenarios.scenario import Scenario
+
+LEVEL = 0.02  # probability per flight at which rare limits are screened
+MOST = 4.0  # flights at one value, as a multiple of those that show the level without an event
+REACH = 8.0  # factor up to which a number is moved
+HALVINGS = 3  # after a value that is safe and one that is not are known
+# number of the environment → which way is worse; where it is zero there is no factor to move it by
+WORSE = {
+    "radio.delay": 1, "radio.range": -1, "radio.far": -1, "radio.received_far": -1, "radio.loss": 1,
+    "sensors.noise": 1, "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.a_max": -1, "wind.gust": 1,
+    "agents": 1,
+}  # fmt: skip
+WHOLE = ("agents",)
+
+
+def usual_keys(scenario: Scenario) -> tuple[str, ...]:
+    """Numbers of the environment that a scenario uses and that a factor can move."""
+    known = declared(scenario)
+    links = scenario.radio.kind == "links"
+    of_links = ("radio.far", "radio.received_far")
+    return tuple(
+        key
+        for key in WORSE
+        if key in known and known[key][1] and (key not in of_links or links) and not (key == "radio.range" and links)
+    )
+
+
+def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
+    """The keys that are named; ScenarioError for one that cannot be varied."""
+    known, faults = declared(scenario), []
+    for key in keys:
+        if key not in WORSE or key not in known:
+            near = get_close_matches(key, WORSE, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(k for k in WORSE if k in known)}"
+            faults.append(f"tolerance: {key} is not a number of the environment; {hint}")
+        elif not known[key][1]:
+            faults.append(f"tolerance: {key} = 0 in {scenario.name}; set the value from which it is to be moved")
+    if faults:
+        raise ScenarioError(faults)
+    return tuple(dict.fromkeys(keys))
+
+
+def tolerance(
+    campaign: Campaign,
+    store: Store,
+    executor: Executor,
+    counted: Count,
+    keys: Sequence[str],
+    budget: float,
+    note: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
+
+    Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal), flights.
+    """
+    until = time.monotonic() + budget
+    rates = [p for p in map(campaign.probability, campaign.limits) if p is not None]
+    level = max(LEVEL, *rates) if rates else LEVEL
+    screen = Screen(campaign, store, executor, level, until)
+    events = sum(any(limit.happened(row) for limit in campaign.limits) for row in counted.rows)
+    told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
+    if not counted.rows or look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
+        told["reason"] = f"as it stands the scenario is not shown to stay below {100.0 * level:g} % per flight"
+        return told
+    for number, key in enumerate(keys):
+        if note:
+            note(f"tolerance of {key}")
+        told["axis"].append(_axis(screen, number, key, *declared(campaign.scenario)[key]))
+    return told
+
+
+class Screen:
+    """Judges one value at a time against a level per flight, on seeds that all values share."""
+
+    def __init__(self, campaign: Campaign, store: Store, executor: Executor, level: float, until: float):
+        self.campaign, self.store, self.executor, self.level, self.until = campaign, store, executor, level, until
+        self.alpha, self.part = 1.0 - campaign.confidence, TOLERANCE
+        most = MOST * needed(level, self.alpha * share(1))
+        self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, self.alpha)))
+
+    def judged(self, batch: Batch, parameters: Mapping[str, float]) -> tuple[str, Look | None]:
+        """safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
+        flown = {number: values for (_, number), values in self.store.flown(batch).items()}
+        events, done, last = 0, 0, None
+        for size, above, below in self.looks:
+            missing = [number for number in range(done, size) if number not in flown]
+            if missing and time.monotonic() > self.until:
+                return "time was over", last
+            seeds = [seed(self.campaign.hash, self.part, number) for number in missing]
+            flights = [
+                Flight(0, number, {**self.campaign.parameters(own), **parameters}, own)
+                for number, own in zip(missing, seeds, strict=True)
+            ]
+            for landed in self.executor.fly(flights):
+                self.store.land(batch, landed)
+                flown[landed.flight.repeat] = landed.values
+                if landed.values is None:
+                    return f"cannot be flown: {landed.reason}", last
+            rows = [flown[number] for number in range(done, size)]
+            if any(row is None for row in rows):
+                return "cannot be flown", last
+            events += sum(any(limit.happened(row or {}) for limit in self.campaign.limits) for row in rows)
+            done, last = size, look(size, events, above, below)
+            if last.high < self.level:
+                return "safe", last
+            if last.low > self.level:
+                return "unsafe", last
+        return "open", last
+
+
+def _axis(screen: Screen, number: int, key: str, how: Quantity, nominal: float | None) -> dict[str, Any]:
+    """Move one number until it is no longer safe, then halve the way between."""
+    value, worse, flights = float(nominal or 0.0), WORSE[key], 0
+    safe, bad, reason, step = value, math.nan, "", 0
+
+    def tried(candidate: float) -> bool | None:
+        nonlocal flights, reason, step
+        batch = Batch("tolerance", number, step)
+        screen.store.ask(batch, [[candidate]], [{key: candidate}])
+        verdict, found = screen.judged(batch, {key: candidate})
+        step, flights = step + 1, flights + (found.flights if found else 0)
+        reason = verdict
+        return None if verdict == "time was over" else verdict == "safe"
+
+    while abs(math.log(safe / value)) < math.log(REACH) - 1e-9:
+        candidate = _whole(key, min(max(safe * 2.0**worse, how.low), how.high))
+        if candidate == safe:
+            reason = f"the end of its range, {how.span}"
+            break
+        good = tried(candidate)
+        if not good:
+            bad = candidate if good is not None else math.nan
+            break
+        safe = candidate
+    for _ in range(HALVINGS if bad == bad else 0):
+        middle = _whole(key, math.sqrt(safe * bad))
+        if middle in (safe, bad):
+            break
+        good = tried(middle)
+        if good is None:
+            break
+        safe, bad = (middle, bad) if good else (safe, middle)
+    made = {"key": key, "unit": how.unit, "nominal": value, "safe": safe, "factor": safe / value, "flights": flights}
+    if bad == bad:
+        made["not_shown"] = bad
+    return made | ({"note": reason} if reason not in ("safe", "unsafe", "open") else {})
+
+
+def _whole(key: str, value: float) -> float:
+    return float(round(value)) if key in WHOLE else value

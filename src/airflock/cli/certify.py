@@ -1,0 +1,270 @@
+"""Verb certify: show by counting that an event is rare, or say what is missing."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+from airflock.endings import PICTURES, SCENARIOS
+from airflock.errors import ScenarioError
+
+LENGTHS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def certify(
+    scenario: Annotated[
+        str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
+    ],
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            "-l",
+            metavar="LIMIT",
+            help="'r_min<1 at 1e-3/h' (per flock hour), '.../drone-h', 'phi_wall>0 at 1%' (of flights), "
+            "'phi_vel>=3 in 99%'; without a rate: bound it. Repeatable; all hold together.",
+            show_default=False,
+        ),
+    ] = None,
+    confidence: Annotated[float, typer.Option(help="Of all limits together.")] = 0.95,
+    budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.")] = "10min",
+    flights: Annotated[
+        int | None, typer.Option(help="Fly so many and look once, whatever the time.", show_default="by the limit")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.toml", help="Certificate; its flights are kept in FILE_flights beside it."
+        ),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue with the flights beside --out.")] = False,
+    tolerance: Annotated[
+        bool, typer.Option("--tolerance", help="Also find how far delay, noise, lag, ... may move.")
+    ] = False,
+    tolerance_of: Annotated[
+        list[str] | None,
+        typer.Option("--tolerance-of", metavar="KEY", help="Only of these keys, such as radio.delay; repeatable."),
+    ] = None,
+    split: Annotated[
+        bool, typer.Option("--split", help="Also estimate r_min limits by splitting: finds and ranks, shows nothing.")
+    ] = False,
+    uncertain: Annotated[
+        bool, typer.Option("--uncertain", help="Draw each flight's numbers from the intervals in the file.")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again, compare the bits.")
+    ] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Bounds, distances and tolerances.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")
+    ] = None,
+    timeout: Annotated[
+        float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
+    ] = None,
+    changes: options.Set = None,
+    law: options.Law = None,
+    trust: options.Trust = False,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    precision: options.Precision = 32,
+    device: Annotated[str, typer.Option(help="cpu, or python (no compiler, for debuggers).")] = "cpu",
+    as_json: options.Json = False,
+) -> None:
+    """Show that an event is rare: exact bounds, seeds fixed beforehand, every look paid for.
+
+    Exit status 0: all limits are shown (or the check holds); 1: they are not; 2: bad input.
+
+    Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
+    """
+    if check:
+        _check(scenario, threads, trust, as_json)
+        return
+    from airflock.certify.campaign import FOLDER
+    from airflock.certify.run import asked, campaign_of, check_options, executor_for, folder_of, planned, run
+    from airflock.evolve.folder import open_folder
+    from airflock.scenarios.files import load
+
+    faults: list[str] = []
+    seconds, campaign = 1.0, None
+    keys: tuple[str, ...] = ()
+    with options.gathering(faults):
+        options.writable((out, SCENARIOS), (plot, PICTURES))
+    with options.gathering(faults):
+        seconds = time_of(budget)
+    with options.gathering(faults):
+        found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
+        how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
+        campaign = campaign_of(found, limit or [], confidence, flights, **how)
+        keys = asked(campaign, tolerance_of or tolerance, split)
+    with options.gathering(faults):
+        check_options(seconds, timeout, scheduler, device)
+    if resume and out is None:
+        faults.append("--resume: name the certificate whose flights are to be continued with --out")
+    options.refuse(faults)
+    assert campaign is not None
+    for text in campaign.scenario.notes:
+        tables.say(f"note: {text}")
+    if scheduler is None:
+        options.compile_aloud(campaign.flown, precision, device)
+    with folder_of(None if out is None else out.parent / f"{out.stem}_flights") as folder:
+        executor = executor_for(campaign, scheduler, threads, timeout)
+        try:
+            campaign = planned(campaign, executor, seconds, folder, resume)
+            open_folder(folder, campaign, resume=resume, kind=FOLDER)
+            with counting(as_json) as (watch, note):
+                made = run(
+                    campaign, folder, executor, seconds, watch, keys=keys, split=split, threads=threads, note=note,
+                    kept=out is not None,
+                )  # fmt: skip
+        finally:
+            executor.close()
+    _end(made, out, plot, as_json)
+
+
+def _end(made: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
+    """Write, print, and leave with status 1 where something is not shown."""
+    if out is not None:
+        made.save(out)
+        tables.say(f"saved {out}")
+    if plot is not None:
+        from airflock.plots.certificate import certificate
+        from airflock.plots.save import save_figure
+
+        save_figure(certificate(made), plot)
+        tables.say(f"saved {plot}")
+    if as_json:
+        tables.emit_json({**made.document(), "seconds": made.seconds})
+    else:
+        _print(made)
+    if not made.shown:
+        raise typer.Exit(1)
+
+
+def time_of(text: str) -> float:
+    """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
+    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+    if found is None or not float(found[1]) > 0.0:
+        raise ScenarioError([f"--budget {text}: write a time above 0 such as 90s, 10min or 2h"])
+    return float(found[1]) * LENGTHS[found[2] or "s"]
+
+
+@contextmanager
+def counting(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
+    """A line that moves: flights, those up to the coming look, events so far, flights per second."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield None, None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    shape = (
+        TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]:.1f} flights/s"), TimeElapsedColumn(),
+    )  # fmt: skip
+    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        task = bar.add_task("counting", total=None, rate=0.0)
+
+        def watch(p: Any) -> None:
+            events = ", ".join(str(count) for count in p.events)
+            bar.update(task, completed=p.done, total=p.total, rate=p.rate, description=f"counting: {events} events")
+
+        def note(text: str) -> None:
+            bar.update(task, description=text, total=None)
+
+        yield watch, note
+
+
+def _print(made: Any) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from airflock.certify.certificate import NOT_SAID, bound
+
+    campaign = made.campaign
+    sure = f"{100.0 * campaign.confidence:g} %"
+    title = f"{campaign.scenario.name}: {len(made.rows):,} flights of {campaign.scenario.flight.duration:g} s"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    for name in ("limit", "events", "flights", f"at most ({sure})", "verdict"):
+        table.add_column(name, justify="right" if name in ("events", "flights") else "left")
+    for verdict in made.verdicts:
+        said = "shown" if verdict.shown else "refuted" if verdict.refuted else "not shown"
+        table.add_row(verdict.limit.text, f"{verdict.events:,}", f"{verdict.flights:,}", bound(campaign, verdict), said)
+    console = Console()
+    console.print(table)
+    for text in made.statements:
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
+    for i, found in made.hazards.items():
+        if found.events:
+            line = (
+                f"{campaign.limits[i].event}: {found.early} of {found.events} first events in the first half of flights"
+            )
+            console.print(
+                f"{line}, {100.0 * found.expected:.0f} % if even: {found.verdict}", highlight=False, soft_wrap=True
+            )
+    _worst(console, made)
+    _tolerances(console, made.tolerance)
+    for text in made.splitting.get("statements", ()):
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"Not said: {'; '.join(NOT_SAID)}.", highlight=False, markup=False, style="dim", soft_wrap=True)
+
+
+def _worst(console: Any, made: Any) -> None:
+    shown: set[str] = set()
+    for entry in made.worst:
+        if entry["limit"] in shown:
+            continue
+        shown.add(entry["limit"])
+        line = f"worst for {entry['limit']}: {tables.number(entry['value'])}"
+        moment = f" before {entry['first']:.0f} s" if "first" in entry else ""
+        console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _tolerances(console: Any, found: Any) -> None:
+    if not found:
+        return
+    from rich import box
+    from rich.table import Table
+
+    if "reason" in found:
+        console.print(f"tolerance: {found['reason']}", highlight=False, markup=False, soft_wrap=True)
+        return
+    title = (
+        f"safe: fewer than {100.0 * found['level']:g} % of flights with an event ({100.0 * found['confidence']:g} %)"
+    )
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
+        table.add_column(name, justify="left" if name in ("number", "") else "right")
+    for axis in found["axis"]:
+        bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
+        table.add_row(
+            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}", bad,
+            f"{axis['flights']:,}", axis.get("note", ""),
+        )  # fmt: skip
+    console.print(table)
+
+
+def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
+    """Check a certificate; status 1 where it does not hold."""
+    from airflock.certify.check import check
+
+    with options.progress(f"{path}: flights again", 0, quiet=as_json) as done:
+        found = check(path, threads=threads, trust=trust, done=done)
+    if as_json:
+        tables.emit_json({"same": found.same, **vars(found)})
+    else:
+        for note in found.notes:
+            tables.say(f"note: {note}")
+        for fault in found.faults:
+            tables.say(f"airflock: {path}: {fault}")
+        said = "same bits, bounds computed again" if found.same else "does not hold"
+        typer.echo(f"{path}: {found.flown} of {found.total:,} flights flown again: {said}")
+    if not found.same:
+        raise typer.Exit(1)

@@ -1,0 +1,111 @@
+"""What is wrong with a command line, as one line in the words of every other fault."""
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import Any
+
+
+def usage_fault(fault: Any, words: Sequence[str]) -> str:
+    """One line for what typer refuses; `words` are those of the command line.
+
+    Typer's classes of faults have moved between its versions, so they are told apart by what they carry.
+    """
+    context = getattr(fault, "ctx", None)
+    verb = _path(context).partition(" ")[2]
+    return f"{verb}: {_said(fault, context, words)}" if verb else _said(fault, context, words)
+
+
+def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
+    kind, message = type(fault).__name__, str(getattr(fault, "message", "") or fault.format_message())
+    parameter = getattr(fault, "param", None)
+    if kind == "NoSuchOption":
+        known = [name for one in context.command.params for name in one.opts] if context is not None else []
+        return f"{fault.option_name}: unknown option{_near(fault.option_name, [*known, '--help'], context)}"
+    unknown = re.match(r"No such command '(.*?)'", message)
+    if unknown is not None:
+        return f"{unknown[1]}: unknown command{_near(unknown[1], list(context.command.commands), context)}"
+    if kind == "MissingParameter" and parameter is not None:
+        return f"{_name(parameter)} is missing{_example(context)}"
+    if kind == "BadParameter" and parameter is not None:
+        return _refused(parameter, words, message)
+    if kind == "BadOptionUsage":
+        return f"{fault.option_name} needs a value"
+    extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
+    if extra is not None:
+        return f"unexpected {extra[1]}{_example(context)}"
+    return str(fault.format_message()).strip().rstrip(".") + _example(context)
+
+
+def _path(context: Any) -> str:
+    """The command as a person writes it, however Python was started."""
+    names = []
+    while context is not None and context.parent is not None:
+        names.append(context.info_name)
+        context = context.parent
+    return " ".join(["airflock", *reversed(names)])
+
+
+def _near(name: str, known: Sequence[str], context: Any) -> str:
+    near = get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"; did you mean {near[0]}?" if near else f"; {_path(context)} --help lists them"
+
+
+def _example(context: Any) -> str:
+    """The example of a verb's help."""
+    text = getattr(getattr(context, "command", None), "help", None) or ""
+    found = re.search(r"Example: (.+)", text)
+    return f"; for instance: {found[1].strip()}" if found else ""
+
+
+def _name(parameter: Any) -> str:
+    """What a person writes: the longest name of an option, or the metavar of an argument."""
+    options = [name for name in parameter.opts if name.startswith("-")]
+    if options:
+        return str(max(options, key=len))
+    return str(parameter.metavar or parameter.name.upper())
+
+
+def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
+    """A value that has the wrong kind, lies outside its range, or is none of its choices."""
+    name, value = _name(parameter), _given(parameter, words)
+    choices = _choices(parameter)
+    if value is not None and choices:
+        near = get_close_matches(value, choices, n=1, cutoff=0.5)
+        return f"{name} {value} is none of {', '.join(choices)}{f'; did you mean {near[0]}?' if near else ''}"
+    low, high = _ends(parameter)
+    if value is None or (low is None and high is None and "valid" not in message):
+        return f"{name}: {message.strip().rstrip('.')}"
+    span = f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
+    give = "" if low is None and high is None else f"; give {span}"
+    try:
+        number = float(value)
+    except ValueError:
+        return f"{name} {value} is not a number{give}"
+    outside = (low is not None and number < low) or (high is not None and number > high)
+    return f"{name} {value} lies outside {span}" if outside else f"{name} {value} is not a whole number{give}"
+
+
+def _given(parameter: Any, words: Sequence[str]) -> str | None:
+    """The last value that a command line gives to an option; None if that cannot be told."""
+    found = None
+    for word, after in zip(words, [*words[1:], None], strict=True):
+        name, equals, value = word.partition("=")
+        if name in parameter.opts:
+            found = value if equals else after
+    return found
+
+
+def _ends(parameter: Any) -> tuple[float | None, float | None]:
+    """Lowest and highest allowed number of an option."""
+    ends = []
+    for name in ("min", "max"):
+        end = getattr(parameter, name, getattr(getattr(parameter, "type", None), name, None))
+        ends.append(None if end is None else float(end))
+    return ends[0], ends[1]
+
+
+def _choices(parameter: Any) -> list[str]:
+    """The words that an option may be."""
+    kind = getattr(parameter, "type_descriptor", None) or getattr(parameter, "type", None)
+    return [str(getattr(choice, "value", choice)) for choice in getattr(kind, "choices", None) or ()]

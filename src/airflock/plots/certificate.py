@@ -1,0 +1,89 @@
+"""A certificate in three panels: how the bound fell, how near agents came, how far numbers may move."""
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from airflock.plots import style
+
+if TYPE_CHECKING:
+    from airflock.certify.certificate import Certificate
+
+
+def certificate(found: "Certificate") -> Figure:
+    """Upper bounds by flights, the distribution of the smallest distance, and tolerances of the environment.
+
+    Panels without data are left out.
+    """
+    draws = [_bounds]
+    if found.rows and "r_min" in found.rows[0]:
+        draws.append(_distances)
+    if found.tolerance.get("axis"):
+        draws.append(_tolerances)
+    figure = style.Picture(3.6 * len(draws) + 0.4, 3.2)
+    for axes, draw, name in zip(figure.subplots(1, len(draws), squeeze=False)[0], draws, "ABC", strict=False):
+        draw(axes, found)
+        style.letter(axes, name)
+    said = "shown" if found.shown else "not shown"
+    style.overall(figure, found.campaign.scenario.name, f"{said}, {100.0 * found.campaign.confidence:g} % confidence")
+    return figure
+
+
+def _bounds(axes: Axes, found: "Certificate") -> None:
+    """Upper and lower bound of every limit at every look, and the limit itself."""
+    for verdict, color in zip(found.verdicts, style.LINES, strict=False):
+        if verdict.looks:
+            n = [look.flights for look in verdict.looks]
+            axes.plot(
+                n, [look.high for look in verdict.looks], "o-", ms=3, lw=1.2, color=color, label=verdict.limit.event
+            )
+            lows = [look.low if look.low > 0.0 else math.nan for look in verdict.looks]
+            axes.plot(n, lows, "o:", ms=2, lw=1.0, color=color)
+        if verdict.probability is not None:
+            axes.axhline(verdict.probability, color=color, lw=0.8, ls="--")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    shown = [line for verdict in found.verdicts for line in (verdict.high, verdict.probability) if line]
+    axes.set_ylim(min([look.low for v in found.verdicts for look in v.looks if look.low > 0.0] + shown) / 3.0, 1.0)
+    style.dress(axes, "flights", "probability of a flight with an event")
+    style.legend(axes)
+
+
+def _distances(axes: Axes, found: "Certificate") -> None:
+    """Share of flights whose smallest distance was below a value; dashed: limits on it."""
+    from_rows = [row.get("closest") if row.get("closest") is not None else row["r_min"] for row in found.rows]
+    values = np.sort(np.array(from_rows, float))
+    values = values[np.isfinite(values)]
+    if len(values):
+        axes.step(values, np.arange(1, len(values) + 1) / len(values), where="post", color=style.BLUE, lw=1.2)
+        axes.set_yscale("log")
+    for verdict in found.verdicts:
+        if verdict.limit.score == "r_min":
+            axes.axvline(verdict.limit.value, color=style.RED, lw=0.8, ls="--")
+    axes.set_xlim(left=0.0)
+    style.dress(axes, "smallest distance in a flight, m", "share of flights below")
+
+
+def _tolerances(axes: Axes, found: "Certificate") -> None:
+    """Tornado: factor by which each number may move, from its nominal value."""
+    rows = sorted(found.tolerance["axis"], key=lambda axis: abs(math.log(axis["factor"])), reverse=True)
+    for y, axis in enumerate(rows):
+        axes.barh(y, axis["factor"] - 1.0, left=1.0, height=0.6, color=style.BLUE)
+        if "not_shown" in axis:
+            axes.plot(axis["not_shown"] / axis["nominal"], y, "|", ms=10, color=style.RED)
+        axes.annotate(
+            f"{axis['safe']:.3g} {axis['unit'] if axis['unit'] != '1' else ''}", (axis["factor"], y), (4, 0),
+            textcoords="offset points", va="center", fontsize=style.SMALL,
+        )  # fmt: skip
+    axes.set_xscale("log")
+    axes.axvline(1.0, color=style.GREY, lw=0.6)
+    axes.set_yticks(range(len(rows)), [axis["key"] for axis in rows])
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.margins(x=0.2)
+    style.dress(axes, "safe factor on the nominal value (red: not shown)")

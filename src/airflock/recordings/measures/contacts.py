@@ -1,0 +1,49 @@
+"""Contacts with walls, obstacles and the scene: when, where, who, and with what."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import states
+from airflock.recordings.scores import scenario_of
+from airflock.world.place import Place, Shapes
+
+
+def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame:
+    """One row per contact: individual, what, begin (s), end (s), and where it began: east, north, up (m).
+
+    radius : of an individual, m; by default metrics.r_body of its scenario
+
+    what is "wall", "obstacle 0" and so on as in world.obstacles, or "scene". Each is followed by itself: a contact
+    lasts while an individual is nearer to it than its radius, and ends where the individual is gone. A log without an
+    arena has no contacts. Touches between two frames are not seen; the order parameter n_contacts looks at every step.
+    """
+    scenario = scenario_of(recording)
+    radius = scenario.metrics.r_body if radius is None else radius
+    if not 0.0 <= radius < float("inf"):
+        raise ParameterError(f"radius = {radius:g} m is not a radius")
+    stands = scenario.stands()
+    place = Place(scenario.world, Shapes(*stands.lists))
+    found, rows = states(recording), []
+    for i, name in enumerate(found.names):
+        begun: dict[str, int] = {}
+        for k in range(len(found.time) + 1):
+            there = k < len(found.time) and found.present[k, i]
+            now = set()
+            if there:
+                x, y, z = (*found.position[k, :, i].tolist(), 0.0)[:3]
+                now = {what for what, distance in place.distances(x, y, z) if distance < radius}
+            for what in sorted(set(begun) - now):
+                first = begun.pop(what)
+                at = (*found.position[first, :, i].tolist(), 0.0)[:3]
+                rows.append((name, what, found.time[first], found.time[k - 1], *at))
+            for what in now - set(begun):
+                begun[what] = k
+    columns = ["individual", "what", "begin", "end", "east", "north", "up"]
+    table = pd.DataFrame(rows, columns=columns)
+    return (
+        table.sort_values(["begin", "individual"], kind="stable", ignore_index=True)
+        if len(rows)
+        else table.astype(dict.fromkeys(columns[2:], np.float64))
+    )

@@ -1,0 +1,40 @@
+"""Arrows for what a law makes of its neighbours: the vectors among the fields of its sums."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def vectors(record: Any) -> dict[str, tuple[str, str]]:
+    """Vectors among the fields of a NamedTuple: name → fields of its x and y component.
+
+    Sums(x, y, z) is one vector without a name; Sums(away_x, away_y, away_z, n) one called away.
+    """
+    fields = record._fields
+    found = {}
+    for field in fields:
+        stem = field[:-1]
+        if field.endswith("x") and f"{stem}y" in fields:
+            found[stem.strip("_")] = (field, f"{stem}y")
+    return found
+
+
+def values(record: Any) -> dict[str, NDArray[np.float64]]:
+    """The vectors that a NamedTuple holds, by name: (3,), without a z component 0."""
+    return {
+        name: np.array([getattr(record, x), getattr(record, y), getattr(record, f"{x[:-1]}z", 0.0)], float)
+        for name, (x, y) in vectors(type(record)).items()
+    }
+
+
+def arrow(begin: NDArray[Any], end: NDArray[Any]) -> NDArray[np.float64]:
+    """A shaft and two barbs, (3, 2, 3), in the plane or as seen from above; nothing for an arrow of no length."""
+    along = np.asarray(end, float) - begin
+    length = float(np.linalg.norm(along))
+    if length < 1e-9:
+        return np.zeros((0, 2, 3))
+    side = np.array([-along[1], along[0], 0.0])
+    across = side / max(float(np.linalg.norm(side)), 1e-9) * length
+    barbs = [end - 0.25 * along + sign * 0.12 * across for sign in (-1.0, 1.0)]
+    return np.array([[begin, end], [barbs[0], end], [barbs[1], end]], float)

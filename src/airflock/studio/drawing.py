@@ -1,0 +1,254 @@
+"""Drawing: what stands, and the flocks of all sides frame by frame: darts, trails, links, collisions."""
+
+import math
+from collections import deque
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.body import radio
+from airflock.metrics.registry import numbers_of
+from airflock.stage import colours
+from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
+from airflock.studio import measures
+from airflock.studio.player import Player
+from airflock.studio.side import Side
+from airflock.studio.view import View
+
+OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
+PIECE = 6  # frames of one piece of a trail
+MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
+BROAD = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
+APART = 2.3  # half widths between the middles of two sides
+LISTED = 40  # collisions that are kept
+LINKS = ("none", "three nearest", "radio")
+NAMES = "AB"
+FLASH = 15  # frames for which a collision is shown
+SAME = 0.5  # s; two collisions of a pair within it are one
+PALE = 240.0  # of a link on which no packet arrives
+
+
+class Collision(NamedTuple):
+    """Two agents nearer than a collision: when, s, on which side, and who."""
+
+    time: float
+    side: int
+    first: int
+    second: int
+
+
+class Flock:
+    """One side as it is drawn: where its scene lies, and who collides."""
+
+    def __init__(self, side: Side, offset: NDArray[Any]):
+        self.side, self.offset = side, offset
+        self.touching: set[tuple[int, int]] = set()
+        measured, scenario = side.scenario.measured_by(), side.scenario
+        counts = {"n_coll", "phi_coll", "collisions"} & set(numbers_of(scenario.measures, measured))
+        self.near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
+        self.period = measures.period_of(scenario)
+        self.position, self.velocity = side.motion
+        self.pairs = measures.Pairs(self.position, self.period)
+
+    def look(self) -> None:
+        """Take the present moment."""
+        self.position, self.velocity = self.side.motion
+        self.pairs = measures.Pairs(self.position, self.period)
+
+    def links(self, kind: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+        """Lines between agents, and their colours: paler where a packet is more likely lost."""
+        tone = np.array(colours.LINES["links"][0])
+        if kind == "radio":
+            k = self.side.scenario.radio
+            pairs, length = self.pairs.linked(min(k.range, 1e8))
+            arrives = np.interp(length, *arrival(k))
+            points = self.position[pairs]
+            tones = PALE - arrives[:, None] * (PALE - 0.8 * tone)
+        else:
+            points = self.pairs.neighbours() if kind == LINKS[1] else np.zeros((0, 2, 3))
+            tones = np.tile(tone, (len(points), 1))
+        return points + self.offset, np.asarray(tones, np.uint8).reshape(-1, 3)
+
+
+@lru_cache(maxsize=16)
+def arrival(k: radio.Parameters) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Distances, m, and the probability that a packet arrives over them, on one of the links."""
+    far = np.linspace(0.0, min(k.range, 4.0 * max(k.loss_at, k.far)), 129)
+    if k.kind == "links":
+        missed = [math.prod(1.0 - radio.received(r, slow, k) for slow in (0.0, 1.0)) for r in far.tolist()]
+    else:
+        missed = [radio.lost(r, k) for r in far.tolist()]
+    return far, 1.0 - np.array(missed)
+
+
+class Drawing:
+    """The scene of a page."""
+
+    def __init__(self, player: Player, view: View):
+        self.player, self.view = player, view
+        self.way, self.trails, self.links, self.follow = "speed", True, LINKS[0], False
+        self.collisions: deque[Collision] = deque(maxlen=LISTED)
+        self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
+        self.stand()
+
+    # ----------------------------------------------------------------------------------------------- what stands
+
+    def stand(self) -> None:
+        """Draw the worlds of all sides anew, with their agents as they are."""
+        view, sides = self.view, self.player.sides
+        self.stages = [self._stage(side) for side in sides]
+        self.span = max(stage.span for stage in self.stages)
+        self.flat = sides[0].scenario.dimensions == 2
+        step = np.array([APART * self.span, 0.0, 0.0])
+        middle = self.stages[0].centre
+        self.flocks = [
+            Flock(side, number * step + (middle - stage.centre) * (1.0, 1.0, 0.0) * bool(number))
+            for number, (side, stage) in enumerate(zip(sides, self.stages, strict=True))
+        ]
+        speeds = [float(np.sqrt((flock.velocity**2).sum(1)).max()) for flock in self.flocks]
+        wanted = [float(side.scenario.measured_by().v_flock or 0.0) for side in sides]
+        self.top = max(1.5 * max(wanted), 1.1 * max(speeds), 1e-3)
+        count = sum(len(flock.position) for flock in self.flocks)
+        self.size = self.span * min(1.0, (100.0 / count) ** 0.25) / MARGIN
+        with view.atomic():
+            view.clear()
+            self._build()
+            view.agents(count, self.size, colours.LINES)
+        wide = self.span + 0.5 * float(step[0]) * (len(sides) - 1)
+        beside = 0.3 * wide * np.array([1.0, 0.0 if self.flat else 0.3, 0.0])  # of the panel
+        share = 1.0 if len(sides) == 1 else BROAD
+        view.look_at(middle + 0.5 * step * (len(sides) - 1) + beside, share * wide, self.flat)
+        self._before: NDArray[Any] | None = None
+        self._pieces, self._done = 0, 0
+        self._alert = np.zeros(count, int)
+        self._shown = list(sides)
+
+    def _stage(self, side: Side) -> Stage:
+        stage = stage_of(side.scenario, side.motion[0])
+        if side.scenario.world.arena == "none" and not stage.solids:
+            speed = float(np.sqrt((side.motion[1] ** 2).sum(1)).max())
+            speed = max(float(side.scenario.measured_by().v_flock or 0.0), 1.1 * speed / 1.5)
+            stage = stage._replace(span=max(stage.span, OPEN * speed))
+        return stage
+
+    def _build(self) -> None:
+        """Everything that stands, each side at its place."""
+        view = self.view
+        self._worlds = [_world(side) for side in self.player.sides]
+        middle = np.mean([s.centre + f.offset for s, f in zip(self.stages, self.flocks, strict=True)], axis=0)
+        view.ground("ground", self.span * len(self.stages), self.stages[0].height[0], middle)
+        for number, (stage, flock) in enumerate(zip(self.stages, self.flocks, strict=True)):
+            mark, shift = NAMES[number], flock.offset
+            for solid in stage.solids:
+                view.solid(Solid(f"{mark}/{solid.name}", solid.vertices + shift, solid.faces, solid.colour))
+            for lines in stage.lines:
+                view.lines(Lines(f"{mark}/{lines.name}", lines.points + shift, lines.colour))
+            if len(self.stages) > 1:
+                view.label(mark, stage.centre + shift + [0.0, 1.08 * self.span, 0.0])
+        if self.handles is not None:
+            self.handles(self)
+
+    def restand(self, always: bool = False) -> None:
+        """Draw what stands anew where it has changed: an obstacle was thrown in, a goal moved, a fork begun."""
+        sides = self.player.sides
+        if len(sides) != len(self._shown) or any(a is not b for a, b in zip(sides, self._shown, strict=True)):
+            self.stand()
+            return
+        if always or [_world(side) for side in sides] != self._worlds:
+            self.stages = [self._stage(side)._replace(span=old.span, centre=old.centre)
+                           for side, old in zip(sides, self.stages, strict=True)]  # fmt: skip
+            with self.view.atomic():
+                self.view.clear(moving=False)
+                self._build()
+
+    def forget(self) -> None:
+        """Forget trails: the flight went elsewhere."""
+        self.view.no_trails()
+        self._before = None
+
+    # -------------------------------------------------------------------------------------------------- frames
+
+    def frame(self, chosen: int | None) -> None:
+        """Draw the present moment; `chosen` counts through the agents of all sides."""
+        flocks = self.flocks
+        for flock in flocks:
+            flock.look()
+        position = np.vstack([flock.position + flock.offset for flock in flocks]).astype(np.float32)
+        velocity = np.vstack([flock.velocity for flock in flocks])
+        if not np.isfinite(position).all():
+            return
+        tone = colours.colours(
+            self.way, np.vstack([f.position for f in flocks]), velocity, self.top, self.stages[0].height
+        )
+        self._flash(tone)
+        trail, anew = tone.copy(), False
+        if chosen is not None:
+            tone[chosen] = colours.CHOSEN
+        self.view.move(position, turned(velocity), tone)
+        if self._before is not None and self.trails:
+            self._pieces += 1
+            anew = self._pieces % PIECE == 0
+            self.view.trail(self._from(position), position, trail, anew)
+        if self.follow:
+            self.view.follow(position.mean(axis=0).astype(float))
+        links = [flock.links(self.links) for flock in flocks]
+        self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
+        if self._before is None or anew:
+            self._before = position
+
+    def _from(self, position: NDArray[Any]) -> NDArray[Any]:
+        """Where a piece of trail begins: where the agent was, or here if it went through a periodic face."""
+        assert self._before is not None
+        begin, first = self._before.copy(), 0
+        for flock in self.flocks:
+            part = slice(first, first + len(flock.position))
+            if flock.period is not None:
+                half = 0.5 * np.array([side or np.inf for side in flock.period])
+                far = (np.abs(position[part] - begin[part]) > half).any(axis=1)
+                begin[part][far] = position[part][far]
+            first = part.stop
+        return begin
+
+    def _flash(self, tone: NDArray[np.uint8]) -> None:
+        """Colour who collides, for half a second at least, and list new collisions."""
+        done, first = sum(len(flock.side.flight.events) for flock in self.flocks), 0
+        if done > self._done:  # what lay ahead of an earlier moment will not come again
+            now = self.player.time
+            self.collisions = deque((c for c in self.collisions if c.time <= now), LISTED)
+        self._done = done
+        self._alert = np.maximum(self._alert - 1, 0)
+        for number, flock in enumerate(self.flocks):
+            touching = flock.pairs.within(flock.near)
+            self._alert[first + touching.ravel()] = FLASH
+            pairs = {(int(i), int(j)) for i, j in touching}
+            for i, j in sorted(pairs - flock.touching):
+                self._note(Collision(flock.side.flight.time, number, i, j))
+            flock.touching = pairs
+            first += len(flock.position)
+        tone[self._alert > 0] = colours.ALERT
+
+    def _note(self, new: Collision) -> None:
+        """List a collision; one that was listed before the flight went back is the same."""
+        if not any(c[1:] == new[1:] and abs(c.time - new.time) < SAME for c in self.collisions):
+            self.collisions = deque(sorted([new, *self.collisions], reverse=True)[:LISTED], LISTED)
+
+    def whose(self, chosen: int) -> tuple[int, int]:
+        """Side and number of an agent counted through all sides."""
+        for number, flock in enumerate(self.flocks):
+            if chosen < len(flock.position):
+                return number, chosen
+            chosen -= len(flock.position)
+        raise IndexError(chosen)
+
+    @property
+    def places(self) -> NDArray[Any]:
+        """Places in the scene of the agents of all sides, (agent, 3) m."""
+        return np.vstack([flock.position + flock.offset for flock in self.flocks])
+
+
+def _world(side: Side) -> Any:
+    """What tells whether a side's world looks as it was drawn."""
+    scenario = side.scenario
+    return scenario.world, scenario.scene, scenario.goals

@@ -1,0 +1,119 @@
+"""Measuring: charts of order parameters, speeds and distances, their histograms, and the table of scores."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from airflock.studio import measures
+from airflock.studio.drawing import NAMES
+from airflock.studio.room import Room
+from airflock.studio.score_tables import score_table
+
+if TYPE_CHECKING:
+    from airflock.studio.page import Page
+
+
+class Measuring(Room):
+    """Charts of one side, or of two in one picture."""
+
+    def __init__(self, page: "Page", tab: Any):
+        super().__init__(page)
+        self.tab = tab
+        self._made: list[Any] = []
+        self.scores: list[dict[str, Any]] = []
+
+    def stand(self) -> None:
+        """Make the charts for as many sides as there are."""
+        player, panel = self.player, self.panel
+        for made in self._made:
+            made.remove()
+        names = [name for name, value in player.sides[0].flight.scores().items() if isinstance(value, (int, float))]
+        published = player.sides[0].scenario.published
+        self.name = measures.chosen_score(dict.fromkeys(names), published)
+        self.sides = []
+        for side, flock in zip(player.sides, self.drawing.flocks, strict=True):
+            far = float(side.scenario.measured_by().r_cluster or 1.0)
+            apart = flock.pairs.apart()
+            far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
+            self.sides.append(measures.Measures(self.drawing.top, max(far, 1e-6)))
+            self.sides[-1].name = self.name
+        two = len(player.sides) > 1
+        tags = [f" {name}" for name in NAMES] if two else [""]
+        with self.tab:
+            self.menu = panel.menu("order parameter", names, self.name, lambda n: player.ask(lambda: self._name(n)))
+            self.course = panel.chart(
+                "since the last change", [*(f"value{t}" for t in tags), "paper +", "paper −"], band=True
+            )
+            words = ("mean", "slowest", "fastest")
+            self.speeds = panel.chart("speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)])
+            self.nearest = panel.chart("smallest distance (m)", [f"nearest pair{t}" for t in tags])
+            self.speed_shares = panel.chart("speeds since the last change", [f"share{t}" for t in tags], across="m/s")
+            self.distance_shares = panel.chart("distance to the nearest", [f"share{t}" for t in tags], across="m")
+            self.table = panel.text()
+        self._made = [
+            self.menu, self.course, self.speeds, self.nearest, self.speed_shares, self.distance_shares, self.table,
+        ]  # fmt: skip
+
+    def _name(self, name: str) -> None:
+        self.name = name
+        for side in self.sides:
+            side.name = name
+            side.course.clear()
+
+    def clear(self) -> None:
+        """Forget the charts: the flight went elsewhere."""
+        for side in self.sides:
+            side.clear()
+
+    def chart(self) -> None:
+        """Add the present moment and draw everything."""
+        flocks, two = self.drawing.flocks, len(self.sides) > 1
+        flights = [flock.side.flight for flock in flocks]
+        self.scores = [
+            side.note(flock.side.flight, flock.velocity, flock.pairs)
+            for side, flock in zip(self.sides, flocks, strict=True)
+        ]
+        instants = [np.array(side.instants) for side in self.sides]
+        count = min(map(len, instants))
+        parts = [part[len(part) - count :] for part in instants]
+        columns = (1,) if two else (1, 2, 3)
+        time = np.ascontiguousarray(parts[0][:, 0])
+        self.speeds.data = time, *(np.ascontiguousarray(part[:, c]) for part in parts for c in columns)
+        self.nearest.data = time, *(np.ascontiguousarray(part[:, 4]) for part in parts)
+        self._draw_course()
+        for chart, shares in (
+            (self.speed_shares, [side.speeds.steps for side in self.sides]),
+            (self.distance_shares, [side.distances.steps for side in self.sides]),
+        ):
+            chart.data = _joined(shares)
+        self.table.content = score_table(flights, self.scores)
+
+    def _draw_course(self) -> None:
+        courses = [np.array(side.course).reshape(-1, 2) for side in self.sides]
+        longest = max(courses, key=len)
+        if not len(longest):
+            return
+        time = longest[:, 0].copy()
+        values = [
+            np.interp(time, course[:, 0], course[:, 1], left=math.nan) if len(course) else np.full(len(time), math.nan)
+            for course in courses
+        ]
+        mean, spread = self.player.sides[0].scenario.published.get(self.name, (math.nan, None))
+        edge, half = np.full(len(time), mean), spread or 0.0
+        self.course.data = time, *values, edge + half, edge - half
+
+
+def _joined(outlines: list[Any]) -> tuple[Any, ...]:
+    """Outlines of histograms over one axis: values and the share of each at them."""
+    if len(outlines) == 1:
+        return tuple(outlines[0])
+    values = np.union1d(outlines[0][0], outlines[1][0])
+    both = np.repeat(values, 2)[1:-1]
+    middle = 0.5 * (both[::2] + both[1::2])
+    found = []
+    for edges, shares in outlines:
+        place = np.searchsorted(edges[::2], middle, side="right") - 1
+        inside = middle <= edges[-1]
+        found.append(np.repeat(np.where(inside, shares[::2][np.clip(place, 0, len(shares) // 2 - 1)], 0.0), 2))
+    return both, *found

@@ -1,0 +1,113 @@
+"""Panel: the controls beside the scene, in the words of the studio. With `view`, the only files that know viser."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import viser
+from viser import uplot
+
+from airflock.stage import colours
+from airflock.studio.controls import Control
+
+TONES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
+
+
+class Panel:
+    """The panel of one page.
+
+    server : of viser
+    """
+
+    def __init__(self, server: viser.ViserServer):
+        self.server = server
+
+    def tabs(self, *names: str) -> list[Any]:
+        """Tabs; each is a context in which controls are made."""
+        group = self.server.gui.add_tab_group()
+        return [group.add_tab(name) for name in names]
+
+    def folder(self, name: str, is_open: bool = True) -> Any:
+        """A folder; a context in which controls are made."""
+        return self.server.gui.add_folder(name, expand_by_default=is_open)
+
+    def text(self, content: str = "") -> Any:
+        """HTML that can be rewritten: `.content`."""
+        return self.server.gui.add_html(content)
+
+    def button(self, label: str, told: Callable[[], None], hint: str = "", icon: str = "") -> Any:
+        """A button; `.label` can be rewritten."""
+        made = self.server.gui.add_button(
+            label, hint=hint or None, icon=getattr(viser.Icon, icon, None) if icon else None
+        )
+        made.on_click(lambda _: told())
+        return made
+
+    def row(self, actions: dict[str, Callable[[], None]]) -> None:
+        """Small buttons side by side."""
+        self.server.gui.add_button_group("", tuple(actions)).on_click(lambda event: actions[event.target.value]())
+
+    def command(self, label: str, key: Any, told: Callable[[], None]) -> None:
+        """A key that does something."""
+        self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: told())
+
+    def checkbox(self, label: str, value: bool, told: Callable[[bool], None], hint: str = "") -> Any:
+        """A switch; its state is `.value`."""
+        made = self.server.gui.add_checkbox(label, value, hint=hint or None)
+        made.on_update(lambda event: told(bool(event.target.value)) if event.client is not None else None)
+        return made
+
+    def menu(self, label: str, options: Sequence[str], value: str, told: Callable[[str], None], hint: str = "") -> Any:
+        """A menu; what is chosen is `.value`."""
+        made = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
+        made.on_update(lambda event: told(event.target.value) if event.client is not None else None)
+        return made
+
+    def number(self, label: str, value: int, low: int, high: int, told: Callable[[int], None], hint: str = "") -> Any:
+        """A field for a whole number."""
+        made = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
+        made.on_update(lambda event: told(int(event.target.value)) if event.client is not None else None)
+        return made
+
+    def slide(
+        self, label: str, low: float, high: float, step: float, value: float, told: Callable[[float], None],
+        hint: str = "",
+    ) -> Any:  # fmt: skip
+        """A slider; `told` hears of a hand on it, not of a value that is set from here."""
+        made = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
+        made.on_update(lambda event: told(float(event.target.value)) if event.client is not None else None)
+        return made
+
+    def control(self, given: Control, told: Callable[[str, Any], None]) -> Any:
+        """A slider or a menu for a parameter."""
+        if given.is_choice:
+            return self.menu(given.label, given.options, given.value, lambda v: told(given.key, v), given.hint)
+        return self.slide(
+            given.label, given.low, given.high, given.step, given.value, lambda v: told(given.key, v), given.hint
+        )
+
+    def chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Any:
+        """A chart: `.data` is (time or what is `across`, *values). With a band, the last two are its ends, shaded."""
+        series: list[Any] = [uplot.Series(label=across)]
+        for number, name in enumerate(names):
+            edge = band and number >= len(names) - 2
+            stroke, width = ("#E69F00", 0.7) if edge else (TONES[number], 2.0)
+            points = uplot.Series_Points(show=False)
+            series.append(uplot.Series(label=name, points=points, stroke=stroke, width=width))
+        shade = (uplot.Band(series=(len(names), len(names) - 1), fill="rgba(230,159,0,0.2)"),) if band else None
+        zero = np.zeros(2)
+        return self.server.gui.add_uplot(
+            (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade,
+            scales={"x": uplot.Scale(time=False)}, legend=uplot.Legend(show=True),
+            axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
+        )  # fmt: skip
+
+    def download(self, name: str, content: bytes) -> None:
+        """Send a file to every open page."""
+        for client in self.server.get_clients().values():
+            client.send_file_download(name, content)
+
+    def say(self, title: str, body: str, bad: bool = False) -> None:
+        """A notice on every open page."""
+        for client in self.server.get_clients().values():
+            client.add_notification(title, body, color="red" if bad else "blue", auto_close_seconds=8.0)

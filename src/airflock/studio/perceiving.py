@@ -1,0 +1,166 @@
+"""Perceiving: what one agent perceives and what its law makes of it, as lines to draw and words to read."""
+
+import html
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.look import View as Seen
+from airflock.engine.place import Course, Place
+from airflock.engine.state import State as Memory
+from airflock.scenarios.scenario import Scenario
+from airflock.stage import colours
+from airflock.stage.arrows import arrow, values
+from airflock.stage.rays import cast_rays
+from airflock.studio.side import Side
+
+NONE = np.zeros((0, 2, 3))
+WAKE = 6.0  # spans of a wake that are drawn
+REACH = 5.0  # darts; length of the longest arrow
+FREE, HIT = colours.GREEN, colours.RED
+
+
+class Drawn(NamedTuple):
+    """Lines about one agent by kind (`stage.colours.LINES`): segments (segment, 2, 3) m and their colours; and words.
+
+    Kinds that are not named show nothing.
+    """
+
+    lines: dict[str, tuple[NDArray[Any], NDArray[Any] | None]]
+    words: str
+
+
+class Perceiving:
+    """Eyes of whoever is selected; remembers the world that it looked at, and how strong each term has been."""
+
+    def __init__(self) -> None:
+        self._place: tuple[Scenario, Place] | None = None
+        self._strongest: dict[str, float] = {}
+
+    def of(self, side: Side, agent: int, size: float, top: float) -> Drawn:
+        """What an agent perceives.
+
+        size : of a dart, m; top : speed that gives the longest arrow, m/s
+        """
+        seen, scenario = side.flight.look(agent), side.scenario
+        own = np.array(seen.true[:3])
+        lines = _neighbours(seen, own, size)
+        wish = np.zeros(3)
+        wish[: len(seen.command)] = seen.command
+        lines["command"] = arrow(own, own + wish * (REACH * size / max(top, 1e-9))), None
+        points, tones, named = self._terms(seen, own, size)
+        lines["terms"] = points, tones
+        words = [*_about(seen, scenario), *named]
+        memory = side.flight.snapshot().state
+        if scenario.model.sight is not None:
+            found, said = self._rays(scenario, memory, seen)
+            lines["rays"] = found
+            words.append(said)
+        if "model.circulation" in memory.arrays or "power.circulation" in memory.arrays:
+            lines["wake"] = _wakes(scenario, side.motion), None
+            words.append(_wash(memory, agent))
+        return Drawn(lines, "<br>".join(words))
+
+    def _terms(self, seen: Seen, own: NDArray[Any], size: float) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
+        """Arrows of what the law was given: of all neighbours, of each, and of all surfaces.
+
+        Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
+        """
+        given = {name or "neighbours": vector for name, vector in values(seen.sums).items()} if seen.sums else {}
+        walls = {f"walls {name}".strip(): vector for name, vector in values(seen.walls).items()} if seen.walls else {}
+        pieces, tones, words = [], [], []
+        for number, (name, vector) in enumerate((given | walls).items()):
+            strength = float(np.linalg.norm(vector))
+            parts = [values(term)["" if name == "neighbours" else name] for term in seen.terms] if name in given else []
+            longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
+            most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
+            tone, scale = colours.TERMS[number % len(colours.TERMS)], REACH * size / max(most, 1e-9)
+            shafts = np.vstack([arrow(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)])
+            pieces.append(shafts)
+            tones.append(np.tile(tone, (len(shafts), 1)))
+            words.append(f"{_dash(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
+        if not pieces:
+            return NONE, np.zeros((0, 3)), []
+        return np.vstack(pieces), np.vstack(tones), words
+
+    def _rays(self, scenario: Scenario, memory: Memory, seen: Seen) -> tuple[tuple[NDArray[Any], NDArray[Any]], str]:
+        """The fan of rays that the agent casts: green where free, red up to what it met."""
+        if self._place is None or self._place[0] is not scenario:
+            self._place = scenario, Place(scenario)
+        place, course = self._place[1], Course(scenario)
+        if len(memory.arrays["later"]):
+            place.scene[0][:] = memory.arrays["shapes"].astype(float).tolist()
+        if course.points and scenario.goals.kind != "own":
+            x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
+            course.at = x, y, z
+        rays, _ = cast_rays(scenario, place, course, seen.own, seen.heard, seen.time, seen.agent)
+        at = np.array(seen.own[:3])
+        ends = np.array([[ray.free * ray.x, ray.free * ray.y, ray.free * ray.z] for ray in rays]).reshape(-1, 3)
+        free = np.array([ray.free >= ray.length for ray in rays], bool)
+        tones = np.where(free[:, None], FREE, HIT)
+        said = f"{_dash(FREE)} {int(free.sum())} rays free {_dash(HIT)} {int((~free).sum())} met something"
+        return (np.stack([np.broadcast_to(at, ends.shape), at + ends], 1), tones), said
+
+
+def _neighbours(seen: Seen, own: NDArray[Any], size: float) -> dict[str, Any]:
+    """Lines to whom it hears; crosses where it believes them to be, and itself."""
+    at = np.array([other.state[:3] for other in seen.heard]).reshape(-1, 3)
+    believed = np.array(seen.own[:3])[None]
+    far = float(np.linalg.norm(believed - own)) > 0.05 * size
+    return {
+        "heard": (np.stack([np.broadcast_to(own, at.shape), at], 1), None),
+        "ghosts": (crosses(at, 0.5 * size), None),
+        "measured": (crosses(believed, 0.7 * size) if far else NONE, None),
+    }
+
+
+def crosses(places: NDArray[Any], half: float) -> NDArray[Any]:
+    """Two strokes at each place (place, 3), m."""
+    cross = half * np.array([[[-1, -1, 0], [1, 1, 0]], [[-1, 1, 0], [1, -1, 0]]], float)
+    return np.asarray((places[:, None, None] + cross).reshape(-1, 2, 3))
+
+
+def _about(seen: Seen, scenario: Scenario) -> list[str]:
+    """What is said of any agent."""
+    oldest = max((other.age for other in seen.heard), default=0.0)
+    off = math.dist(seen.true[:3], seen.own[:3])
+    wish = ", ".join(f"{part:.2f}" for part in seen.command)
+    unit = {"velocity": " m/s", "acceleration": " m/s²"}.get(scenario.model.command, "")
+    heard = f"hears {len(seen.heard)} others, at most {oldest:.2g} s old"
+    crossed = f"{_dash(colours.PURPLE, '✕')} where they were heard"
+    if off > 0.0:
+        crossed += f" {_dash(colours.BLUE, '✕')} where it believes to be, {off:.2g} m off"
+    return [
+        f"<b>agent {seen.agent}</b>, {math.hypot(*seen.true[3:]):.2f} m/s",
+        f"{_dash(colours.ORANGE)} {heard}", crossed, f"{_dash(colours.RED)} command ({wish}){unit}",
+    ]  # fmt: skip
+
+
+def _dash(tone: tuple[int, int, int], mark: str = "━") -> str:
+    red, green, blue = tone
+    return f"<span style='color:#{red:02x}{green:02x}{blue:02x}'>{mark}</span>"
+
+
+def _wakes(scenario: Scenario, motion: tuple[NDArray[Any], NDArray[Any]]) -> NDArray[Any]:
+    """The two outermost trailing legs of every wing, straight back."""
+    position, velocity = (part.astype(float) for part in motion)
+    span, ahead = float(scenario.wing.span), np.array([1.0, 0.0, 0.0])
+    if scenario.wing.frame == "ground":
+        mean = velocity.mean(axis=0) * [1.0, 1.0, 0.0]
+        ahead = mean / max(float(np.linalg.norm(mean)), 1e-9)
+    across = 0.5 * span * np.array([-ahead[1], ahead[0], 0.0])
+    ends = position[:, None] + np.array([-across, across])
+    return np.asarray(np.stack([ends, ends - WAKE * span * ahead], 2).reshape(-1, 2, 3))
+
+
+def _wash(memory: Memory, agent: int) -> str:
+    """Drag of a bird, and what the wash of the others makes of it."""
+    which = "power" if "shared_power_drag" in memory.driver.ROWS else "model"
+    drag = float(memory.rows([f"shared_{which}_drag"])[0, agent])
+    said = f"{_dash(colours.SKY)} wakes; induced drag {drag:.3g} N"
+    if which == "power":
+        alone = float(memory.rows(["shared_power_solo"])[0, agent])
+        said += f", {100.0 * (drag / max(alone, 1e-9) - 1.0):+.0f} % of a lone bird's"
+    return said

@@ -1,0 +1,87 @@
+"""Playing: pause, step, back, speed, seed and agents; how the flock is shown; collisions, with a way to their time."""
+
+from typing import TYPE_CHECKING
+
+from airflock.stage import colours
+from airflock.studio.drawing import LINKS, NAMES, Collision
+from airflock.studio.room import Room, note
+
+if TYPE_CHECKING:
+    from airflock.studio.page import Page
+
+SOON = 10  # s; how far one press goes back
+BEFORE = 1.0  # s; a jump to a collision ends so long before it
+SPEEDS = {"0.1 ×": 0.1, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0, "20 ×": 20.0, "as fast as it goes": 1e9}
+JUMP = "jump to …"
+
+
+class Playing(Room):
+    """Controls of time and of what is drawn."""
+
+    def __init__(self, page: "Page"):
+        super().__init__(page)
+        panel, player, drawing = self.panel, self.player, self.drawing
+        self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P", "PLAYER_PAUSE")
+        panel.row({"Step": self.ask(player.step), f"Back {SOON} s": self.ask(self.back), "Reset": self.ask(self.reset)})
+        panel.menu("speed", tuple(SPEEDS), "1 ×", lambda chosen: self._speed(SPEEDS[chosen]))
+        panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
+        most = max(1000, player.flight.agents)
+        panel.number(
+            "agents", player.flight.agents, 1, most, lambda n: player.ask(lambda: self.reset(agents=n)),
+            "another number begins another flight",
+        )  # fmt: skip
+        panel.menu("colour by", colours.WAYS, drawing.way, lambda way: setattr(drawing, "way", way))
+        self.key = panel.text()
+        panel.checkbox("trails", drawing.trails, told=lambda on: setattr(drawing, "trails", on))
+        panel.menu(
+            "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
+            "to the three nearest, or to all in radio range, paler where packets are lost",
+        )  # fmt: skip
+        drawing.follow = player.scenario.world.arena == "none" and not drawing.stages[0].solids
+        panel.checkbox("follow the flock", drawing.follow, told=lambda on: setattr(drawing, "follow", on))
+        self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes to one second before it")
+        self.listed = panel.text()
+        self._told: list[Collision] = []
+        for key, label, action in (
+            ("P", "Pause or fly", player.toggle), ("N", "Step", player.step), ("R", "Reset", self.reset),
+            ("B", "Back", self.back),
+        ):  # fmt: skip
+            panel.command(label, key, self.ask(action))
+
+    def _speed(self, speed: float) -> None:
+        self.player.pace.speed = speed
+
+    def back(self, time: float | None = None) -> None:
+        """Go back to a time, s, or by ten seconds."""
+        self.player.back(self.player.time - SOON if time is None else time)
+        self.page.elsewhere()
+
+    def reset(self, seed: int | None = None, agents: int | None = None) -> None:
+        """Begin another flight."""
+        self.player.reset(seed, {} if agents is None else {"agents": agents})
+        self.drawing.collisions.clear()
+        self.page.stand()
+
+    def _jump(self, chosen: str) -> None:
+        when = next((c.time for c in self._told if self._name(c) == chosen), None)
+        if when is not None:
+            self.player.ask(lambda: self.back(max(when - BEFORE, 0.0)))
+
+    def _name(self, c: Collision) -> str:
+        side = f", {NAMES[c.side]}" if len(self.player.sides) > 1 else ""
+        return f"t = {c.time:.1f} s: {c.first} and {c.second}{side}"
+
+    def chart(self) -> None:
+        """The button's words, the key to the colours, and the list of collisions."""
+        label = "Fly" if self.player.paused else "Pause"
+        if self.pause.label != label:
+            self.pause.label = label
+        drawing = self.drawing
+        self.key.content = colours.key(drawing.way, drawing.top, drawing.stages[0].height)
+        found = list(drawing.collisions)
+        if found != self._told:
+            self._told = found
+            self.jump.options = (JUMP, *dict.fromkeys(map(self._name, found)))
+            self.jump.value = JUMP
+            few = "<br>".join(self._name(c) for c in found[:8])
+            self.listed.content = note(f"<b>Nearer than a collision</b><br>{few}") if found else ""

@@ -1,0 +1,33 @@
+"""Room: a part of a page with one purpose, its controls and what it shows."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from airflock.studio.page import Page
+
+
+class Room:
+    """One part of a page.
+
+    page : which it belongs to
+    """
+
+    def __init__(self, page: "Page"):
+        self.page, self.player, self.view = page, page.player, page.view
+        self.panel, self.drawing = page.view.panel, page.drawing
+
+    def stand(self) -> None:
+        """The flights are others than before: another one began, or a second one joined or left."""
+
+    def chart(self) -> None:
+        """Show the present moment; a few times a second."""
+
+    def ask(self, action: Callable[[], Any]) -> Callable[[], None]:
+        """What a control calls to have something done before the next frame."""
+        return lambda: self.player.ask(lambda: (action(), None)[1])
+
+
+def note(text: str) -> str:
+    """Small print of a panel, as HTML."""
+    return f"<div style='padding:0 0.75em;font-size:0.85em'>{text}</div>"

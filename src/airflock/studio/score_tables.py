@@ -1,0 +1,81 @@
+"""Tables of a page, as HTML: order parameters of a window, two flights side by side, and how two scenarios differ."""
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from airflock.engine.flight import Flight
+from airflock.metrics.registry import reports
+from airflock.scenarios.scenario import Scenario
+
+
+def score_table(flights: Sequence[Flight], scores: Sequence[Mapping[str, Any]]) -> str:
+    """Order parameters of this window, of the window before, and of the paper, as HTML; of two flights side by side."""
+    flight, two = flights[0], len(flights) > 1
+    about, published = reports(flight.scenario.measures), {} if two else flight.scenario.published
+    before = flight.windows[-1].scores if flight.windows and not two else {}
+    heads = ["A", "B", "B − A"] if two else ["now", *(["before"] if before else []), *(["paper"] if published else [])]
+    rows = ["<tr>" + "".join(f"<th style='text-align:right'>{head}</th>" for head in ["", *heads]) + "</tr>"]
+    for name, value in scores[0].items():
+        if not isinstance(value, (int, float)):
+            continue
+        unit, meaning = about.get(name, ("", ""))
+        cells = [_number(value)]
+        if two:
+            other = scores[1].get(name)
+            gap = other - value if isinstance(other, (int, float)) else None
+            cells += [_number(other), _number(gap)]
+        if before:
+            cells.append(_number(before.get(name)))
+        if published:
+            mean, spread = published.get(name, (None, None))
+            cells.append(_number(mean) + (f" ± {spread:.2g}" if spread is not None else ""))
+        rows.append(_row(f"{name} ({unit})" if unit else name, cells, meaning))
+    since = " and ".join(f"{flight.windows[-1].end if flight.windows else 0.0:.3g} s" for flight in flights)
+    return _table(rows, f"since t = {since}")
+
+
+def difference_table(a: Scenario, b: Scenario) -> str:
+    """What two scenarios do not have in common, as HTML."""
+    found = differences(a, b)
+    if not found:
+        return _table([], "no difference but chance that grew")
+    heads = "<tr><th></th><th style='text-align:right'>A</th><th style='text-align:right'>B</th></tr>"
+    rows = [_row(key, [_word(one), _word(other)]) for key, one, other in found]
+    return _table([heads, *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")
+
+
+def differences(a: Scenario, b: Scenario) -> list[tuple[str, Any, Any]]:
+    """Keys whose values differ, with both values; None where a scenario has no such key."""
+    found: list[tuple[str, Any, Any]] = []
+    if a.model.name != b.model.name:
+        found.append(("model.kind", a.model.name, b.model.name))
+    for section, mine in a.records.items():
+        theirs = b.records[section]
+        names = dict.fromkeys([*mine.__dataclass_fields__, *theirs.__dataclass_fields__])
+        for name in names:
+            one, other = getattr(mine, name, None), getattr(theirs, name, None)
+            if one != other and (section, name) != ("", "duration"):
+                found.append((f"{section}.{name}".strip("."), one, other))
+    return found
+
+
+def _row(title: str, cells: Sequence[str], meaning: str = "") -> str:
+    body = "".join(f"<td style='text-align:right;padding-left:0.8em'>{html.escape(cell)}</td>" for cell in cells)
+    return f"<tr title='{html.escape(meaning, quote=True)}'><td>{html.escape(title)}</td>{body}</tr>"
+
+
+def _table(rows: Sequence[str], said: str) -> str:
+    table = f"<table style='font-size:0.8em;font-variant-numeric:tabular-nums'>{''.join(rows)}</table>"
+    return f"<div style='padding:0 0.75em'><small>{said}</small>{table}</div>"
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, (int, float)):
+        return _number(value)
+    return "–" if value is None else str(value) if isinstance(value, str) else f"{len(value)} given"
+
+
+def _number(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, (int, float)) and math.isfinite(value) else "–"

@@ -1,0 +1,247 @@
+"""Side: one open flight that is tuned, and what was changed on it. A page shows one of them, or two side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.engine.events import Event
+from airflock.engine.flight import Flight
+from airflock.engine.moments import Snapshot
+from airflock.errors import RecordingError, StudioError
+from airflock.recordings import attributes
+from airflock.recordings.files import load_recording
+from airflock.recordings.scores import scenario_of
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+from airflock.studio.controls import fields
+
+LONGEST = 1e6  # s; an open page has no end of its own
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where flights come from.
+
+    where     : preset, scenario file or recording, which is flown again with its events
+    settings  : keys changed from outside
+    law       : a law that flies instead of the file's; trust : whether code that the file names may run
+    recording : what `where` holds, if it is a recording
+    """
+
+    where: str
+    settings: Mapping[str, Any]
+    law: Any = None
+    trust: bool = False
+    recording: xr.Dataset | None = None
+
+    @classmethod
+    def of(cls, where: str, settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False) -> "Origin":
+        """An origin by its name; raises RecordingError for a recording that cannot be flown again."""
+        return cls(where, dict(settings or {}), law, trust, recorded(where) if where.lower().endswith(".nc") else None)
+
+    def scenario(self) -> Scenario:
+        """The scenario, with its own duration."""
+        if self.recording is not None:
+            return scenario_of(self.recording, dict(self.settings))
+        return load(self.where, dict(self.settings), self.law, trust=self.trust)
+
+    def flight(self, seed: int) -> tuple[Scenario, Flight]:
+        """The scenario without an end, and an open flight of it."""
+        preset = endless(self.scenario())
+        if self.recording is None:
+            return preset, Flight(preset, seed)
+        same = not self.settings and seed == int(self.recording.attrs["airflock_seed"])
+        events = attributes.events(self.recording) if same else []
+        return preset, Flight(preset, seed, precision=int(self.recording.attrs["airflock_precision"]), events=events)
+
+    def beside(self, first: "Origin") -> str:
+        """What it is called beside another one: its name, or the keys that set it apart."""
+        if self.where != first.where:
+            return self.where
+        return ", ".join(f"{key} = {v}" for key, v in self.settings.items() if first.settings.get(key) != v)
+
+    @property
+    def document(self) -> dict[str, Any] | None:
+        """The scenario of a recording as a document; None of a preset or a file."""
+        return None if self.recording is None else attributes.scenario_document(self.recording)
+
+
+class Side:
+    """One flight of an origin, with a list of what was changed, so that it can be undone.
+
+    Attributes: preset, the scenario at its start; flight; changed, keys that differ from it with their values.
+    """
+
+    def __init__(self, origin: Origin, seed: int):
+        self.origin = origin
+        self.preset, self.flight = origin.flight(seed)
+        self.changed: dict[str, Any] = {}
+        self._before: list[dict[str, Any]] = []
+        self._gust: tuple[float, dict[str, Any]] | None = None  # how long it blows, s; what is set back after it
+        self._calm: float | None = None  # when it ends, s
+
+    def fork(self) -> "Side":
+        """Another side that goes on from here, with the same noise."""
+        twin = object.__new__(Side)
+        twin.__dict__.update(self.__dict__)
+        twin.flight = self.flight.branch()
+        twin.changed, twin._before = dict(self.changed), []
+        return twin
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario in force."""
+        return self.flight.scenario
+
+    @property
+    def motion(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0."""
+        return in_space(self.flight.state, self.scenario.dimensions)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All keys that differ from the file."""
+        return {**self.origin.settings, **self.changed}
+
+    def command(self, seed: int) -> str:
+        """The command that opens the present scenario again."""
+        parts = ["airflock watch", self.origin.where, fields(self.settings), f"--seed {seed}"]
+        return " ".join(part for part in parts if part)
+
+    # ----------------------------------------------------------------------------------------------- flying
+
+    def fly_to(self, time: float) -> None:
+        """Fly to a time, s; a gust that ends on the way is ended there."""
+        before = self.flight.time
+        self._advance(time if self._calm is None else min(time, self._calm))
+        if self._gust is None:
+            return
+        if self._calm is None and not self.flight.waiting:
+            self._calm = before + self._gust[0]
+        if self._calm is not None and self.flight.time >= self._calm - 1e-9:
+            self.flight.change(self._gust[1])  # its driver flew before the gust: nothing is compiled
+            self._gust = self._calm = None
+            self._advance(time)
+
+    def _advance(self, time: float) -> None:
+        steps = round(time / self.scenario.flight.dt) - self.flight.step
+        if steps > 0:
+            self.flight.advance(steps=steps)
+
+    def again(self, moment: Snapshot, time: float) -> None:
+        """Go back to a moment, then fly to a time, s, with all that was done to the flight up to there."""
+        done = self.flight.events[len(moment.events) :]
+        self.restore(moment)
+        last = round(time / self.scenario.flight.dt)
+        self._replay([event for event in done if event.step < last])
+        self._advance(time)
+        self.changed = self._changes()
+
+    def _replay(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self._advance(event.step * self.scenario.flight.dt)
+            self.flight.event(event.kind, **event.data)
+
+    def restore(self, moment: Snapshot) -> None:
+        """Go back to a moment of this flight, s; what came after it is given up."""
+        self.flight.restore(moment)
+        self._gust = self._calm = None
+        self.changed, self._before = self._changes(), []
+
+    def _changes(self) -> dict[str, Any]:
+        """Keys that are changed at the present moment of the flight, with their values."""
+        found: dict[str, Any] = {}
+        for event in self.flight.events:
+            if event.kind == "change":
+                found |= event.data
+        return {key: value for key, value in found.items() if value != value_of(self.preset, key)}
+
+    # ----------------------------------------------------------------------------------------------- tuning
+
+    def change(self, settings: Mapping[str, Any]) -> None:
+        """Set keys of the scenario from now on; what must be compiled comes into force when that is done."""
+        self.flight.change(settings, wait=False)
+        self._before.append(dict(self.changed))
+        self.changed = {**self.changed, **settings}
+
+    def undo(self) -> dict[str, Any]:
+        """Take the last change back, as a further change. Returns the keys set, with their values."""
+        return self._return_to(self._before.pop()) if self._before else {}
+
+    def to_preset(self) -> dict[str, Any]:
+        """Set everything that was changed back to the preset. Returns the keys set, with their values."""
+        self._before.append(dict(self.changed))
+        return self._return_to({})
+
+    def _return_to(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        keys = [key for key in self.changed if wanted.get(key) != self.changed[key]]
+        values = {key: wanted[key] if key in wanted else value_of(self.preset, key) for key in keys}
+        if values:
+            self.flight.change(values, wait=False)
+        self.changed = dict(wanted)
+        return values
+
+    def gust(self, east: float, north: float, seconds: float) -> None:
+        """Let the wind blow stronger by so much (m/s) for some seconds, then as it was."""
+        wind = self.scenario.wind
+        back = {"wind.east": wind.east, "wind.north": wind.north} if self._gust is None else self._gust[1]
+        self.flight.change({"wind.east": wind.east + east, "wind.north": wind.north + north}, wait=False)
+        self._gust, self._calm = (seconds, back), None
+
+    # -------------------------------------------------------------------------------------------------- acting
+
+    def clear_of(self, x: float, y: float, width: float, name: str = "") -> None:
+        """Raise StudioError where an agent is inside a square around (x, y), m."""
+        position, _ = self.motion
+        inside = np.flatnonzero((np.abs(position[:, :2] - (x, y)) <= 0.5 * width).all(axis=1))
+        if len(inside):
+            raise StudioError(f"agent {inside[0]} {f'of {name} ' if name else ''}is where the obstacle would stand")
+
+    def throw(self, x: float, y: float, width: float) -> None:
+        """Add a square obstacle of a width, m, around (x, y) to the world."""
+        half = 0.5 * width
+        corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]]
+        known = [[list(corner) for corner in outline] for outline in self.scenario.world.obstacles]
+        self.change({"world.obstacles": [*known, corners]})
+
+    def move_goal(self, number: int, place: Sequence[float]) -> None:
+        """Put a goal somewhere else, m; goals that the scene gave are points from then on."""
+        dims = self.scenario.dimensions
+        points = [[float(c) for c in point[:dims]] for point in self.scenario.waypoints()]
+        if number < len(points):
+            points[number] = [float(c) for c in place[:dims]]
+            self.change({"goals.kind": "points", "goals.points": points})
+
+
+def recorded(where: str) -> xr.Dataset:
+    """A recording that can be flown again. Raises RecordingError for any other, and says what shows it."""
+    found = load_recording(where)
+    if "airflock_scenario" not in found.attrs or not int(found.attrs.get("random_start", 1)):
+        raise RecordingError(f"{where}: was not flown from a scenario and a seed; airflock replay {where} shows it")
+    return found
+
+
+def endless(scenario: Scenario) -> Scenario:
+    """The scenario with the longest duration that a flight can have."""
+    longest = min(LONGEST, 0.9 * 2**31 * scenario.flight.dt)
+    document = {**scenario.document, "duration": longest}
+    return replace(scenario, flight=replace(scenario.flight, duration=longest), document=document)
+
+
+def in_space(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Positions and velocities (agent, 3) from a state (component, agent) of two or three dimensions."""
+    found = np.zeros((2, state.shape[1], 3), np.float32)
+    found[0, :, :dimensions], found[1, :, :dimensions] = state[:dimensions].T, state[dimensions : 2 * dimensions].T
+    return found[0], found[1]
+
+
+def value_of(scenario: Scenario, key: str) -> Any:
+    """Value of a key such as model.p_rep."""
+    section, _, name = key.partition(".")
+    if not name:
+        return getattr(scenario.flight, section)
+    return getattr(scenario.parameters if section == "model" else getattr(scenario, section), name)

@@ -1,0 +1,111 @@
+"""Tuning: sliders and menus of every parameter of the side in hand, undo, and what can be saved of it."""
+
+import html
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from airflock.errors import AirflockError
+from airflock.studio.controls import Control, controls_of
+from airflock.studio.drawing import NAMES
+from airflock.studio.player import Player
+from airflock.studio.room import Room, note
+from airflock.studio.side import value_of
+
+if TYPE_CHECKING:
+    from airflock.studio.page import Page
+
+
+class Tuning(Room):
+    """Sliders of one side."""
+
+    def __init__(self, page: "Page", tab: Any):
+        super().__init__(page)
+        self.tab = tab
+        self._handles: dict[str, tuple[Any, Control]] = {}
+        self._made: list[Any] = []
+        self._filled: Any = None
+        panel, player = self.panel, self.player
+        panel.row(
+            {
+                "Undo": self.ask(lambda: self.put(player.side.undo())),
+                "Back to preset": self.ask(lambda: self.put(player.side.to_preset())),
+            }
+        )
+        panel.row(
+            {
+                "Save scenario (.toml)": self.ask(self._save_toml),
+                "Save flight (.nc)": self.ask(self._save_recording),
+                "Save replay (.html)": self.ask(self._save_replay),
+            }
+        )
+        self.command = panel.text()
+
+    def stand(self) -> None:
+        """Make the controls of the side in hand; again only where another law or side is in hand."""
+        preset, two = self.player.preset, len(self.player.sides) > 1
+        filled = preset.model, preset.records.keys(), self.player.hand if two else None
+        if filled != self._filled:
+            for made in self._made:
+                made.remove()
+            self._made, self._handles, self._filled = [], {}, filled
+            with self.tab:
+                for section, controls in controls_of(preset).items():
+                    name = f"{NAMES[self.player.hand]}: {section}" if two else section
+                    folder = self.panel.folder(name, section == "model")
+                    self._made.append(folder)
+                    with folder:
+                        for control in controls:
+                            self._handles[control.key] = self.panel.control(control, self._change), control
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the values in force."""
+        values = {key: value_of(self.player.scenario, key) for key in self._handles}
+        self.put({key: value for key, value in values.items() if value != self._handles[key][0].value})
+
+    def put(self, values: dict[str, Any]) -> None:
+        """Show values on their controls."""
+        for key, value in values.items():
+            if key in self._handles:
+                self._handles[key][0].value = value
+
+    def _change(self, key: str, value: Any) -> None:
+        self.player.ask(lambda: self._changed(key, value))
+
+    def _changed(self, key: str, value: Any) -> None:
+        try:
+            self.player.change(key, value)
+        except AirflockError:
+            self.put({key: value_of(self.player.scenario, key)})
+            raise
+
+    def _save_toml(self) -> None:
+        self._saved(self.player.save_toml(free(Path(f"{stem(self.player)}_tuned.toml"))))
+
+    def _save_recording(self) -> None:
+        self._saved(self.player.save_recording(free(Path(f"{stem(self.player)}_seed{self.player.seed}.nc"))))
+
+    def _save_replay(self) -> None:
+        self._saved(self.player.save_replay(free(Path(f"{stem(self.player)}_seed{self.player.seed}.html"))))
+
+    def _saved(self, path: Path) -> None:
+        self.player.note = f"saved {path.absolute()}"
+        self.player.fault(self.player.note)
+        self.panel.say("Saved", str(path.absolute()))
+
+    def chart(self) -> None:
+        """The command that opens this scenario again."""
+        self.command.content = note(f"<code>{html.escape(self.player.command)}</code>")
+
+
+def stem(player: Player) -> str:
+    """What files of the side in hand are called."""
+    return Path(player.side.origin.where).with_suffix("").name
+
+
+def free(path: Path) -> Path:
+    """A name that is not taken: flight.nc, flight-2.nc, ..."""
+    found, number = path, 2
+    while found.exists():
+        found, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
+    return found

@@ -1,0 +1,260 @@
+"""Certificates: verdicts by counting, interrupted and continued, written, checked, tampered with."""
+
+import math
+import random
+import re
+import tomllib
+
+import pytest
+import tomlkit
+from typer.testing import CliRunner
+
+from airflock.certify.bounds import per_hour
+from airflock.certify.campaign import FOLDER, Campaign
+from airflock.certify.certificate import digest, sealed
+from airflock.certify.check import check
+from airflock.certify.limits import read, read_all
+from airflock.certify.run import certify, run
+from airflock.certify.seeds import COUNT, identity, seed
+from airflock.cli.main import app
+from airflock.errors import AirflockError, ScenarioError, StudyError
+from airflock.evolve.executors.here import Here
+from airflock.evolve.folder import open_folder
+from airflock.evolve.run import Interrupted
+from airflock.scenarios.files import load, make
+
+LIMIT = "r_min<1 at 2%"
+
+
+def campaign(*limits, **how):
+    scenario = load("vasarhelyi_2018/real_6ms")
+    return Campaign(scenario, read_all(list(limits or (LIMIT,)), scenario), **how)
+
+
+def dice(p):
+    """A score in place of a flight: an event with probability p, that the seed alone decides."""
+
+    def score(parameters, own):
+        chance = random.Random(own)
+        near = chance.random() < p + 10.0 * max(0.0, parameters.get("radio.delay", 0.0) - 1.5)
+        found = {"r_min": 0.5 if near else 5.0, "phi_vel": 6.0 + chance.gauss(0.0, 0.1), "phi_wall": 0.0}
+        return found | ({"closest": 0.4, "first": [600.0 * chance.random()]} if near else {})
+
+    return score
+
+
+def flown(asked, folder, p, *, budget=60.0, resume=False, score=None, **how):
+    open_folder(folder, asked, resume=resume, kind=FOLDER)
+    executor = Here(score or dice(p), 2)
+    try:
+        return run(asked, folder, executor, budget, **how)
+    finally:
+        executor.close()
+
+
+def test_a_rare_event_is_shown_a_frequent_one_refuted_and_one_at_the_limit_stays_open(tmp_path):
+    shown = flown(campaign(), tmp_path / "a", 0.0)
+    assert shown.shown and shown.verdicts[0].events == 0
+    assert len(shown.rows) == math.ceil(math.log(0.025) / math.log(0.98)) and shown.verdicts[0].high <= 0.02
+    refuted = flown(campaign(), tmp_path / "b", 0.3)
+    assert refuted.verdicts[0].refuted and not refuted.shown and len(refuted.rows) < len(shown.rows)
+    assert "refuted: r_min<1 happens at least" in refuted.statements[0]
+
+
+def test_several_limits_share_what_may_go_wrong(tmp_path):
+    found = flown(campaign(LIMIT, "phi_vel>=5 in 98%", "phi_wall>0 at 2%"), tmp_path / "a", 0.0)
+    assert found.shown and len(found.rows) == math.ceil(math.log(0.05 / 3 / 2) / math.log(0.98))
+
+
+def test_a_limit_that_no_budget_can_show_is_told_with_its_price(tmp_path):
+    found = flown(campaign("r_min<1 at 1e-9/h"), tmp_path / "a", 0.0, budget=0.5)
+    assert not found.shown and found.verdicts[0].needs > 2e10
+    assert "needs 22,133," in found.statements[0] and "on this machine; the given time can show" in found.statements[0]
+
+
+def test_rates_are_per_flock_hour_and_drone_hour():
+    one, other = campaign("r_min<1 at 0.3/h"), campaign("r_min<1 at 0.01/drone-h")
+    p = one.probability(one.limits[0])
+    assert p == pytest.approx(1.0 - math.exp(-0.3 / 6.0)) == other.probability(other.limits[0])
+    assert per_hour(p, one.hours) == pytest.approx(0.3) == 30 * other.told(other.limits[0], p)
+
+
+def test_what_was_interrupted_ends_as_if_it_had_not_been(tmp_path):
+    wanted = flown(campaign(), tmp_path / "a", 0.004).document()
+    sound, count = dice(0.004), 0
+
+    def stopped(parameters, own):
+        nonlocal count
+        count += 1
+        if count in (20, 70):
+            raise KeyboardInterrupt
+        return sound(parameters, own)
+
+    for time in range(2):
+        with pytest.raises(Interrupted, match=r"flights are stored in .*/b; continue with --resume"):
+            flown(campaign(), tmp_path / "b", 0.0, resume=time > 0, score=stopped)
+    found = flown(campaign(), tmp_path / "b", 0.0, resume=True, score=stopped).document()
+    del wanted["worst"], found["worst"], wanted["seal"], found["seal"]  # they name the folder
+    assert found == wanted
+
+
+def test_a_folder_of_another_campaign_is_refused(tmp_path):
+    flown(campaign(), tmp_path / "a", 0.0)
+    with pytest.raises(StudyError, match="already holds this campaign; continue it with --resume"):
+        flown(campaign(), tmp_path / "a", 0.0)
+    with pytest.raises(StudyError, match="holds another campaign: confidence = 0.95 there, 0.9 now"):
+        flown(campaign(confidence=0.9), tmp_path / "a", 0.0, resume=True)
+
+
+def test_a_flight_that_fails_is_no_flight_that_went_well(tmp_path):
+    asked = campaign()
+    bad = seed(asked.hash, COUNT, 30)
+
+    def score(parameters, own):
+        if own == bad:
+            raise ZeroDivisionError("agent 3 finds no room")
+        return dice(0.0)(parameters, own)
+
+    for resume in (False, True):
+        with pytest.raises(StudyError, match=f"flight 30, seed {bad}, failed: agent 3 finds no room"):
+            flown(asked, tmp_path / "a", 0.0, score=score, resume=resume)
+
+
+def test_the_tolerance_of_a_number_is_found_between_two_values(tmp_path):
+    """Beyond a delay of 1.5 s the dice are loaded: P grows by 1 in 0.1 s, so 2 % is passed at 1.502 s."""
+    found = flown(campaign(), tmp_path / "a", 0.0, keys=("radio.delay", "body.tau")).tolerance
+    delay, tau = found["axis"]
+    assert delay["safe"] <= 1.51 <= delay["not_shown"] < 1.1 * delay["safe"] and delay["nominal"] == 1.0
+    assert tau["factor"] == 8.0 and "not_shown" not in tau
+
+
+def test_numbers_that_are_not_sure_are_drawn_by_each_seed(tmp_path):
+    document = dict(load("vasarhelyi_2018/real_6ms").document)
+    document["radio"] = {**document["radio"], "delay": {"value": 1.0, "unit": "s", "interval": [0.8, 1.4]}}
+    scenario = make(document, "mine")
+    asked = Campaign(scenario, read_all([LIMIT], scenario), uncertain=True)
+    drawn = [asked.parameters(s)["radio.delay"] for s in range(500)]
+    assert 0.8 <= min(drawn) < 0.82 and 1.38 < max(drawn) <= 1.4 and asked.parameters(7) == asked.parameters(7)
+    with pytest.raises(ScenarioError, match="no number has an interval"):
+        certify("vasarhelyi_2018/real_6ms", LIMIT, uncertain=True)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A certificate of real flights, tiny ones in plain Python, as a file."""
+    folder = tmp_path_factory.mktemp("written")
+    tiny = load(
+        "vasarhelyi_2018/real_4ms", {"agents": 3, "duration": 1.0, "dt": 0.1, "world.side": 30.0, "metrics.period": 0.5}
+    )
+    found = certify(tiny, ["r_min<9 at 99%", "phi_wall>0"], flights=24, device="python", folder=folder / "flights")
+    return found, found.save(folder / "certificate.toml")
+
+
+def test_events_are_those_of_every_motion_step(written):
+    """The smallest distance of a flight is looked for at every step, between the samples of the order parameters."""
+    found, _ = written
+    hit = [row for row in found.rows if "closest" in row]
+    assert hit and all(row["closest"] <= row["r_min"] + 1e-12 for row in hit)
+    assert any(row["closest"] < row["r_min"] for row in hit)
+    assert found.verdicts[0].events == sum(row.get("closest", math.inf) < 9.0 for row in found.rows)
+
+
+def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
+    found, path = written
+    copy = tmp_path / "alone.toml"
+    copy.write_bytes(path.read_bytes())
+    again = check(copy)
+    assert again.same and again.flown == 24 and found.check().same
+    document = tomllib.loads(path.read_text())
+    assert document["shown"] and document["flights"]["identity"] == identity(found.campaign.scenario)
+    assert identity(load(path.parent / "flights" / "scenario.toml")) == identity(found.campaign.scenario)
+    assert found.worst[0]["value"] == min(row.get("closest", row["r_min"]) for row in found.rows)
+    assert "yes" in found._repr_html_() and "Certificate of" in repr(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda d: d["limit"][0].update(high=0.001), "its bounds do not follow from its counts"),
+        (lambda d: d["limit"][0]["looks"][0].update(above=0.5), "its bounds do not follow from its counts"),
+        (lambda d: d["check"]["digests"].__setitem__(3, "0" * 12), "flight 3, seed [0-9]+: other bits"),
+        (lambda d: d["flights"].update(first_seed=7), "its seeds are not those that the scenario fixes"),
+    ],
+)
+def test_what_is_changed_and_sealed_again_is_still_found(written, tmp_path, change, told):
+    document = tomllib.loads(written[1].read_text())
+    del document["seal"]
+    change(document)
+    path = tmp_path / "c.toml"
+    path.write_text(tomlkit.dumps(sealed(document)))
+    (fault,) = check(path).faults
+    assert re.search(told, fault)
+
+
+def test_a_certificate_of_another_scenario_version_or_format_is_refused(written, tmp_path):
+    text, path = written[1].read_text(), tmp_path / "c.toml"
+    for old, new, told in (
+        (
+            "duration = 1.0\nagents = 3",
+            "duration = 1.0\nagents = 4",
+            "those of another scenario than the one that it holds",
+        ),
+        ("format = 1\n", "format = 2\n", "is of format 2; this Airflock reads format 1"),
+        ('airflock = "', 'airflock = "9.', "made by airflock 9."),
+        ("seal =", "sea =", "is not a certificate"),
+    ):
+        changed = text.replace(old, new)
+        if "agents" in old:
+            changed = text.replace("agents = 3", "agents = 4")
+        path.write_text(changed)
+        with pytest.raises(StudyError, match=told):
+            check(path)
+
+
+def test_a_digest_tells_nan_and_null_apart_from_numbers_but_not_from_each_other():
+    assert digest({"a": math.nan}) == digest({"a": None}) != digest({"a": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("text", "event", "probability"),
+    [
+        ("r_min<1 at 1%", "r_min<1", 0.01),
+        ("r_min < 1.5 at 0.01/flight", "r_min<1.5", 0.01),
+        ("phi_vel>=3 in 99%", "phi_vel<3", 0.01),
+        ("phi_corr > 0.5 in 0.9", "phi_corr<=0.5", 0.1),
+        ("n_coll>=1 at 6 / h", "n_coll>=1", 1.0 - math.exp(-1.0)),
+        ("phi_wall>0 at 0.2/drone-h", "phi_wall>0", 1.0 - math.exp(-1.0)),
+        ("r_min<3", "r_min<3", None),
+    ],
+)
+def test_limits_are_read(text, event, probability):
+    limit = read(text, load("vasarhelyi_2018/real_6ms"))
+    found = limit.probability(1.0 / 6.0, 30)
+    assert limit.event == event and (found is None if probability is None else found == pytest.approx(probability))
+
+
+def invoked(*arguments):
+    return CliRunner().invoke(app, ["certify", *(str(a) for a in arguments)])
+
+
+def test_all_faults_are_told_at_once_before_anything_flies(tmp_path):
+    wrong = ["--limit", "rmin<1 at 1/h", "--limit", "phi_vel<3 at 1/h", "--limit", "r_min<1 at 1e-3", "--limit", "near"]
+    done = invoked("vasarhelyi_2018/real_6ms", *wrong, "--confidence", "2", "--budget", "soon", "--out", "a.png")
+    assert isinstance(done.exception, AirflockError)
+    lines = str(done.exception).splitlines()
+    for told in (
+        "did you mean r_min?", "give it /flight, or as 'phi_vel>=3 in 99%'", "say how often", "cannot be read",
+        "confidence = 2 lies outside", "--budget soon: write a time", "a.png: ending .png is not .toml",
+    ):  # fmt: skip
+        assert sum(told in line for line in lines) == 1, told
+
+
+@pytest.mark.parametrize(("limit", "status"), [("r_min<0.001 at 50%", 0), ("r_min<100 at 10%", 1)])
+def test_the_exit_status_says_whether_the_limit_is_shown(tmp_path, limit, status):
+    small = ["--agents", "3", "--duration", "1", "--set", "dt=0.1", "--device", "python"]
+    path = tmp_path / "c.toml"
+    done = invoked("vasarhelyi_2018/real_4ms", "--limit", limit, *small, "--out", path, "--json")
+    assert done.exit_code == status, done.output
+    assert tomllib.loads(path.read_text())["shown"] == (status == 0)
+    checked = invoked(path, "--check")
+    assert checked.exit_code == 0 and "same bits" in checked.output

@@ -1,0 +1,172 @@
+"""Fields from GeoJSON and KML: the same metres from both, true to the ellipsoid; what is wrong is one line each."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon
+
+import airflock
+from airflock.doors import TextError, xml
+from airflock.errors import ScenarioError
+from airflock.mavlink.coordinates import Site
+from airflock.recordings.scores import scenario_of
+from airflock.scenarios.files import load, make
+from airflock.scenes.outlines import ground_of
+
+FIELDS = Path(__file__).parents[1] / "fields"
+FEW = {"agents": 4, "start.separation": 4.0, "duration": 1.0}
+SHELL = [[19.06, 47.47], [19.064, 47.47], [19.064, 47.473], [19.06, 47.473]]
+
+
+def polygon(*rings, **properties):
+    shape = {"type": "Polygon", "coordinates": [[*ring, ring[0]] for ring in rings]}
+    return {"type": "Feature", "properties": properties, "geometry": shape}
+
+
+def written(tmp_path, *features, name="a.geojson"):
+    path = tmp_path / name
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": list(features)}))
+    return path
+
+
+def faults_of(path, **settings):
+    with pytest.raises(ScenarioError) as caught:
+        load("vasarhelyi_2018/4ms", FEW | {"world.file": str(path)} | settings)
+    return str(caught.value).splitlines()
+
+
+def test_a_field_in_an_l_with_a_pond_and_a_crane():
+    found = ground_of(FIELDS / "field.geojson", space=True)
+    keys, site = found.keys, Site(*found.origin, 0.0)
+    assert found.origin == (47.4715, 19.062)
+    assert len(keys["corners"]) == 6 and len(keys["obstacles"]) == 2
+    assert (keys["floor"], keys["ceiling"]) == (5.0, 80.0) and keys["heights"] == [[-1e5, 1e5], [-1e5, 30.0]]
+    for (x, y), (longitude, latitude) in zip(
+        keys["corners"], [(19.06, 47.47), (19.064, 47.47), (19.064, 47.4715)], strict=False
+    ):
+        back = site.geodetic(x, y, 0.0)
+        assert (back.latitude, back.longitude) == pytest.approx((latitude, longitude), abs=2e-8)
+    north = 0.0015 * 111_181.0  # m; a degree of the meridian at 47.47° on WGS 84
+    assert max(y for _, y in keys["corners"]) == pytest.approx(north, rel=1e-4)
+    assert Polygon(keys["corners"]).contains(Polygon(keys["obstacles"][1]))
+
+
+def test_kml_tells_the_same_field():
+    ours, theirs = (ground_of(FIELDS / f"field.{kind}") for kind in ("geojson", "kml"))
+    assert ours.origin == theirs.origin and ours.keys == theirs.keys
+    assert "field, 6 corners" in theirs.note and "latitude 47.4715000" in theirs.note
+
+
+def test_a_flight_in_a_field_keeps_it_without_the_file(tmp_path, seed):
+    (tmp_path / "here.geojson").write_text((FIELDS / "field.geojson").read_text())
+    (tmp_path / "mine.toml").write_text(
+        'extends = "vasarhelyi_2018/4ms"\nagents = 3\nduration = 1.0\n[world]\nfile = "here.geojson"\n'
+    )
+    scenario = load(tmp_path / "mine.toml", {"world.dimensions": "3"})
+    assert scenario.world.floor == 5.0 and "heights" not in scenario.notes[0]
+    assert "left out in a plane" in load(tmp_path / "mine.toml").notes[1]
+    (tmp_path / "here.geojson").unlink()
+    recording = airflock.simulate(scenario, seed, device="python")
+    again = scenario_of(recording)
+    assert again.world == scenario.world and not again.world.file
+    np.testing.assert_array_equal(airflock.simulate(again, seed, device="python").position, recording.position)
+
+
+def test_fewer_corners_move_the_outline_by_no_more_than_asked(tmp_path):
+    turn = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    ring = np.column_stack([19.06 + 0.002 * np.cos(turn), 47.47 + 0.001 * np.sin(turn)]).tolist()
+    path = written(tmp_path, polygon(ring))
+    whole, few = (ground_of(path, simplify=s).keys["corners"] for s in (0.0, 2.0))
+    assert len(few) < 40 < len(whole)
+    assert Polygon(whole).exterior.hausdorff_distance(Polygon(few).exterior) <= 2.01
+
+
+WRONG = {
+    "crosses": ([polygon([SHELL[0], SHELL[2], SHELL[1], SHELL[3]], name="bow")], "bow crosses or touches itself"),
+    "outside": ([polygon(SHELL), polygon([[20.0, 48.0], [20.001, 48.0], [20.0, 48.001]], name="pond")],
+                "pond lies outside feature 1"),
+    "hole": ([polygon(SHELL, [[19.065, 47.471], [19.066, 47.471], [19.066, 47.472]], name="meadow")],
+             "a hole of meadow lies outside meadow"),
+    "reaches": ([polygon(SHELL), polygon([[19.063, 47.471], [19.066, 47.471], [19.066, 47.472]])],
+                "feature 2 reaches outside feature 1"),
+    "none": ([{"type": "Feature", "geometry": {"type": "Point", "coordinates": [1.0, 2.0]}}], "holds no polygon"),
+    "two": ([polygon(SHELL[:2])], "a ring of 2 corners"),
+    "metres": ([polygon([[5e5, 5e6], [5.1e5, 5e6], [5e5, 5.1e6]])], "is not a longitude and latitude in degrees"),
+    "text": ([polygon([["a", "b"], *SHELL[1:]])], "is not a point [longitude, latitude]"),
+    "height": ([polygon(SHELL, floor="low")], "the property floor = 'low' is not a height in m"),
+    "flat": ([{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": 5}}], "coordinates is not a list"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_field_is_one_line(tmp_path, name):
+    features, said = WRONG[name]
+    (line,) = faults_of(written(tmp_path, *features))
+    assert said in line and line.startswith("world.file = ")
+
+
+def test_faults_of_a_file_come_together_and_name_what_they_are_of(tmp_path):
+    pond, bow = [[20.0, 48.0], [20.001, 48.0], [20.0, 48.001]], [SHELL[0], SHELL[2], SHELL[1], SHELL[3]]
+    lines = faults_of(written(tmp_path, polygon(SHELL), polygon(pond, name="pond"), polygon(bow, name="bow")))
+    assert len(lines) == 2 and "pond" in lines[0] and "bow" in lines[1]
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("no.geojson", "no such file"), ("a.kmz", "unzip it first"), ("a.shp", "ends in none of .geojson, .json, .kml"),
+])  # fmt: skip
+def test_a_file_of_no_use_is_one_line(tmp_path, name, said):
+    if name.startswith("a"):
+        (tmp_path / name).write_text("{}")
+    (line,) = faults_of(tmp_path / name)
+    assert said in line
+
+
+def test_a_field_and_its_corners_are_not_given_twice():
+    lines = faults_of(FIELDS / "field.kml", **{"world.corners": SHELL, "world.simplify": -1.0})
+    assert "world.corners: is given, and world.file as well" in lines[0] and "world.simplify = -1.0" in lines[1]
+
+
+BOMB = '<!DOCTYPE k [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><kml>&b;</kml>'
+FETCH = '<!DOCTYPE k [<!ENTITY x SYSTEM "file:///etc/passwd">]><kml><name>&x;</name></kml>'
+
+
+@pytest.mark.parametrize("text", [
+    BOMB, FETCH, "<kml><Polygon></kml>", "", "<a>" * 40 + "</a>" * 40, "\x00", "<kml>&nbsp;</kml>",
+    "<k>" + "<a/>" * 100_001 + "</k>",
+])  # fmt: skip
+def test_hostile_xml_ends_at_the_door(tmp_path, text):
+    with pytest.raises(TextError):
+        xml(text)
+    (tmp_path / "a.kml").write_text(text)
+    (line,) = faults_of(tmp_path / "a.kml")
+    assert line.startswith("world.file = ") and len(line) < 500
+
+
+def test_xml_is_read_without_namespaces():
+    found = xml('<k:kml xmlns:k="http://a/b"><k:name> x <b/>y</k:name></k:kml>')
+    assert (found.tag, found.children[0].tag, found.children[0].children[0].tag) == ("kml", "name", "b")
+    assert re.sub(r"\s+", " ", found.children[0].text) == "x y"
+
+
+@pytest.mark.parametrize("text", [
+    "[" * 5000, '{"type": "FeatureCollection", "features": 3}', '{"type": "Polygon", "coordinates": [[[1e400, 0]]]}',
+    "{}",
+    '{"type": "Polygon", "crs": {"name": "EPSG:3857"}, "coordinates": []}',
+])  # fmt: skip
+def test_hostile_geojson_is_one_line(tmp_path, text):
+    (tmp_path / "a.geojson").write_text(text)
+    (line,) = faults_of(tmp_path / "a.geojson")
+    assert line.startswith("world.file = ") and len(line) < 500
+
+
+def test_what_is_not_loaded_reads_no_file():
+    """Neither a recording's document nor a change of a flight."""
+    table = {"model": {"kind": "vasarhelyi_2018"}, "world": {"file": "/etc/passwd"}}
+    with pytest.raises(ScenarioError, match="a file is read where a scenario is loaded, and not here"):
+        make(table, "recording")
+    flight = airflock.open(load("vasarhelyi_2018/4ms", FEW), 1, device="python")
+    with pytest.raises(ScenarioError, match="and not here"):
+        flight.change({"world.file": str(FIELDS / "field.kml")})

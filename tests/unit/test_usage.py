@@ -1,0 +1,59 @@
+"""A wrong command line ends with one line in the words of every other fault, and with status 2."""
+
+import pytest
+
+from airflock.cli.main import app, main
+from airflock.cli.sweep import alike
+from airflock.errors import AirflockError
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("rum x", "rum: unknown command; did you mean run?"),
+        ("xyzzy", "xyzzy: unknown command; airflock --help lists them"),
+        ("--hlep", "--hlep: unknown option; did you mean --help?"),
+        ("run x --sed 3", "run: --sed: unknown option; did you mean --seeds?"),
+        ("run x --zzz", "run: --zzz: unknown option; airflock run --help lists them"),
+        ("run x --seeds 0", "run: --seeds 0 lies outside [1, 1000000]"),
+        ("run x --seeds=-3", "run: --seeds -3 lies outside [1, 1000000]"),
+        ("run x --seeds abc", "run: --seeds abc is not a number; give [1, 1000000]"),
+        ("run x --seeds 1.5", "run: --seeds 1.5 is not a whole number; give [1, 1000000]"),
+        ("run x --first-seed -1", "run: --first-seed -1 lies outside [0, inf]"),
+        ("run x --duration soon", "run: --duration soon is not a number"),
+        ("run x --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
+        ("run x --seeds", "--seeds needs a value"),
+        ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),
+        ("run a b c", "run: unexpected b c; for instance: airflock run"),
+        ("evolve a", "evolve: --out is missing; for instance: airflock evolve"),
+        ("plot a --kind serie", "plot: --kind serie is none of trajectories, exposure, series, rules, transfer, scene"),
+        ("fly prepar", "fly: prepar: unknown command; did you mean prepare?"),
+        ("fly prepare a --member 3", "fly prepare: --member: unknown option; did you mean --members?"),
+    ],
+)
+def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["/anywhere/airflock", *words.split()])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capsys.readouterr()
+    assert ended.value.code == 2 and told.out == ""
+    assert told.err.startswith(f"airflock: {line}")
+    assert len(told.err.splitlines()) == 1
+
+
+def test_the_nearest_choice_is_told():
+    with pytest.raises(AirflockError, match=r"wash; did you mean series\?$"):
+        app(["plot", "a", "--kind", "serie"])
+
+
+@pytest.mark.parametrize("words", [["--version"], ["--help"], ["run", "--help"], ["fly", "--help"]])
+def test_what_is_right_ends_well(words, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["airflock", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0 and capsys.readouterr().out
+
+
+def test_notes_of_a_sweep_that_differ_in_numbers_alone_are_one_line():
+    notes = ["delay = 0.1 s is odd", "no walls", "delay = 0.25 s is odd", "delay = 1e-05 s is odd", "delay = x is odd"]
+    assert list(alike(notes)) == ["delay = 0.1 s is odd (2 more like it)", "no walls", "delay = x is odd"]
