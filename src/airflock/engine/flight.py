@@ -16,7 +16,7 @@ from airflock.engine.moments import Snapshot, Window
 from airflock.engine.onsets import onsets, told
 from airflock.engine.presence import join, leave
 from airflock.engine.simulate import finish, opened
-from airflock.engine.state import State
+from airflock.engine.state import NEVER, State
 from airflock.engine.threads import in_background
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
@@ -108,6 +108,19 @@ class Flight:
         """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
         self._begin()
         return self._state.motion
+
+    @property
+    def measured(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
+        self._begin()
+        names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
+        return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
+
+    @property
+    def sent(self) -> NDArray[Any]:
+        """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
+        stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
+        return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
