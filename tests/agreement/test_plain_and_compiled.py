@@ -29,7 +29,8 @@ FLIGHTS = {
         "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
     }),
     "circle": ("vasarhelyi_2018", {
-        "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "quadrotor",
+        "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "fixed_wing",
+        "model.v_flock": 15.0, "start.speed": 15.0, "wind.east": 2.0,
     }),
     "silo": ("viragh_2014", {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,

@@ -31,7 +31,9 @@ CASES = {
         "metrics.stop": "collision", "metrics.r_coll": 14.0, "start.separation": 15.0, "start.speed": 4.0,
         "agents": 10, "duration": 1.6, "metrics.period": 0.05,
     }, 1, True),
-    "split": ("vasarhelyi_2018", {"metrics.r_cluster": 12.0, "start.speed": 3.0, "agents": 7}, 2, True),
+    "split": ("vasarhelyi_2018", {
+        "metrics.r_cluster": 12.0, "start.speed": 15.0, "agents": 7, "body.kind": "fixed_wing", "model.v_flock": 15.0,
+    }, 2, True),
     "storm": ("viragh_2014", {
         "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
         "metrics.r_coll": 9.0, "metrics.collision_period": 0.15,

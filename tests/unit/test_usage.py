@@ -3,6 +3,7 @@
 import pytest
 
 from airflock.cli.main import app, main
+from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
 
 
@@ -51,3 +52,8 @@ def test_what_is_right_ends_well(words, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 0 and capsys.readouterr().out
+
+
+def test_notes_of_a_sweep_that_differ_in_numbers_alone_are_one_line():
+    notes = ["delay = 0.1 s is odd", "no walls", "delay = 0.25 s is odd", "delay = 1e-05 s is odd", "delay = x is odd"]
+    assert list(alike(notes)) == ["delay = 0.1 s is odd (2 more like it)", "no walls", "delay = x is odd"]

@@ -1,11 +1,12 @@
 """The bodies that a scenario can name: the key body.kind."""
 
-from airflock.body import direct, jostled, motion, quadrotor, steered, turning
+from airflock.body import direct, fixed_wing, jostled, motion, quadrotor, steered, turning
 from airflock.core.contract import Body, body
 
 BODIES: dict[str, Body] = {
     "multirotor": body(motion, "multirotor"),
     "quadrotor": body(quadrotor, "quadrotor"),
+    "fixed_wing": body(fixed_wing, "fixed_wing"),
     "direct": body(direct, "direct"),
     "jostled": body(jostled, "jostled"),
     "steered": body(steered, "steered"),

@@ -146,7 +146,7 @@ class Body:
     integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
     Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move` asks
                   for it as `memory` and returns it behind the velocity
-    limits      : `limits` of any of b, dt, speed → what of a scenario the body cannot fly, one line each
+    limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot fly, one line each
     violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
     """
 
@@ -167,9 +167,8 @@ class Body:
         """What each field of its Memory is at the start of a flight."""
         return tuple(getattr(self.Memory, "_field_defaults", {}).values())
 
-    def lacks(self, b: Any, dt: float, speed: float) -> list[str]:
-        """What this body cannot fly: with parameters b, steps of dt (s), a law that prefers a speed (m/s)."""
-        given = {"b": b, "dt": dt, "speed": speed}
+    def lacks(self, **given: Any) -> list[str]:
+        """What this body cannot fly, by what `limits` may ask for."""
         if self.limits is None:
             return []
         return self.limits(**{name: given[name] for name in asks(self.limits, "limits", self.name)})

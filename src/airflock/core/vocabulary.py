@@ -84,6 +84,7 @@ BODY = {
     "wz": "the same, up, m/s",
     "dt": "time step, s",
     "memory": "the body's Memory of this agent",
+    "wing": "parameters of the wing (aero.wing)",
 }
 MEASURED = {
     "x": "position, east, m",
@@ -189,6 +190,8 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "b": "the body's parameters",
         "dt": "time step, s",
         "speed": "preferred speed of the law, m/s; 0.0 if it has none",
+        "start": "speed at the start, m/s",
+        "wing": "parameters of the wing (aero.wing)",
     },
     "faults": {
         "q": "metric parameters",

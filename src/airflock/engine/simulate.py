@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import cpu, devices, failure
+from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe, probe_fault
@@ -122,6 +122,8 @@ def fly(
         plan = plan.built(given_start=True)
         start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
+    if chosen != "cuda":
+        needs.check(scenario, plan)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
 
@@ -216,6 +218,7 @@ def opened(
     plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     if device == "python":
         plan = plan.built(grid=False, bits=64)
+    needs.check(scenario, plan)
     given = None
     if start is not None:
         given = sound_start(scenario, plan, start)

@@ -15,6 +15,7 @@ from airflock.core.agent import State
 from airflock.core.contract import Body
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
+from airflock.errors import RuleError
 from airflock.fleet import telemetry
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
@@ -67,6 +68,9 @@ class Vehicle:
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.lifting = False
+        for name in asks(body.move, "move", body.name):
+            if name not in GIVEN:
+                raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
         self._asked = tuple(GIVEN.index(name) for name in asks(body.move, "move", body.name))
         self._old = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None

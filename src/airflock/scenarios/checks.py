@@ -51,7 +51,10 @@ def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) ->
     if b is None or flight is None or found is None or p is None:
         return []
     speed = float(found.preferred_speed(p)) if found.preferred_speed is not None else 0.0
-    return carried.lacks(b, flight.dt, speed)
+    begin, wing = parts["start"], parts["wing"]
+    if begin is None or wing is None:
+        return []
+    return carried.lacks(b=b, dt=flight.dt, speed=speed, start=begin.speed, wing=wing)
 
 
 def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:

@@ -35,6 +35,7 @@ def respond(
             mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
             gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
             memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers_of(i, "b", flock, numbers, plan=plan),
+            wing=numbers.wing,
         )  # fmt: skip
         for kind in plan.suffers("motion"):
             on = lasts(i, kind, time, flock, numbers)

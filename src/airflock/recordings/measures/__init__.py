@@ -2,7 +2,6 @@
 
 delays: who leads, by delay of directions · correlation: how far fluctuations of velocity are alike · neighbours:
 nearest distances and pairs · surroundings: where neighbours are, front-back and left-right · shape: area and form ·
-milling · turning · bursts: burst and coast · contacts: with walls, obstacles and the scene.
-
-Order parameters of a flight, by the compiled rules, are in `scores`.
+milling · turning · bursts: burst and coast · contacts: with walls, obstacles and the scene. Order parameters of a
+flight, by the compiled rules, are in `scores`.
 """
