@@ -293,8 +293,12 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     w = (a.east + gust[0], a.north + gust[1], a.up + gust[2] if three else 0.0)
     known = {"v": s[3:], "m": plus(s, agent.own)[3:], "c": agent.command, "g": g, "w": w}
     given = {letter + axis: vector[c] for letter, vector in known.items() for c, axis in enumerate("xyz")}
-    known = {"dt": dt, "b": agent.b, "memory": agent.kept, "wing": scenario.wing}
-    moved = answer(body.move, "move", given | known, body.name)
+    moved = answer(
+        body.move,
+        "move",
+        given | {"dt": dt, "b": agent.b, "memory": agent.kept, "wing": scenario.wing},
+        body.name,
+    )
     velocity, agent.kept = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
     for suffering in agent.faults.values():
         told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}

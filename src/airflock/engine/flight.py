@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airflock import __version__
 from airflock.engine import cpu, failure
+from airflock.engine.beginnings import NEVER
 from airflock.engine.carry import carry
 from airflock.engine.events import Event, agent_number, events_of, vector
 from airflock.engine.look import View, view
@@ -16,7 +17,7 @@ from airflock.engine.moments import Snapshot, Window
 from airflock.engine.onsets import onsets, told
 from airflock.engine.presence import join, leave
 from airflock.engine.simulate import finish, opened
-from airflock.engine.state import NEVER, State
+from airflock.engine.state import State
 from airflock.engine.threads import in_background
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named

@@ -14,6 +14,7 @@ import xarray as xr
 
 from airflock.doors import from_outside, json_object
 from airflock.errors import RecordingError, bounded
+from airflock.faults.registry import KINDS
 from airflock.scenarios.files import MODELS
 
 FORMAT = 2
@@ -77,10 +78,13 @@ def events(recording: xr.Dataset) -> list[Any]:
 
 
 def flown_with_own_law(recording: xr.Dataset) -> bool:
-    """Whether the law was the user's own, which is not in the recording."""
+    """Whether the law, or a kind of fault, was the user's own, which is not in the recording."""
     document = scenario_document(recording)
-    kind = (document or {}).get("model", {}).get("kind")
-    return document is not None and (LAW in recording.attrs or kind not in MODELS)
+    if document is None:
+        return False
+    kind, faults = document.get("model", {}).get("kind"), document.get("faults", [])
+    own = [entry for entry in faults if isinstance(entry, Mapping) and entry.get("kind") not in KINDS]
+    return LAW in recording.attrs or kind not in MODELS or bool(own)
 
 
 def checksum(recording: xr.Dataset) -> str:

@@ -231,12 +231,13 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
     if not _in_file(_kind(document, "metrics"), SETS):
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if not _in_file(_kind(document, "body"), BODIES):
-        document = {**document, "body": {}}
+        document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)
     kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
+    stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
     return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
 
 
