@@ -107,7 +107,7 @@ class _Trial:
         self.scenario, self.cost, self.threads, self.done = scenario, cost, threads, done
         self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
-        self.kept = [optimum]
+        self.kept, self.seen = [optimum], [optimum[1]]
         self.first = against(self.optimum, self.optimum, *optimum)
         if float(self.optimum["fitness"].max()) < ZERO:
             told = {name: values.tolist() for name, values in self.optimum.items()}
@@ -126,8 +126,9 @@ class _Trial:
         found = []
         for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
             parameters = moved(self.scenario, self.kept[-1][1], step, part)
-            if parameters == self.kept[-1][1]:
+            if parameters in self.seen:  # nothing changes, or it was undone before
                 break
+            self.seen.append(parameters)
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
             gains = _gains(self.table, table)

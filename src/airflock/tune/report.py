@@ -17,6 +17,7 @@ from airflock.evolve.store import Store
 from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
+from airflock.scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
     from airflock.tune.run import Tuned
@@ -92,12 +93,12 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> st
     verdict = "All limits are shown." if made.shown else "Not all limits are shown."
     scenario = found.scenario
     body = [
-        f"<h1>{escape(scenario.document.get('title') or scenario.name)}</h1>",
+        f"<h1>{escape(str(found.start.document.get('title') or found.start.name))}</h1>",
         f"<p>{escape(sentence(found.start))}. Airflock {__version__}.</p>",
         f'<p class="verdict{"" if made.shown else " no"}">{verdict}</p>',
         _list(made.statements),
         "<h2>What was assumed</h2>",
-        _table(("key", "value", "source"), _assumed(found.start.document)),
+        _table(("key", "value", "source"), [*_assumed(found.start.document), *_defaults(found.start)]),
         _list([*found.notes, *found.start.notes]),
         "<h2>What was found</h2>",
         f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
@@ -110,7 +111,11 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> st
         "<h2>Certificate</h2>",
         made._repr_html_(),
         _list(
-            [f"{made.campaign.limits[i].event}: events come {h.verdict}" for i, h in made.hazards.items() if h.events]
+            [
+                f"{made.campaign.limits[i].event} over the time of a flight: {h.verdict}"
+                for i, h in made.hazards.items()
+                if h.events
+            ]
         ),
         "<h2>How far numbers may move</h2>",
         _table(("number", "nominal", "safe to", "factor", ""), tolerances)
@@ -153,6 +158,19 @@ def _assumed(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
             else:
                 text = str(entry)
                 rows.append((key, text if len(text) < 80 else f"{text[:77]}...", ""))
+    return rows
+
+
+def _defaults(scenario: Scenario) -> list[tuple[str, str, str]]:
+    """Numbers of drones, radio and wind that the file leaves as they are, and that are not zero."""
+    rows = []
+    for key, (how, value) in declared(scenario).items():
+        section, _, name = key.partition(".")
+        given = scenario.document.get(section, {})
+        if section in ("body", "sensors", "radio", "wind") and value and name not in given:
+            rows.append(
+                (key, with_unit(f"{value:.4g}", how.unit), f"default: {how.source}" if how.source else "default")
+            )
     return rows
 
 
