@@ -17,8 +17,8 @@ from airflock.engine.flight import Flight
 from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.recordings.layout import DIMENSIONS, UNITS
-from airflock.scenarios.geometry import half_sizes
 from airflock.scenarios.scenario import Scenario
+from airflock.world.place import half_sizes
 
 Array = NDArray[Any]
 KINDS = ("measured", "heard")
