@@ -93,6 +93,20 @@ def test_walls_come_first_where_they_are_what_is_short(monkeypatch):
     assert "v_shill" in harden.harden(load("vasarhelyi_2018/6ms"), range(5))[1].name
 
 
+def test_agents_brake_earlier_where_they_touch_walls_and_that_helps(monkeypatch):
+    """Every flight touches a wall by the chance of its seed, unless agents brake 5 m earlier (0.5 s twice at 6 m/s)."""
+
+    def score(p, chance):
+        wall = max(0.0, 0.1 - 0.02 * p.r0_shill + 0.01 * chance)
+        return {"fitness": 0.9, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.99, "phi_wall": wall, "f_coll": 1.0}
+
+    flown_by(monkeypatch, score)
+    found = harden.harden(load("vasarhelyi_2018/6ms", {"model.r0_shill": 0.0}), range(20))
+    kept = [step.name for step in found[1:-1] if step.kept]
+    assert kept[0] == "v_shill down, r0_shill up" and "r0_shill up" in kept
+    assert found[0].contacts == 1.0 and found[-1].contacts < 0.1
+
+
 def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):
     """On the seeds of the steps all is well; on those after them more repulsion makes agents collide."""
     lucky = {np.random.default_rng(seed).normal() for seed in range(20)}

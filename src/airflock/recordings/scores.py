@@ -148,11 +148,11 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = plan_of(scenario, precision=precision)
+    plan = plan_of(scenario.alike(), precision=precision)
     q = scenario.measured_by()
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
     steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
-    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    numbers = tables(scenario.alike(), plan, 0).changed(agents=frames.shape[2], **steps)
     _refuse_gaps(plan, present)
     values, series = cpu.measure_frames(plan, numbers, frames, period, present=present)
     names = [name for name, _, _ in columns(plan.metrics)]
