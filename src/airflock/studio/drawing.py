@@ -175,9 +175,10 @@ class Drawing:
         velocity = np.vstack([flock.velocity for flock in flocks])
         if not np.isfinite(position).all():
             return
-        tone = colours.colours(
-            self.way, np.vstack([f.position for f in flocks]), velocity, self.top, self.stages[0].height
-        )
+        usual = float(np.quantile(np.sqrt((velocity**2).sum(1)), 0.95))
+        self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
+        own = np.vstack([flock.position for flock in flocks])
+        tone = colours.colours(self.way, own, velocity, self.top, self.stages[0].height)
         self._flash(tone)
         trail, anew = tone.copy(), False
         if chosen is not None:
