@@ -465,3 +465,15 @@ def test_bad_groups_are_one_line_each(groups, said):
 def test_a_law_that_solves_for_the_whole_flock_has_one_set_of_numbers():
     with pytest.raises(ScenarioError, match="solves for the whole flock, with one set of numbers"):
         load("dimock_2003/published", {"groups": [{"model": {"r_c": 3.0}}]})
+
+
+def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
+    from airflock.errors import RecordingError
+    from airflock.recordings.attributes import faults, told_faults
+
+    recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
+    assert told_faults(faults(recording)) == "1 fault: fails of agent 2 at 1 s"
+    figure = airflock.plots.series(recording)
+    assert "fails (2)" in "".join(text.get_text() for axes in figure.axes for text in axes.texts)
+    with pytest.raises(RecordingError, match="airflock_faults is damaged"):
+        faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))

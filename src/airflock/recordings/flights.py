@@ -19,6 +19,7 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.errors import FlightError
+from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
 from airflock.scenarios.files import MODELS, loaded
@@ -132,7 +133,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
     if flight.events:
         attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
     if flight.faults:
-        attributes["airflock_faults"] = json.dumps({"faults": plain(flight.faults)})
+        attributes[FAULTS] = json.dumps({"faults": plain(flight.faults)})
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
