@@ -144,7 +144,7 @@ def test_who_is_unseen_for_long_has_left_and_enters_again():
 def test_bad_tracks_and_laws_are_one_line_each():
     with pytest.raises(AirflockError) as fault:
         airflock.infer(vicsek(), ["vicsek_1996", "couzin_2002/torsu"])
-    assert "did you mean vicsek_1995" in str(fault.value) and "couzin_2002/torus" in str(fault.value)
+    assert "did you mean vicsek_1995?" in str(fault.value) and "couzin_2002/torus" in str(fault.value)
     with pytest.raises(AirflockError, match="did you mean world.side"):
         airflock.infer(vicsek(), ["vicsek_1995"], settings={"world.sied": 3.0})
     with pytest.raises(RecordingError, match="too few"):

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from airflock.engine.state import State
 from airflock.engine.tables import tables
 from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
-from airflock.scenarios.files import MODELS, load, make
+from airflock.scenarios.files import MODELS, load, make, presets
 from airflock.scenarios.scenario import Scenario
 from airflock.world.place import half_sizes
 
@@ -146,6 +148,10 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
         open_air = {"model": {"kind": str(what)}, "world": {"arena": "none"}, "radio": {"delay": 0.0}}
         open_air["start"] = {"kind": "ball", "separation": 0.0}
         return make(open_air, str(what), settings, trust=trust or str(what).endswith(".py"))
+    if what not in presets() and not Path(what).is_file():
+        near = get_close_matches(str(what), [*MODELS, *presets()], n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else f"; laws: {', '.join(MODELS)}"
+        raise ScenarioError([f"{what}: no such law, preset or file{hint}"])
     return load(what, settings, trust=trust)
 
 
