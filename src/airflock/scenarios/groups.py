@@ -53,10 +53,10 @@ def groups_of(given: Any, agents: int, records: Mapping[str, type]) -> tuple[tup
     notes: list[str] = []
     for number, table in enumerate(given):
         where = f"groups[{number}]"
-        faults += [f"{where}.{key} is no key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
+        faults += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
         name = table.get("name", f"group_{number}")
         if not isinstance(name, str) or not name or name in {group.name for group in found}:
-            faults.append(f"{where}.name = {name!r} is no name of its own")
+            faults.append(f"{where}.name = {name!r} is not a name of its own")
             name = where
         numbers: dict[tuple[str, str], float] = {}
         spread: dict[tuple[str, str], float] = {}
@@ -111,7 +111,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
 def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
     """Numbers and spreads of one section of a group."""
     if not isinstance(table, Mapping):
-        return {}, {}, [], [f"{where} = {table!r} is no table of numbers"]
+        return {}, {}, [], [f"{where} = {table!r} is not a table of numbers"]
     known = {name: declared for name, declared, _ in declarations(record)}
     values: dict[str, Any] = {}
     spreads: dict[str, Any] = {}
@@ -141,7 +141,7 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
         value = entry["value"] if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
-            faults.append(f"{where}.{key} is no number of it")
+            faults.append(f"{where}.{key}: unknown number")
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
             faults.append(f"{where}.{key}.spread = {value!r} is not a standard deviation of 0 {declared.unit} or more")
         else:
