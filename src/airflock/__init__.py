@@ -47,6 +47,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.scenarios.scaling import starting_set as starting_set
     from airflock.scenarios.scenario import Scenario as Scenario
     from airflock.studio.watch import watch as watch
+    from airflock.tune.run import tune as tune
 
 __version__ = "0.1.0"
 
@@ -79,6 +80,7 @@ _WHERE = {
     "evolve": "airflock.evolve",
     "harden": "airflock.evolve.harden",
     "certify": "airflock.certify",
+    "tune": "airflock.tune",
     "display": "airflock.display",
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",
@@ -95,7 +97,7 @@ _WHERE = {
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "certify", "display", "identify", "infer", "body", "plots")
+_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 

@@ -79,6 +79,13 @@ COUNTERPARTS: dict[str, Counterpart] = {
             },
         },
     ),
+    "tune": Counterpart(
+        'airflock.tune("mine.toml", "tuned")', "tune",
+        {
+            "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
+            **{name: name for name in ("budget", "limit", "confidence", "resume", "threads", "trust")},
+        },
+    ),
     "plot": Counterpart(
         'airflock.plot("flight.nc", "series")', "plot",
         {

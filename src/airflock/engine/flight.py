@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airflock import __version__
 from airflock.engine import cpu, failure
+from airflock.engine.beginnings import NEVER
 from airflock.engine.carry import carry
 from airflock.engine.events import Event, agent_number, events_of, vector
 from airflock.engine.look import View, view
@@ -108,6 +109,19 @@ class Flight:
         """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
         self._begin()
         return self._state.motion
+
+    @property
+    def measured(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
+        self._begin()
+        names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
+        return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
+
+    @property
+    def sent(self) -> NDArray[Any]:
+        """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
+        stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
+        return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.

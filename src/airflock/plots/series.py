@@ -41,7 +41,7 @@ def series(
     if "flocked" in course:
         from airflock.plots.flocked import flocked
 
-        return flocked(recording, start=start, stop=stop, settings=settings)
+        return flocked(recording, start=start, stop=stop, smooth=smooth, settings=settings)
     if not {"phi_corr", "phi_vel", "phi_lap"} <= set(course):
         return _each(recording, course, smooth)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0

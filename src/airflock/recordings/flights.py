@@ -21,6 +21,7 @@ from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
+from airflock.recordings.perception import finish_keeping, sound
 from airflock.scenarios.files import MODELS, loaded
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
@@ -36,6 +37,7 @@ def simulate(
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
     events: Sequence[Event | Mapping[str, Any]] = (),
+    keep: Sequence[str] = (),
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
@@ -55,6 +57,10 @@ def simulate(
         Told what auto picked.
     events : sequence of mappings, optional
         What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
+    keep : sequence of str
+        measured: the variables measured_position and measured_velocity, as agents last measured their own; heard: the
+        variable age (time, receiver, sender), s since what was last heard had been sent, nan where nothing was. The
+        flight's bits are the same.
 
     Returns
     -------
@@ -81,13 +87,17 @@ def simulate(
     """
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)
+    sound(keep, events, scenario)
     device = picked([scenario], device, precision=precision, record=True, say=say)
     if device in DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
+        perceived = finish_keeping(flight, keep) if keep else {}
         flight.finish()
-        return recording_of(flight)
-    if events:
-        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu or python")
+        return recording_of(flight).assign(perceived)
+    if events or keep:
+        raise FlightError(
+            f"{'events' if events else 'keep'}: a flight on device = {device} takes none; choose device = cpu or python"
+        )
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
