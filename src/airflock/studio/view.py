@@ -180,6 +180,7 @@ class View:
             name: self._segments(f"/{name}", EMPTY, colour, width) for name, (colour, width) in lines.items()
         }
         self._bare = set(self._extra)
+        self._room: dict[str, int] = {}  # segments that kinds with colours of their own hold
         self._moving += [self._agents, *self._trails, *self._extra.values()]
 
     def move(self, position: NDArray[Any], turn: NDArray[Any], colour: NDArray[Any]) -> None:
@@ -205,16 +206,21 @@ class View:
     def extra(self, name: str, points: NDArray[Any], colour: NDArray[Any] | None = None) -> None:
         """Lines of a kind: (segment, 2, 3) m, each in its own colour (segment, 3) if given; none clears them."""
         node = self._extra[name]
-        if not len(points):
-            if name not in self._bare:
-                node.points = EMPTY
-                node.colors = np.asarray(node.colors, np.uint8).reshape(-1, 3)[0]
-                self._bare.add(name)
+        if not len(points) and name in self._bare:
             return
-        self._bare.discard(name)
-        node.points = points.astype(np.float32)
+        (self._bare.discard if len(points) else self._bare.add)(name)
+        if colour is None and name not in self._room:
+            node.points = points.astype(np.float32) if len(points) else EMPTY
+            return
+        # a page that gets more places than colours draws the rest pale: both keep one size, which seldom grows
+        room = self._room[name] = max(self._room.get(name, 32), 1 << (max(len(points), 1) - 1).bit_length())
+        places, tones = np.zeros((room, 2, 3), np.float32), np.zeros((room, 2, 3), np.uint8)
+        places[: len(points)] = points
+        if len(points):
+            places[len(points) :] = points[0, 0]
         if colour is not None:
-            node.colors = np.repeat(_linear(colour)[:, None], 2, axis=1)
+            tones[: len(points)] = _linear(colour)[:, None]
+        node.colors, node.points = tones, places
 
     def on_click(self, told: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
         """Tell of a click into the scene: origin and direction of its ray."""
