@@ -82,7 +82,11 @@ def test_the_flock_is_seen_moves_pauses_and_takes_changes(live, tab):
     tab.get_by_text("agent 0", exact=True).wait_for(timeout=PATIENCE * 1000)
     tab.get_by_text("Push", exact=True).click()
     until(lambda: player.flight.events[-1].kind == "push", "nobody was pushed")
-    assert not tab.faults
+    tab.get_by_text("Let it fail", exact=True).click()
+    player.ask(player.toggle)
+    until(lambda: player.flight.faults, "no motor fails")
+    assert [event.kind for event in player.flight.events][-2:] == ["push", "fault"]
+    assert player.flight.faults[0]["kind"] == "motor" and not tab.faults
 
 
 def test_nobody_comes_in_without_the_token(live, browser):

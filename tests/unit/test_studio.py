@@ -432,3 +432,28 @@ def test_a_study_in_the_background_searches_around_what_was_set(tmp_path):
     assert summary(rows) == ([(0.4, pytest.approx(0.3)), (0.4, 0.3)], 0.4, {"a": 2.0})
     with pytest.raises(StudioError, match="no number"):
         Study(tmp_path / "study", "", {}, "fitness")
+
+
+def test_an_agent_that_left_is_nowhere_and_the_others_fly_on(player):
+    player.fly(50)
+    before = player.motion[0].copy()
+    player.flight.remove(3)
+    position, velocity = player.motion
+    assert np.isfinite(position).all() and position[3, 2] < -1e6 and not velocity[3].any()
+    np.testing.assert_array_equal(np.delete(position, 3, 0), np.delete(before, 3, 0))
+    player.fly(50)
+    assert not player.failure
+    assert measures.Pairs(player.motion[0]).nearest() < 300.0
+
+
+def test_a_fault_is_an_event_and_back_takes_it_away(player):
+    player.fly(100)
+    player.flight.fault("radio_silent", 2)
+    player.fly(150)
+    assert [event.kind for event in player.flight.events] == ["fault"] and len(player.flight.faults) == 1
+    live = player.flight.state
+    player.fly(50)
+    player.back(2.5)
+    np.testing.assert_array_equal(player.flight.state, live)
+    player.back(0.5)
+    assert not player.flight.events and not player.flight.faults

@@ -14,7 +14,7 @@ from airflock.stage import colours
 from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
 from airflock.studio import measures
 from airflock.studio.player import Player
-from airflock.studio.side import Side
+from airflock.studio.side import BELOW, Side
 from airflock.studio.view import View
 
 OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
@@ -69,7 +69,8 @@ class Flock:
         else:
             points = self.pairs.neighbours() if kind == LINKS[1] else np.zeros((0, 2, 3))
             tones = np.tile(tone, (len(points), 1))
-        return points + self.offset, np.asarray(tones, np.uint8).reshape(-1, 3)
+        seen = (points[..., 2] > 0.5 * BELOW).all(axis=1)
+        return points[seen] + self.offset, np.asarray(tones, np.uint8).reshape(-1, 3)[seen]
 
 
 @lru_cache(maxsize=16)
@@ -124,7 +125,7 @@ class Drawing:
         self._shown = list(sides)
 
     def _stage(self, side: Side) -> Stage:
-        stage = stage_of(side.scenario, side.motion[0])
+        stage = stage_of(side.scenario, side.motion[0][side.flight.present])
         if side.scenario.world.arena == "none" and not stage.solids:
             stage = stage._replace(span=max(stage.span, OPEN * usual_speed(side)))
         return stage
@@ -189,7 +190,8 @@ class Drawing:
             anew = self._pieces % PIECE == 0
             self.view.trail(self._from(position), position, trail, anew)
         if self.follow:
-            self.view.follow(position.mean(axis=0).astype(float))
+            there = np.concatenate([flock.side.flight.present for flock in flocks])
+            self.view.follow(position[there].mean(axis=0).astype(float))
         links = [flock.links(self.links) for flock in flocks]
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
         if self._before is None or anew:
@@ -206,6 +208,8 @@ class Drawing:
                 far = (np.abs(position[part] - begin[part]) > half).any(axis=1)
                 begin[part][far] = position[part][far]
             first = part.stop
+        gone = (position[:, 2] <= 0.5 * BELOW) | (begin[:, 2] <= 0.5 * BELOW)
+        begin[gone] = position[gone]
         return begin
 
     def _flash(self, tone: NDArray[np.uint8]) -> None:

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.faults.registry import KINDS as KINDS_OF_FAULT
 from airflock.stage import colours
 from airflock.studio.drawing import NAMES
-from airflock.studio.perceiving import Perceiving
+from airflock.studio.perceiving import Drawn, Perceiving
 from airflock.studio.room import Room, note
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class Selecting(Room):
                     "None": self.ask(lambda: self.choose(None)),
                 }
             )
+            self.fault = self.panel.menu("fault", tuple(KINDS_OF_FAULT), "motor", lambda _: None, "begins at once")
+            self.panel.row({"Let it fail": self.ask(self.fail)})
         self.panel.command("Next agent", "S", self.ask(lambda: self.by(1)))
 
     def stand(self) -> None:
@@ -73,9 +76,21 @@ class Selecting(Room):
             return
         number, agent = self.drawing.whose(self.chosen)
         flock = self.drawing.flocks[number]
+        if not flock.side.flight.present[agent]:
+            self._show(Drawn({}, f"<b>agent {agent}</b> has left"), flock.offset, number)
+            return
         drawn = self.eyes.of(flock.side, agent, self.drawing.size, self.drawing.top)
+        self._show(drawn, flock.offset, number)
+
+    def _show(self, drawn: Drawn, offset: NDArray[Any], side: int) -> None:
         for kind in KINDS:
             points, tones = drawn.lines.get(kind, (np.zeros((0, 2, 3)), None))
-            self.view.extra(kind, points + flock.offset, tones)
-        where = f" of {NAMES[number]}" if len(self.player.sides) > 1 else ""
+            self.view.extra(kind, points + offset, tones)
+        where = f" of {NAMES[side]}" if len(self.player.sides) > 1 else ""
         self.about.content = note(drawn.words.replace("</b>", f"{where}</b>", 1))
+
+    def fail(self) -> None:
+        """Let the fault that the menu names begin in whoever is selected."""
+        if self.chosen is not None:
+            side, agent = self.drawing.whose(self.chosen)
+            self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)

@@ -19,6 +19,7 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
 
+BELOW, SPACED = -1e7, 1e4  # m; where agents that have left are shown: nowhere
 LONGEST = 1e6  # s; an open page has no end of its own
 
 
@@ -99,8 +100,15 @@ class Side:
 
     @property
     def motion(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0."""
-        return in_space(self.flight.state, self.scenario.dimensions)
+        """Positions (agent, 3) in m and velocities (agent, 3) in m/s; the third axis of a plane is 0.
+
+        Agents that have left are far below, each in a place of its own, at rest.
+        """
+        position, velocity = in_space(self.flight.state, self.scenario.dimensions)
+        gone = np.flatnonzero(~self.flight.present)
+        position[gone] = np.column_stack([SPACED * gone, 0.0 * gone, np.full(len(gone), BELOW)])
+        velocity[gone] = 0.0
+        return position, velocity
 
     @property
     def settings(self) -> dict[str, Any]:

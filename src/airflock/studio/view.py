@@ -20,7 +20,7 @@ TRAILS = 40  # nodes, rewritten in turn: a trail is so many frames long
 NARROW = 0.12  # rad; field of view for what is flat, seen from far above: there is no orthographic camera
 WIDE = 0.8
 SETTLING = 2.0  # s; a page that was just opened or pointed elsewhere is not led yet
-EMPTY = np.zeros((1, 2, 3), np.float32)
+FEW = 32  # segments of a kind of lines at first
 STILL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -176,10 +176,12 @@ class View:
         blank = np.zeros((count, 2, 3), np.float32)
         tones = np.zeros((count, 2, 3), np.uint8)
         self._trails = [self._segments(f"/trails/{t}", blank, tones, 1.5) for t in range(TRAILS)]
-        self._extra = {
-            name: self._segments(f"/{name}", EMPTY, colour, width) for name, (colour, width) in lines.items()
-        }
+        # a page takes colours of single segments only where the first ones had colours of their own
+        few = np.zeros((FEW, 2, 3), np.float32), np.zeros((FEW, 2, 3), np.uint8)
+        self._extra = {name: self._segments(f"/{name}", *few, width) for name, (_, width) in lines.items()}
+        self._tone = {name: np.array(colour) for name, (colour, _) in lines.items()}
         self._bare = set(self._extra)
+        self._room = dict.fromkeys(self._extra, FEW)  # segments that each kind holds
         self._moving += [self._agents, *self._trails, *self._extra.values()]
 
     def move(self, position: NDArray[Any], turn: NDArray[Any], colour: NDArray[Any]) -> None:
@@ -205,16 +207,18 @@ class View:
     def extra(self, name: str, points: NDArray[Any], colour: NDArray[Any] | None = None) -> None:
         """Lines of a kind: (segment, 2, 3) m, each in its own colour (segment, 3) if given; none clears them."""
         node = self._extra[name]
-        if not len(points):
-            if name not in self._bare:
-                node.points = EMPTY
-                node.colors = np.asarray(node.colors, np.uint8).reshape(-1, 3)[0]
-                self._bare.add(name)
+        if not len(points) and name in self._bare:
             return
-        self._bare.discard(name)
-        node.points = points.astype(np.float32)
-        if colour is not None:
-            node.colors = np.repeat(_linear(colour)[:, None], 2, axis=1)
+        (self._bare.discard if len(points) else self._bare.add)(name)
+        # a page that gets more places than colours draws the rest pale: both keep one size, which seldom grows
+        room = self._room[name] = max(self._room[name], 1 << (max(len(points), 1) - 1).bit_length())
+        places, tones = np.zeros((room, 2, 3), np.float32), np.zeros((room, 2, 3), np.uint8)
+        places[: len(points)] = points
+        if len(points):
+            places[len(points) :] = points[0, 0]
+            given = self._tone[name] if colour is None else np.asarray(colour)
+            tones[: len(points)] = np.broadcast_to(_linear(given), (len(points), 3))[:, None]
+        node.colors, node.points = tones, places
 
     def on_click(self, told: Callable[[NDArray[Any], NDArray[Any]], None]) -> None:
         """Tell of a click into the scene: origin and direction of its ray."""
