@@ -29,6 +29,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    tune,
     types,
     watch,
 )
@@ -91,7 +92,10 @@ PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "run": run.run, "watch": watch.watch, "plot": look.plot, "video": look.video, "replay": look.replay,
         "score": run.score, "sweep": sweep.sweep, "display": display.display,
     },
-    "Search and make safe": {"evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify},
+    "Search and make safe": {
+        "evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify,
+        "tune": tune.tune,
+    },
     "Recordings of others": {
         "import": imports.import_tracks, "identify": identify.identify, "infer": infer.infer,
         "export": imports.export,

@@ -97,7 +97,7 @@ class Inferred:
     def document(self) -> dict[str, Any]:
         """A scenario file's content: the best law with its numbers; raises AirflockError where there is none."""
         if self.best is None:
-            raise AirflockError(f"infer: {self.verdict}; there is no scenario to write")
+            raise AirflockError(f"infer: {self.verdict}; nothing can be written")
         scenario = self.best.candidate.scenario
         found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
         found.pop("published", None)

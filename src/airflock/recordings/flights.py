@@ -19,6 +19,7 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.errors import FlightError
+from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
 from airflock.scenarios.files import MODELS, loaded
@@ -131,6 +132,8 @@ def recording_of(flight: Flight) -> xr.Dataset:
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
         attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
+    if flight.faults:
+        attributes[FAULTS] = json.dumps({"faults": plain(flight.faults)})
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
@@ -160,6 +163,9 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
         kind = table.get("kind") if isinstance(table, dict) else None
         if isinstance(kind, str) and kind.endswith(".py"):
             table["kind"] = PurePath(kind).stem
+    for entry in document.get("faults", ()):
+        if str(entry.get("kind", "")).endswith(".py"):
+            entry["kind"] = PurePath(entry["kind"]).stem
     return document
 
 
