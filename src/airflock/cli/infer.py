@@ -113,7 +113,7 @@ def _table(found: Any) -> None:
     fitted, every = found.fitted
     title = f"{found.individuals} individuals, {found.steps} steps; fitted on {fitted} of {every} frames"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    for name in ("law", "log-likelihood gained", "ahead in spans", "AIC", "inside 95 %", "left over", "numbers"):
+    for name in ("law", "gain", "ahead", "AIC", "in 95 %", "left over", "numbers"):
         table.add_column(name, justify="left" if name == "law" else "right", no_wrap=True)
     for law in found.laws:
         table.add_row(
@@ -122,7 +122,9 @@ def _table(found: Any) -> None:
         )  # fmt: skip
     console = Console()
     console.print(table)
-    console.print("gained, AIC: against going straight on; gained on parts that were held out", highlight=False)
+    console.print(
+        "gain: log-likelihood of held-out steps above going straight on; AIC: of the fit, below it", highlight=False
+    )
     console.print(found.verdict, style="bold", highlight=False, markup=False)
 
 

@@ -22,7 +22,7 @@ PROBE = 0.02  # of a range: step by which slopes are taken; wider than what the 
 DEPENDENT = 0.1  # share of a slope that the others do not explain, below which a number cannot be told
 DRAWN = 200  # places at random, of which the best begin a search
 STARTS = 5  # from the best of which it is climbed at once
-SEARCHES, ROUNDS, POPULATION = 1, 90, 14  # of CMA-ES
+ROUNDS, POPULATION = 100, 16  # of CMA-ES
 LOOKS = 6  # best places at which is asked what a number does
 FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
 SCAN = 10  # places along the range of one number
@@ -190,11 +190,20 @@ def _at(model: Model, start: Array, free: Sequence[int], spans: Sequence[int] | 
     return model.score(u, spans).loss() + prior(u, free)
 
 
-def search(model: Model, start: Array, begin: Array, spans: Sequence[int], seed: int, say: Callable[[], None]) -> Array:
+def search(
+    model: Model,
+    start: Array,
+    begin: Array,
+    spans: Sequence[int],
+    seed: int,
+    say: Callable[[], None],
+    searches: int,
+) -> Array:
     """The best place found over the whole range of the named numbers, on a few spans: by climbs and by CMA-ES.
 
     start : a place whose named numbers are defaults, from which is climbed, too
     begin : places of the named numbers to begin from, best first
+    searches : of CMA-ES
     """
     import warnings
 
@@ -209,7 +218,7 @@ def search(model: Model, start: Array, begin: Array, spans: Sequence[int], seed:
         say()
         if found.loss < lowest:
             lowest, best = found.loss, found.place
-    for attempt in range(SEARCHES):
+    for attempt in range(searches):
         options = {
             "bounds": [0.0, 1.0], "seed": seed + attempt + 1, "verbose": -9, "maxiter": ROUNDS, "tolfun": 0.1,
             "popsize": POPULATION,

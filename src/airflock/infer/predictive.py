@@ -12,6 +12,7 @@ from airflock.infer.tracks import ABSENT
 
 Array = NDArray[np.float64]
 LONGEST = 60.0  # s that are flown
+MARGIN = 0.01  # share of a value that nobody calls a difference
 MEANINGS = {
     "polarisation": "1", "milling": "1", "speed": "m/s", "nearest": "m", "radius": "m",
 }  # fmt: skip
@@ -19,7 +20,7 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Check:
-    """By measure: the tracks' mean and the 2.5 and 97.5 % ends of the flights."""
+    """By measure: the tracks' mean and the 2.5 and 97.5 % ends of the flights, 1 % of the mean wider."""
 
     found: dict[str, tuple[float, float, float]]
 
@@ -98,5 +99,6 @@ def posterior(model: Model, place: Array, noise: Noise, flights: int, say: Calla
     found = {}
     for name, value in own.items():
         drawn = np.array([row[name] for row in rows])
-        found[name] = (value, float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975)))
+        margin = MARGIN * abs(value)
+        found[name] = (value, float(np.quantile(drawn, 0.025)) - margin, float(np.quantile(drawn, 0.975)) + margin)
     return Check(found)

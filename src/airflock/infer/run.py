@@ -204,6 +204,11 @@ def infer(
     )
     if best is not None:
         model, best.fit = select.simpler(fitted[0][1], best.fit, scale, seed, _teller(say, f"{best.name}, simplified"))
+        held = select.hold_out(model, best.fit, lambda: None)
+        best = laws[0] = _law(best.name, model, best.fit, held, plain, straight, scale)
+        found_all.best, found_all.verdict = _verdict(laws)
+    if found_all.best is not None:
+        best = found_all.best
         sure = again(model, best.fit.place, best.fit.free, spans, _teller(say, f"{best.name}, flown again"))
         _tell(found_all, model, sure)
         if check:

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 FOLDS = 4  # parts of the tracks that are held out in turn
 ENOUGH = 24_000  # individual steps, and
 FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
+SEARCHES, DEEP = 1, 2  # searches by CMA-ES for any law, and once more for the best
 HOPS, FEW_HOPS = 6, 4  # climbs beside the best law's fit, and beside any
 AGAIN = 3  # steps of a climb without the part that is held out
 WITHIN = 1.959964  # standard deviations that hold 95 %
@@ -54,13 +55,17 @@ def fit(
     kept = telling(model, _begin(model, gains), begin, model.few())
     model = Model(replace(law, numbers=tuple(law.numbers[k] for k in kept)), tracks, scale)
     say()
-    found = polish(model, search(model, _begin(model, gains), begin[:, kept], model.few(), seed, say))
+    found = polish(model, search(model, _begin(model, gains), begin[:, kept], model.few(), seed, say, SEARCHES))
     say()
     return model, found
 
 
 def simpler(model: Model, found: Fit, scale: Scale, seed: int, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit after more searching beside it, without numbers that the others make up for."""
+    if DEEP:
+        begin = drawn(model, found.place, model.few(), seed + 1)
+        other = polish(model, search(model, found.place, begin, model.few(), seed + 1, say, DEEP))
+        found = min(found, other, key=lambda each: each.loss)
     found = hop(model, found, sample(model), HOPS, seed, say)
     found = climb(model, found.place, found.free, sample(model))
     gone = simplify(model, found, say)
