@@ -48,29 +48,25 @@ print(*airflock.certify(study / "best.toml", limit, flights=400).statements, sep
 # %%
 # Give fitness away for distance
 # ------------------------------
-# The recipe by which the authors' optimum became their outdoor flights, step by step on the same seeds; each step says
-# what it costs in fitness and gains in distance, with 95 % intervals.
+# The recipe by which the authors' optimum became their outdoor flights, step by step on the same seeds. A step stays if
+# it gains distance, costs little fitness, and breaks nothing that held; what is left is flown again on fresh seeds.
 steps = airflock.harden(study / "best.toml", range(40))
-pd.DataFrame([step.as_dict() for step in steps])[["name", "fitness", "r_min", "cost", "gain"]].round(3)
+pd.DataFrame([step.as_dict() for step in steps])[["name", "fitness", "r_min", "cost", "verdict"]].round(3)
 
 # %%
-# The first step is nearly free; the later ones cost much and gain little. So ask of each what was asked of the optimum.
-for step in steps:
-    changed = airflock.load(study / "best.toml", dict(step.parameters))
-    verdict = airflock.certify(changed, limit, flights=400).statements[0]
-    print(f"{step.name:28s} fitness {step.fitness:.3f}  {verdict}")
+# So ask of what is left what was asked of the optimum. The certificate also says how far the delay may grow before the
+# statement does not hold any more.
+safer = airflock.load(study / "best.toml", dict(steps[-1].parameters))
+certificate = airflock.certify(safer, limit, flights=400, tolerance=["radio.delay"])
+certificate.save("certificate.toml")
+print(*certificate.statements, sep="\n")
+pd.DataFrame(certificate.tolerance["axis"])[["key", "unit", "nominal", "safe", "not_shown"]].round(2)
 
 # %%
 # What was shown, and what was not
 # --------------------------------
 # A flock that is "not shown" need not be worse than the limit: 400 flights may be too few. Where nothing happens at
-# all, they still allow an event in 0.75 % of flights. And all this holds for the scenario as it stands: with
-# `tolerance=True` the certificate says how far delay, range, noise and lag may move before it does not hold any more.
-certificate = airflock.certify(
-    airflock.load(study / "best.toml", dict(steps[1].parameters)), limit, flights=400, tolerance=["radio.delay"]
-)
-certificate.save("certificate.toml")
-pd.DataFrame(certificate.tolerance["axis"])[["key", "unit", "nominal", "safe", "not_shown"]].round(2)
-
-# %%
+# all, they still allow an event in 0.75 % of flights. And all this holds for the scenario as it stands: no faults, no
+# wind, no person at the transmitter.
+#
 # `airflock certify certificate.toml --check` flies a part of it again, on any machine, and computes all bounds anew.

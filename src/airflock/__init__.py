@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.core.contract import body as body
     from airflock.core.contract import metric as metric
     from airflock.core.contract import model as model
+    from airflock.core.fault import fault as fault
     from airflock.core.parameters import Parameters as Parameters
     from airflock.core.parameters import choice as choice
     from airflock.core.parameters import quantity as quantity
@@ -61,6 +62,7 @@ _WHERE = {
     "model": "airflock.core.contract",
     "body": "airflock.body",
     "metric": "airflock.core.contract",
+    "fault": "airflock.core.fault",
     "metric_set": "airflock.metrics.registry",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",

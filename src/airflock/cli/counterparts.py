@@ -33,7 +33,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
     ),
     "score": Counterpart(
         "airflock.score(recording)", "score",
-        {"files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero"},
+        {
+            "files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero",
+            "groups": "groups",
+        },
     ),
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
@@ -184,6 +187,6 @@ COUNTERPARTS: dict[str, Counterpart] = {
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (
-    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body",
+    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "metric", "metric_set", "check_model", "check_body", "check_metric", "quantity", "choice",
 )  # fmt: skip

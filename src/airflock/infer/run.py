@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airflock.errors import AirflockError, RecordingError
 from airflock.infer import select
 from airflock.infer.bootstrap import Again, Noise, again
-from airflock.infer.candidates import Candidate, candidate
+from airflock.infer.candidates import Candidate, candidate, scenarios_of
 from airflock.infer.fit import Fit, Model
 from airflock.infer.leftover import left_over
 from airflock.infer.maps import Maps, maps
@@ -51,6 +51,7 @@ class Law:
 
     gain, error : log-likelihood of held-out steps above that of going straight on, and its standard error
     ahead       : share of spans in which it predicts better
+    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
     criterion   : Akaike's, of the fit, below that of going straight on; negative is better
     inside      : share of held-out differences within the 95 % that are predicted
     missed      : share of what is explained with a free sum of forces added that the law alone leaves over, 0 to 1
@@ -61,6 +62,7 @@ class Law:
     gain: float
     error: float
     ahead: float
+    price: float
     criterion: float
     inside: float
     missed: float
@@ -95,7 +97,7 @@ class Inferred:
     def document(self) -> dict[str, Any]:
         """A scenario file's content: the best law with its numbers; raises AirflockError where there is none."""
         if self.best is None:
-            raise AirflockError(f"infer: {self.verdict}; there is no scenario to write")
+            raise AirflockError(f"infer: {self.verdict}; nothing can be written")
         scenario = self.best.candidate.scenario
         found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
         found.pop("published", None)
@@ -175,20 +177,12 @@ def infer(
         raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
     say = done or (lambda _: None)
     settings = dict(settings or {})
+    scenarios, box = scenarios_of(models, settings, trust=trust)
     recordings = recordings_of(tracks)
-    box = _box(settings)
     followed = [tracks_of(recording, name, box=box) for name, recording in recordings]
     _alike(followed)
     scale = scale_of(followed)
-    faults: list[str] = []
-    candidates = []
-    for what in models:
-        try:
-            candidates.append(candidate(what, scale, followed[0].axes, settings, trust=trust))
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
-    if faults:
-        raise AirflockError("\n".join(faults))
+    candidates = [candidate(each, scale, followed[0].axes) for each in scenarios]
     reference, straight = select.straight(followed, scale)
     plain = select.hold_out(reference, straight, lambda: say("going straight on"))
     gains = straight.place[reference.named :]
@@ -237,14 +231,6 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
     return found
 
 
-def _box(settings: Mapping[str, Any]) -> tuple[float, ...]:
-    """Half sides of a periodic box that the settings speak of."""
-    if settings.get("world.edges") != "periodic":
-        return (0.0, 0.0, 0.0)
-    side = 0.5 * float(settings.get("world.side", 0.0))
-    return side, side, 0.5 * float(settings.get("world.height", 0.0))
-
-
 def _alike(followed: Sequence[Tracks]) -> None:
     first = followed[0]
     for other in followed[1:]:
@@ -270,6 +256,7 @@ def _law(
     left, gained = left_over(model, found.place, spans_of_fit), max(straight.score.loss() - found.score.loss(), 0.0)
     return Law(
         name, float(ahead.sum()), float(np.sqrt(spans) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
+        0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
         2.0 * (bare[0] - bare[1]), held.inside,
         left / max(gained + left, 1e-9), numbers, model.law, found, maps(model, found.place, scale, spans_of_fit),
         held.surprise,
@@ -279,7 +266,7 @@ def _law(
 def _verdict(laws: list[Law]) -> tuple[Law | None, str]:
     """The law that explains the tracks, if one does, and the line that says so."""
     best = laws[0]
-    if not (best.gain > SURE * best.error and best.ahead >= MOST):
+    if not (best.gain > max(SURE * best.error, best.price) and best.ahead >= MOST):
         return None, "none of these explains the tracks better than going straight on"
     missed = (
         f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""

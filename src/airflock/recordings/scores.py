@@ -43,6 +43,7 @@ def score(
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
     aero: bool = False,
+    groups: bool = False,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
@@ -66,6 +67,8 @@ def score(
         Told what auto picked.
     aero : bool
         For a recording, measure the power that its geometry saves.
+    groups : bool
+        For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
 
     Returns
     -------
@@ -91,6 +94,13 @@ def score(
     """
     if isinstance(what, xr.Dataset):
         settings = aero_settings(what, settings) if aero else settings
+        if groups:
+            from airflock.recordings.groups import BETWEEN, group_scores
+
+            table = _about(group_scores(what, settings), scenario_of(what, settings))
+            for place, about in (("units", 0), ("meanings", 1)):
+                table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
+            return table
         values, _ = measure(what, settings)
         return _about(pd.DataFrame([values]), scenario_of(what, settings))
     scenario, found = loaded(what), sound_seeds(seeds)
@@ -148,11 +158,11 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = plan_of(scenario, precision=precision)
+    plan = plan_of(scenario.alike(), precision=precision)
     q = scenario.measured_by()
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
     steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
-    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    numbers = tables(scenario.alike(), plan, 0).changed(agents=frames.shape[2], **steps)
     _refuse_gaps(plan, present)
     values, series = cpu.measure_frames(plan, numbers, frames, period, present=present)
     names = [name for name, _, _ in columns(plan.metrics)]
@@ -231,12 +241,13 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
     if not _in_file(_kind(document, "metrics"), SETS):
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if not _in_file(_kind(document, "body"), BODIES):
-        document = {**document, "body": {}}
+        document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)
     kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
+    stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
     return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
 
 
