@@ -128,6 +128,17 @@ def test_the_tolerance_of_a_number_is_found_between_two_values(tmp_path):
     assert tau["factor"] == 8.0 and "not_shown" not in tau
 
 
+def test_a_map_says_which_cells_are_safe_and_bounds_each(tmp_path):
+    axes = {"radio.delay": [0.5, 1.0, 1.7], "body.tau": [0.5, 1.0]}
+    told = flown(campaign(), tmp_path / "a", 0.0, axes=axes).over
+    verdicts = {tuple(cell["values"]): cell["verdict"] for cell in told["cell"]}
+    assert verdicts == {(d, t): "safe" if d < 1.5 else "unsafe" for d in axes["radio.delay"] for t in axes["body.tau"]}
+    assert all(cell["high"] <= 0.02 for cell in told["cell"] if cell["verdict"] == "safe")
+    with pytest.raises(ScenarioError) as fault:
+        certify("vasarhelyi_2018/real_6ms", LIMIT, over={"radio.dely": [0.0, 1.0], "body.tau": [1.0, -1.0]})
+    assert "did you mean radio.delay?" in str(fault.value) and "body.tau = -1.0 lies outside" in str(fault.value)
+
+
 def test_numbers_that_are_not_sure_are_drawn_by_each_seed(tmp_path):
     document = dict(load("vasarhelyi_2018/real_6ms").document)
     document["radio"] = {**document["radio"], "delay": {"value": 1.0, "unit": "s", "interval": [0.8, 1.4]}}
@@ -144,7 +155,7 @@ def written(tmp_path_factory):
     """A certificate of real flights, tiny ones in plain Python, as a file."""
     folder = tmp_path_factory.mktemp("written")
     tiny = load(
-        "vasarhelyi_2018/real_4ms", {"agents": 3, "duration": 1.0, "dt": 0.1, "world.side": 30.0, "metrics.period": 0.5}
+        "vasarhelyi_2018/real_4ms", {"agents": 3, "duration": 4.0, "dt": 0.1, "world.side": 30.0, "metrics.period": 0.5}
     )
     found = certify(tiny, ["r_min<9 at 99%", "phi_wall>0"], flights=24, device="python", folder=folder / "flights")
     return found, found.save(folder / "certificate.toml")
@@ -166,7 +177,7 @@ def test_a_certificate_holds_all_that_it_takes_to_check_it(written, tmp_path):
     again = check(copy)
     assert again.same and again.flown == 24 and found.check().same
     document = tomllib.loads(path.read_text())
-    assert document["shown"] and document["flights"]["identity"] == identity(found.campaign.scenario)
+    assert document["shown"] == found.shown and document["flights"]["identity"] == identity(found.campaign.scenario)
     assert identity(load(path.parent / "flights" / "scenario.toml")) == identity(found.campaign.scenario)
     assert found.worst[0]["value"] == min(row.get("closest", row["r_min"]) for row in found.rows)
     assert "yes" in found._repr_html_() and "Certificate of" in repr(found)
@@ -195,8 +206,8 @@ def test_a_certificate_of_another_scenario_version_or_format_is_refused(written,
     text, path = written[1].read_text(), tmp_path / "c.toml"
     for old, new, told in (
         (
-            "duration = 1.0\nagents = 3",
-            "duration = 1.0\nagents = 4",
+            "duration = 4.0\nagents = 3",
+            "duration = 4.0\nagents = 4",
             "those of another scenario than the one that it holds",
         ),
         ("format = 1\n", "format = 2\n", "is of format 2; this Airflock reads format 1"),

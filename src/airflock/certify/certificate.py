@@ -36,7 +36,8 @@ class Certificate:
 
     verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
     rows      : scores of all flights that were counted, in the order of their seeds
-    tolerance : by `airflock.certify.tolerance`; splitting: by `airflock.certify.rare`; plain values, empty if not asked
+    tolerance : by `airflock.certify.tolerance`; splitting: by `airflock.certify.branches`; over: by
+                `airflock.certify.maps`; plain values, empty if not asked for
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
     where     : file or name of the scenario, by which flights are flown again
@@ -51,6 +52,7 @@ class Certificate:
     rate: float = 0.0
     tolerance: Mapping[str, Any] = field(default_factory=dict)
     splitting: Mapping[str, Any] = field(default_factory=dict)
+    over: Mapping[str, Any] = field(default_factory=dict)
     where: str = ""
 
     @property
@@ -106,6 +108,7 @@ class Certificate:
             "worst": self.worst,
             "tolerance": dict(self.tolerance),
             "splitting": dict(self.splitting),
+            "map": dict(self.over),
             "check": {"every": step, "digests": digests[::step]},
             "flown": {
                 "rules": c.document()["rules"], "precision": c.precision, "device": c.device, **self.versions

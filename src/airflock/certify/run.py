@@ -16,6 +16,7 @@ from airflock.certify.counting import Count, Watch, count
 from airflock.certify.flights import Task, score_of
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.limits import read_all
+from airflock.certify.maps import bounds_over, sound_axes
 from airflock.certify.seeds import TOLERANCE, seed
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.executors import Executor, Flight
@@ -45,6 +46,7 @@ def certify(
     uncertain: bool = False,
     tolerance: bool | Sequence[str] = False,
     split: bool = False,
+    over: Mapping[str, Sequence[float]] | None = None,
     precision: int = 32,
     device: str = "cpu",
     scheduler: str | None = None,
@@ -82,6 +84,8 @@ def certify(
         Also find how far each number of the environment may move; or only the keys that are named.
     split : bool
         Also estimate limits on r_min by splitting, which finds and ranks rare flights but shows nothing.
+    over : mapping, optional
+        Two keys with their values, {"radio.delay": [0.5, 1.0], "body.noise": [0.2, 0.4]}: also bounds over this grid.
     precision : int
         Bits per number: 32 or 64.
     device : str
@@ -118,6 +122,7 @@ def certify(
     found = variant(scenario, settings, law, trust=trust)
     campaign = campaign_of(found, limit, confidence, flights, uncertain=uncertain, precision=precision, device=device)
     keys = asked(campaign, tolerance, split)
+    axes = sound_axes(campaign.scenario, over) if over else {}
     check_options(budget, timeout, scheduler, device)
     with folder_of(folder) as path:
         executor = executor_for(campaign, scheduler, threads, timeout)
@@ -125,16 +130,9 @@ def certify(
             campaign = planned(campaign, executor, budget, path, resume)
             open_folder(path, campaign, resume=resume, kind=FOLDER)
             return run(
-                campaign,
-                path,
-                executor,
-                budget,
-                watch,
-                keys=keys,
-                split=split,
-                threads=threads,
+                campaign, path, executor, budget, watch, keys=keys, split=split, axes=axes, threads=threads,
                 kept=folder is not None,
-            )
+            )  # fmt: skip
         finally:
             executor.close()
 
@@ -255,11 +253,12 @@ def run(
     *,
     keys: Sequence[str] = (),
     split: bool = False,
+    axes: Mapping[str, Sequence[float]] | None = None,
     threads: int | None = None,
     note: Callable[[str], None] | None = None,
     kept: bool = True,
 ) -> Certificate:
-    """Count, find tolerances of `keys`, and split if asked, in a folder that `open_folder` has accepted.
+    """Count, find tolerances of `keys`, split, and map over `axes`, in a folder that `open_folder` has accepted.
 
     note : told in a few words what begins; kept: whether the folder stays
     """
@@ -270,7 +269,7 @@ def run(
         sweep(folder)
         write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
         try:
-            part = COUNTED if keys or split else 1.0
+            part = COUNTED if keys or split or axes else 1.0
             counted = count(campaign, store, executor, math.inf if campaign.flights else budget * part, watch)
             tolerances: Mapping[str, Any] = {}
             rare: Mapping[str, Any] = {}
@@ -287,13 +286,14 @@ def run(
             if keys:
                 from airflock.certify.tolerance import tolerance
 
-                tolerances = tolerance(campaign, store, executor, counted, keys, left(), note)
+                tolerances = tolerance(campaign, store, executor, counted, keys, left() * (0.5 if axes else 1.0), note)
+            cells = bounds_over(campaign, store, executor, axes, left(), note) if axes else {}
         except KeyboardInterrupt as stop:
             told = f"{store.count('count'):,} flights are stored in {folder}; continue with --resume"
             raise Interrupted(f"interrupted: {told}") from stop
     return Certificate(
         campaign, tuple(counted.verdicts), hazards(campaign, counted), counted.rows, versions(),
-        time.monotonic() - began, counted.rate, tolerances, rare, where,
+        time.monotonic() - began, counted.rate, tolerances, rare, cells, where,
     )  # fmt: skip
 
 

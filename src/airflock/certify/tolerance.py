@@ -77,8 +77,7 @@ def tolerance(
     Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal), flights.
     """
     until = time.monotonic() + budget
-    rates = [p for p in map(campaign.probability, campaign.limits) if p is not None]
-    level = max(LEVEL, *rates) if rates else LEVEL
+    level = level_of(campaign)
     screen = Screen(campaign, store, executor, level, until)
     events = sum(any(limit.happened(row) for limit in campaign.limits) for row in counted.rows)
     told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
@@ -92,12 +91,19 @@ def tolerance(
     return told
 
 
+def level_of(campaign: Campaign) -> float:
+    """Probability per flight against which values are judged: that of the limits, or LEVEL where they are rarer."""
+    return max([LEVEL, *(p for p in map(campaign.probability, campaign.limits) if p is not None)])
+
+
 class Screen:
     """Judges one value at a time against a level per flight, on seeds that all values share."""
 
-    def __init__(self, campaign: Campaign, store: Store, executor: Executor, level: float, until: float):
+    def __init__(
+        self, campaign: Campaign, store: Store, executor: Executor, level: float, until: float, part: int = TOLERANCE
+    ):
         self.campaign, self.store, self.executor, self.level, self.until = campaign, store, executor, level, until
-        self.alpha, self.part = 1.0 - campaign.confidence, TOLERANCE
+        self.alpha, self.part = 1.0 - campaign.confidence, part
         most = MOST * needed(level, self.alpha * share(1))
         self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, self.alpha)))
 

@@ -52,6 +52,12 @@ def certify(
     split: Annotated[
         bool, typer.Option("--split", help="Also estimate r_min limits by splitting: finds and ranks, shows nothing.")
     ] = False,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map", metavar="KEY=VALUES", help="Twice: also bounds over a grid, such as radio.delay=0.5:1.5:5."
+        ),
+    ] = None,
     uncertain: Annotated[
         bool, typer.Option("--uncertain", help="Draw each flight's numbers from the intervals in the file.")
     ] = False,
@@ -85,13 +91,16 @@ def certify(
         _check(scenario, threads, trust, as_json)
         return
     from airflock.certify.campaign import FOLDER
+    from airflock.certify.maps import sound_axes
     from airflock.certify.run import asked, campaign_of, check_options, executor_for, folder_of, planned, run
+    from airflock.cli.sweep import axis
     from airflock.evolve.folder import open_folder
     from airflock.scenarios.files import load
 
     faults: list[str] = []
     seconds, campaign = 1.0, None
     keys: tuple[str, ...] = ()
+    axes: dict[str, list[float]] = {}
     with options.gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
     with options.gathering(faults):
@@ -101,6 +110,7 @@ def certify(
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
         campaign = campaign_of(found, limit or [], confidence, flights, **how)
         keys = asked(campaign, tolerance_of or tolerance, split)
+        axes = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
     with options.gathering(faults):
         check_options(seconds, timeout, scheduler, device)
     if resume and out is None:
@@ -118,8 +128,8 @@ def certify(
             open_folder(folder, campaign, resume=resume, kind=FOLDER)
             with counting(as_json) as (watch, note):
                 made = run(
-                    campaign, folder, executor, seconds, watch, keys=keys, split=split, threads=threads, note=note,
-                    kept=out is not None,
+                    campaign, folder, executor, seconds, watch, keys=keys, split=split, axes=axes, threads=threads,
+                    note=note, kept=out is not None,
                 )  # fmt: skip
         finally:
             executor.close()
@@ -211,6 +221,7 @@ def _print(made: Any) -> None:
             )
     _worst(console, made)
     _tolerances(console, made.tolerance)
+    _map(console, made.over)
     for text in made.splitting.get("statements", ()):
         console.print(text, highlight=False, markup=False, soft_wrap=True)
     console.print(f"Not said: {'; '.join(NOT_SAID)}.", highlight=False, markup=False, style="dim", soft_wrap=True)
@@ -248,6 +259,27 @@ def _tolerances(console: Any, found: Any) -> None:
             axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}", bad,
             f"{axis['flights']:,}", axis.get("note", ""),
         )  # fmt: skip
+    console.print(table)
+
+
+def _map(console: Any, found: Any) -> None:
+    """Upper bounds in percent of flights, first key downwards, second across."""
+    if not found:
+        return
+    from rich import box
+    from rich.table import Table
+
+    (down, across), (rows, columns) = found["keys"], found["axes"]
+    title = f"at most so many % of flights with an event; * safe, below {100.0 * found['level']:g} %"
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column(f"{down} / {across}", style="bold")
+    for value in columns:
+        table.add_column(f"{value:g}", justify="right")
+    cells = iter(found["cell"])
+    for value in rows:
+        row = [next(cells) for _ in columns]
+        told = [f"{100.0 * cell['high']:.3g}{'*' if cell['verdict'] == 'safe' else ''}" for cell in row]
+        table.add_row(f"{value:g}", *told)
     console.print(table)
 
 

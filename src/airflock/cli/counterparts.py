@@ -73,7 +73,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **{
                 name: name
                 for name in (
-                    "confidence", "budget", "flights", "resume", "tolerance", "split", "uncertain", "scheduler",
+                    "confidence", "budget", "flights", "resume", "tolerance", "split", "over", "uncertain", "scheduler",
                     "timeout", "threads", "precision", "device",
                 )
             },

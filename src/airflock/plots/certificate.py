@@ -1,10 +1,11 @@
-"""A certificate in three panels: how the bound fell, how near agents came, how far numbers may move."""
+"""A certificate in panels: how the bound fell, how near agents came, how far numbers may move, bounds over two."""
 
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def certificate(found: "Certificate") -> Figure:
-    """Upper bounds by flights, the distribution of the smallest distance, and tolerances of the environment.
+    """Upper bounds by flights, smallest distances, tolerances of the environment, and a map of two of its numbers.
 
     Panels without data are left out.
     """
@@ -24,8 +25,10 @@ def certificate(found: "Certificate") -> Figure:
         draws.append(_distances)
     if found.tolerance.get("axis"):
         draws.append(_tolerances)
+    if found.over:
+        draws.append(_map)
     figure = style.Picture(3.6 * len(draws) + 0.4, 3.2)
-    for axes, draw, name in zip(figure.subplots(1, len(draws), squeeze=False)[0], draws, "ABC", strict=False):
+    for axes, draw, name in zip(figure.subplots(1, len(draws), squeeze=False)[0], draws, "ABCD", strict=False):
         draw(axes, found)
         style.letter(axes, name)
     said = "shown" if found.shown else "not shown"
@@ -87,3 +90,21 @@ def _tolerances(axes: Axes, found: "Certificate") -> None:
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.margins(x=0.2)
     style.dress(axes, "safe factor on the nominal value (red: not shown)")
+
+
+def _map(axes: Axes, found: "Certificate") -> None:
+    """Upper bound over two numbers; the line is the level below which a cell is safe."""
+    told = found.over
+    rows, columns = (np.array(values) for values in told["axes"])
+    high = np.array([cell["high"] for cell in told["cell"]]).reshape(len(rows), len(columns))
+    shown = axes.pcolormesh(
+        columns, rows, high, norm=LogNorm(told["level"] / 10.0, 1.0), cmap="viridis_r", shading="nearest"
+    )
+    if high.min() < told["level"] < high.max():
+        axes.contour(columns, rows, high, levels=[told["level"]], colors=style.RED, linewidths=1.2)
+    axes.plot([], [], color=style.RED, label=f"{100.0 * told['level']:g} % of flights")
+    style.dress(axes, told["keys"][1], told["keys"][0], grid=False)
+    style.legend(axes, above=True)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    style.colour_bar(figure, shown, axes, "flights with an event, at most")

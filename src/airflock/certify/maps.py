@@ -1,0 +1,72 @@
+"""Maps: bounds over a grid of two numbers of the scenario, each cell judged as `tolerance` judges a value."""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from itertools import product
+from typing import Any
+
+from airflock.certify.campaign import Campaign
+from airflock.certify.seeds import MAP
+from airflock.certify.tolerance import Screen, level_of
+from airflock.errors import ScenarioError
+from airflock.evolve.executors import Executor
+from airflock.evolve.space import declared
+from airflock.evolve.store import Batch, Store
+from airflock.scenarios.scenario import Scenario
+
+MOST = 400  # cells
+
+
+def sound_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+    """The two axes of a map; ScenarioError with everything that is wrong with them."""
+    known, faults = declared(scenario), []
+    if len(axes) != 2:
+        faults.append(f"map: needs two keys, not {len(axes)}")
+    for key, values in axes.items():
+        if key not in known:
+            near = get_close_matches(key, known, n=1, cutoff=0.5)
+            faults.append(
+                f"map: {key} is not a number of {scenario.name}{f'; did you mean {near[0]}?' if near else ''}"
+            )
+            continue
+        how = known[key][0]
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not how.low <= value <= how.high:
+                faults.append(f"map: {key} = {value!r} lies outside {how.span}")
+        if len(set(values)) < 2 or sorted(values) != list(values):
+            faults.append(f"map: {key}: give at least two values that grow")
+    if math.prod(len(values) for values in axes.values()) > MOST:
+        faults.append(f"map: more than {MOST} cells")
+    if faults:
+        raise ScenarioError(faults)
+    return {key: [float(value) for value in values] for key, values in axes.items()}
+
+
+def bounds_over(
+    campaign: Campaign,
+    store: Store,
+    executor: Executor,
+    axes: Mapping[str, Sequence[float]],
+    budget: float,
+    note: Callable[[str], None] | None = None,
+) -> dict[str, Any]:
+    """Verdict and bounds of every cell, on seeds that all cells share.
+
+    Returns plain values: level, keys, values, and for each cell values, verdict, low, high (per flight), flights.
+    """
+    screen = Screen(campaign, store, executor, level_of(campaign), time.monotonic() + budget, MAP)
+    cells = []
+    for number, values in enumerate(product(*axes.values())):
+        if note:
+            note(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
+        parameters = dict(zip(axes, values, strict=True))
+        batch = Batch("map", 0, number)
+        store.ask(batch, [list(values)], [parameters])
+        verdict, found = screen.judged(batch, parameters)
+        cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
+        if found is not None:
+            cell |= {"low": found.low, "high": found.high, "flights": found.flights, "events": found.events}
+        cells.append(cell)
+    return {"level": screen.level, "keys": list(axes), "axes": [list(v) for v in axes.values()], "cell": cells}
