@@ -524,3 +524,9 @@ def test_what_the_page_shows_works(tmp_path):
     (tmp_path / "compass.py").write_text(own, encoding="utf-8")
     path.write_text('extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "compass.py"\nat = 1.0\n', encoding="utf-8")
     assert load(path, trust=True).fault_kinds[0].name == "compass"
+
+
+def test_a_recording_with_gaps_flies_again_to_the_same_bits(tmp_path):
+    recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
+    path = airflock.save(recording, tmp_path / "flight.nc")
+    assert "same bits" in str(airflock.validate(path))
