@@ -502,3 +502,31 @@ def test_groups_are_scored_alone_and_against_each_other():
     assert table.loc["all", "phi_vel"] == whole["phi_vel"]
     with pytest.raises(RecordingError, match=r"its scenario has no \[\[groups\]\]"):
         airflock.score(airflock.simulate(load(PAPER, SMALL), 1, device="python"), groups=True)
+
+
+def test_what_the_page_shows_works(tmp_path):
+    """The examples of docs/faults.md, as they stand there."""
+    import re
+    from pathlib import Path
+
+    text = (Path(__file__).resolve().parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
+    tables = re.findall(r"```toml\n(.*?)```", text, re.S)
+    shown, own = re.findall(r"```python\n(.*?)```", text, re.S)
+    path = tmp_path / "mine.toml"
+    path.write_text(f"{tables[0]}\n{tables[1]}", encoding="utf-8")
+    assert [entry.fault.name for entry in load(path).faults] == ["motor", "gnss_drift"]
+    assert load(path).varied == (("p", "p_rep"), ("b", "tau"), ("b", "a_max"))
+    known = {}
+    exec(shown.replace("seed=1)", 'seed=1, device="python")'), known)
+    assert [fault["kind"] for fault in known["flight"].faults] == ["motor"] and known["flight"].present.all()
+    for kind in KINDS:
+        assert f"`{kind}`" in text, kind
+    (tmp_path / "compass.py").write_text(own, encoding="utf-8")
+    path.write_text('extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "compass.py"\nat = 1.0\n', encoding="utf-8")
+    assert load(path, trust=True).fault_kinds[0].name == "compass"
+
+
+def test_a_recording_with_gaps_flies_again_to_the_same_bits(tmp_path):
+    recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
+    path = airflock.save(recording, tmp_path / "flight.nc")
+    assert "same bits" in str(airflock.validate(path))

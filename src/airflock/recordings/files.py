@@ -161,6 +161,6 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
     if noted is not None and noted != flown:
         differences.insert(0, f"law: {noted} then, {flown} now")
     same = again["position"].shape == recording["position"].shape and bool(
-        np.array_equal(again["position"].values, recording["position"].values)
+        np.array_equal(again["position"].values, recording["position"].values, equal_nan=True)
     )
     return same, differences

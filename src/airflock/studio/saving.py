@@ -52,6 +52,6 @@ def flown_again(flight: Flight) -> xr.Dataset:
     events = [event for event in flight.events if event.step < flight.step]
     again = Flight(short, seed, precision=precision, start=start, events=events)
     again.advance(steps=flight.step)
-    if len(events) == len(flight.events) and not np.array_equal(again.state, flight.state):
+    if len(events) == len(flight.events) and not np.array_equal(again.state, flight.state, equal_nan=True):
         raise FlightError(f"{scenario.name}: flown again, the positions at t = {flight.time:g} s differ")
     return simulate(short, seed, precision=precision, start=start, events=events)
