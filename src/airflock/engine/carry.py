@@ -18,7 +18,8 @@ def carry(old: State, new: State, step: int) -> None:
     """
     _rows(old, new)
     new.arrays["past"][...] = _under_way(old, new, step)
-    new.arrays["gust"][:] = old.arrays["gust"]
+    if new.plan.dryden == old.plan.dryden:
+        new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.links and new.plan.links:
         new.arrays["store"][...] = old.arrays["store"]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:

@@ -70,7 +70,8 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
-        windy=any((wind.east, wind.north, wind.up, wind.gust)),
+        windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
+        dryden=wind.kind == "dryden",
     )
 
 

@@ -19,8 +19,13 @@ def fields(record: Any) -> range:
 
 
 def remembered(i: int, flock: Flock, *, plan: Plan) -> Any:
-    """What the body of agent i remembers."""
-    return plan.body.Memory(*[flock.body[c][i] for c in fields(plan.body.Memory)])  # type: ignore[misc]
+    """What the body of agent i remembers; None if it keeps no memory."""
+    return kept(plan.body.Memory, i, flock)
+
+
+def kept(record: Any, i: int, flock: Flock) -> Any:
+    """What a body whose Memory is this record remembers of agent i."""
+    return None if record is None else record(*[flock.body[c][i] for c in fields(record)])
 
 
 def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan) -> None:
