@@ -26,7 +26,7 @@ ALLOWED = {"glossary.md": {"latency", "flight logs"}, "tracks.md": {"flight logs
 # what no message says → how each kind of fault is worded (decision 0084)
 WORDINGS = {
     r"\bis no key\b|\bno such (?:key|order parameter|paper|option|model|section|metric|part)\b": "NAME: unknown KIND",
-    r"\bis no (?:number|table|list|name|mapping|model|body|scenario|recording|file|law)\b": "= VALUE is not a KIND",
+    r"(?<!there )\bis no (?:number|table|list|name|model|body|scenario|recording|file|law)\b": "VALUE is not a KIND",
     r"\bis not one of\b|\bmust be one of\b|\bis not among\b|\bis not in\b \[": "= VALUE is none of A, B, C",
     r"\bout of (?:range|bounds)\b|\bmust (?:lie in|be between|be in)\b": "= VALUE lies outside [LOW, HIGH]",
     r"\bmust be positive\b": "= VALUE must be above 0",

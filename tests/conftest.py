@@ -1,5 +1,6 @@
 """Options and fixtures of all tests."""
 
+import gc
 import os
 
 import hypothesis
@@ -7,6 +8,7 @@ import pytest
 
 hypothesis.settings.register_profile("untimed", deadline=None)  # no test asserts a time
 hypothesis.settings.load_profile("untimed")
+gc.set_threshold(100_000, 50, 50)  # a compilation makes millions of objects that stay: looking at them takes a tenth
 
 
 def pytest_addoption(parser):

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from airflock.body.registry import BODIES as KNOWN_BODIES
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.errors import ScenarioError
+from airflock.faults.registry import KINDS
 from airflock.scenarios.files import MODELS, find_model, make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -78,7 +79,56 @@ def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
         if keys.get("goals.kind") == "own":
             keys["goals.points"] = keys["goals.points"][: keys["agents"]]
     start = lattice(keys, rng, length, speed, reach) if rng.random() < 0.35 else None
+    groups(keys, rng, kind)
+    faults(keys, rng, length)
     return keys, start
+
+
+def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
+    """Agents with numbers of their own."""
+    if rng.random() > 0.3:
+        return
+    found: list[dict[str, Any]] = [{"name": "some", "agents": rng.randint(1, keys["agents"])}]
+    if found[0]["agents"] < keys["agents"]:
+        found.append({"name": "rest"})
+    law, body = find_model(kind), KNOWN_BODIES[keys["body.kind"]]
+    for group in found:
+        for section, record in (("model", law.Parameters), ("body", body.Parameters)):
+            own: dict[str, Any] = {}
+            sometimes(own, rng, record, section, 0.3, ("rays", "most"))
+            numbers = {key.partition(".")[2]: value for key, value in own.items() if isinstance(value, float)}
+            off = {name: {"value": value, "spread": 0.05 * abs(value)} for name, value in numbers.items()}
+            group[section] = off if rng.random() < 0.5 else numbers
+    keys["groups"] = found
+
+
+def faults(keys: dict[str, Any], rng: Random, length: float) -> None:
+    """What befalls single agents."""
+    if rng.random() > 0.4:
+        return
+    found = []
+    for _ in range(rng.randint(1, 3)):
+        kind = rng.choice(tuple(KINDS))
+        entry: dict[str, Any] = {"kind": kind}
+        for name, declared, default in declarations(KINDS[kind].Parameters):
+            share = declared.unit == "1"
+            entry[name] = rng.choice((0.0, 0.5, 1.0)) if share else rng.choice((0.3 * default, -0.5 * default, 0.2))
+            entry[name] = min(max(entry[name], declared.low), declared.high)
+        ends = kind != "fails" and rng.random() < 0.4
+        if rng.random() < 0.6:
+            begun = KINDS[kind].leaves is not None and keys.get("goals.kind") == "own"  # ways are planned for all
+            entry["at"] = rng.choice((0.2 if begun else 0.0, 0.2, 0.37))
+            entry |= rng.choice(({"until": 0.61}, {"lasts": 0.3})) if ends else {}
+        else:
+            entry |= {"per_hour": 8000.0, **({"lasts": 0.25} if ends else {})}
+        if rng.random() < 0.5:
+            entry["agents"] = sorted(rng.sample(range(keys["agents"]), rng.randint(1, keys["agents"])))
+        elif "groups" in keys:
+            entry["group"] = "some"
+        if "agents" not in entry and "group" not in entry and rng.random() < 0.5:
+            entry["number"] = rng.randint(1, keys["agents"])
+        found.append(entry)
+    keys["faults"] = found
 
 
 def sometimes(keys: dict[str, Any], rng: Random, record: type, section: str, share: float, but: tuple[str, ...] = ()):
@@ -276,10 +326,11 @@ OPTIONS |= {
     "body": {"kind": tuple(KNOWN_BODIES), **options(KNOWN_BODIES["heading"].Parameters)},
 }
 OPTIONS["wing"] = OPTIONS["wing"] | {"segments": tuple(dict.fromkeys(SEGMENTS))}
-CHOICES = [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
+CHOICES = [f"faults.kind = {kind}" for kind in KINDS]
+CHOICES += [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
 SWITCHES = (
     "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
-    "stop", "descends", "given", "sees", "walls",
+    "stop", "descends", "given", "sees", "walls", "groups", "faults", "absent",
 )  # fmt: skip
 
 
@@ -294,11 +345,15 @@ def notions(draw: Draw) -> set[str]:
         "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
         "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
+        "groups": bool(found.varied), "faults": bool(found.fault_kinds),
+        "absent": any(kind.leaves for kind in found.fault_kinds),
     }  # fmt: skip
     assert tuple(switches) == SWITCHES
-    names = {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
+    kinds = {f"faults.kind = {kind.name}" for kind in found.fault_kinds}
+    names = kinds | {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
     records = {
-        "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio, "world": found.world, "scene": found.scene,
+        "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio,
+        "world": found.world, "scene": found.scene,
         "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
         "flight": found.flight,
     } | ({"aero": found.aero} if found.descends else {})  # fmt: skip
@@ -310,6 +365,7 @@ def notions(draw: Draw) -> set[str]:
 
 
 IMPOSSIBLE = (
+    {"absent on", "faults off"},
     {"goals on", "own on"},  # goals of the flock, or one for each agent
     {"periodic on", "islands on"},
     {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},

@@ -295,13 +295,13 @@ def commands() -> None:
             flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
             about = options.get(option.name, "")
             argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
-            rows.append((flag, plain(getattr(option, "help", "") or ""), argument))
+            rows.append((flag, plain(_help(getattr(option, "help", "") or "")), argument))
         pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")
     put("commands.md", "".join(pieces))
 
 
 def _help(text: str) -> str:
-    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text)
+    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text.replace("\\[", "["))  # a terminal's markup
 
 
 def presets() -> None:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.core.contract import body as body
     from airflock.core.contract import metric as metric
     from airflock.core.contract import model as model
+    from airflock.core.fault import fault as fault
     from airflock.core.parameters import Parameters as Parameters
     from airflock.core.parameters import choice as choice
     from airflock.core.parameters import quantity as quantity
@@ -46,6 +47,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.scenarios.scaling import starting_set as starting_set
     from airflock.scenarios.scenario import Scenario as Scenario
     from airflock.studio.watch import watch as watch
+    from airflock.tune.run import tune as tune
 
 __version__ = "0.1.0"
 
@@ -60,6 +62,7 @@ _WHERE = {
     "model": "airflock.core.contract",
     "body": "airflock.body",
     "metric": "airflock.core.contract",
+    "fault": "airflock.core.fault",
     "metric_set": "airflock.metrics.registry",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",
@@ -77,6 +80,7 @@ _WHERE = {
     "evolve": "airflock.evolve",
     "harden": "airflock.evolve.harden",
     "certify": "airflock.certify",
+    "tune": "airflock.tune",
     "display": "airflock.display",
     "plot": "airflock.plots.picture",
     "plots": "airflock.plots",
@@ -93,7 +97,7 @@ _WHERE = {
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "certify", "display", "identify", "infer", "body", "plots")
+_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
 

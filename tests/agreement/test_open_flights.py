@@ -279,7 +279,7 @@ def test_a_change_is_refused_in_one_line_each_and_leaves_the_flight_as_it_was(sc
         (lambda f: f.advance(steps=3).sense(), "the next decision is at step 220, this is 203"),
         (lambda f: f.branch(-1), "not a whole number from 0"),
         (lambda f: f.event("branch"), "world = None is not a whole number from 0"),
-        (lambda f: f.event("explode"), "known kinds: change, command, push, place, branch"),
+        (lambda f: f.event("explode"), "known kinds: change, command, push, place, fault, remove, add, branch"),
         (lambda f: f.frames, "record=True"),
     ],
 )

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from airflock.engine.cuda import cells, kernel
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import shape_of
+from airflock.engine.devices import no_cuda
 from airflock.engine.passes import build as building
 from airflock.engine.passes import driver
 from airflock.engine.simulate import plan_of
@@ -83,7 +84,8 @@ def found_of(name):
     found = {"32": trees_of(driver.flight, plan), "64": trees_of(driver.flight, plan.built(bits=64, record=True))}
     if found["64"] == found["32"]:
         del found["64"]
-    found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
+    if no_cuda(plan, one.agents) is None:
+        found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
     alone = not (plan.noisy or plan.delayed or plan.lossy or plan.links or plan.sequential)
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
         found["grid"] = trees_of(driver.flight, plan.built(grid=True))

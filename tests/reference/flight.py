@@ -22,8 +22,10 @@ from airflock.engine.place import Course, Place, Senses
 from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
 from reference.begin import ZERO, Vector, begin, given, normals
+from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
 from reference.scores import Scores
 
+MOVING = ("vx", "vy", "vz", "cx", "cy", "cz")
 LIMIT = 1e8  # m; no radio reaches farther
 
 
@@ -35,6 +37,8 @@ class Agent:
     command    : what its model decided last
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     memory     : the model's Memory; kept: the body's; rays: how many it cast at its last decision
+    faults     : by kind, the latest that has hit it; present : whether it is there
+    p, b       : its numbers of model and body
     packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
     """
 
@@ -46,9 +50,13 @@ class Agent:
     kept: Any = None
     rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
+    faults: dict[str, Suffering] = field(default_factory=dict)
+    present: bool = True
+    p: Any = None
+    b: Any = None
 
 
-def fly_plainly(
+def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     scenario: Scenario,
     seed: int = 0,
     start: NDArray[Any] | None = None,
@@ -67,6 +75,11 @@ def fly_plainly(
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
     memory = scenario.vehicle.Memory
     flock = [Agent(state, kept=memory() if memory else None) for state in begun]
+    for i, agent in enumerate(flock):
+        agent.p = own_parameters(scenario, "model", scenario.parameters, i, seed)
+        agent.b = own_parameters(scenario, "body", scenario.body, i, seed)
+    due, here = begins(scenario, seed), 0
+    may_leave = any(entry.fault.leaves for entry in scenario.faults if entry.fault in scenario.fault_kinds)
     count = times["steps"] // times["sample_every"] + 1
     frames = np.zeros((count, 3 * dims, scenario.agents))
     chosen = scenario.order_parameters if metrics is None else metrics
@@ -77,40 +90,74 @@ def fly_plainly(
     at_start, gust = states(flock), ZERO
     past: dict[int, list[State]] = {}  # by the number of the decision that hears them
     for step in range(times["steps"] + 1):
-        course.advance(step * dt, dt, states(flock))
-        place.appear(step * dt, states(flock))
+        if befall(scenario, step, flock, due):
+            solve = of_model(scenario)
+        there = [i for i, agent in enumerate(flock) if agent.present]
+        here += len(there)
+        if not there:
+            if step % times["sample_every"] == 0:
+                frames[step // times["sample_every"]] = components(flock, dims)
+            continue
+        count = len(there) >= min(2, len(flock))
+        course.advance(step * dt, dt, states(flock, None if scenario.goals.kind == "own" else there))
+        place.appear(step * dt, states(flock, there))
         if (step + delay) % every == 0:
             past[(step + delay) // every] = states(flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
-            shared = solve(states(flock)) if solve else None
+            shared = dict(zip(there, solve(states(flock, there)), strict=True)) if solve else None
             past_now = past.pop(number, at_start)
             decisions(scenario, seed, (place, course), flock, number, past_now, step * dt, shared=shared)
         if step % times["collide_every"] == 0:
-            events = scores.look("collision", states(flock), step * dt).get("n_coll", 0.0)
-            if events > 0.5 and scenario.metrics.stop == "collision":
+            seen = scores.look("collision", states(flock, there), step * dt, who=there, count=count)
+            if seen.get("n_coll", 0.0) > 0.5 and scenario.metrics.stop == "collision":
                 frames = frames[: -(-step // times["sample_every"])]
                 break
         if step % times["sample_every"] == 0:
-            scores.look("sample", states(flock), step * dt, [agent.rays for agent in flock])
+            rays = [flock[i].rays for i in there]
+            scores.look("sample", states(flock, there), step * dt, rays, who=there, count=count)
             frames[step // times["sample_every"]] = components(flock, dims)
         if step < times["steps"]:
             gust = blow(scenario, seed, step, gust)
-            for i, agent in enumerate(flock):
+            for i in there:
+                agent = flock[i]
                 if scenario.flight.update == "sequential":
                     decisions(scenario, seed, (place, course), flock, step, states(flock), step * dt, [i])
                 advance(scenario, seed, step, i, agent, gust, place)
-    return Flown(scores.totals() | course.values(), frames, components(flock, dims)[: 2 * dims], 0)
+    told = {"present": here / ((step + 1) * len(flock))} if may_leave else {}
+    return Flown(scores.totals() | course.values() | told, frames, components(flock, dims)[: 2 * dims], 0)
 
 
-def states(flock: Sequence[Agent]) -> list[State]:
-    """True states of all agents."""
-    return [agent.state for agent in flock]
+def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
+    """Let begin what is due; whether somebody dropped out."""
+    left = False
+    for number, entry, lasts, leaves in due.get(step, ()):
+        agent = flock[number]
+        if not agent.present:
+            continue
+        if leaves:
+            agent.present, left = False, True
+            continue
+        known = {f"at_{name}": value for name, value in agent.state._asdict().items()}
+        known |= dict(zip(("at_cx", "at_cy", "at_cz"), agent.command, strict=True))
+        dt = scenario.flight.dt
+        agent.faults[entry.fault.name] = Suffering(entry.fault, entry.numbers, step * dt, lasts, known, 0.5 * dt)
+        order = [kind.name for kind in scenario.fault_kinds]  # a later kind disturbs what an earlier one has left
+        agent.faults = dict(sorted(agent.faults.items(), key=lambda item: order.index(item[0])))
+    return left
+
+
+def states(flock: Sequence[Agent], who: Sequence[int] | None = None) -> list[State]:
+    """True states of all agents, or of some."""
+    return [agent.state for agent in flock] if who is None else [flock[i].state for i in who]
 
 
 def components(flock: Sequence[Agent], dims: int) -> NDArray[np.float64]:
     """Position, velocity and command, (component, agent), only the axes that are flown."""
-    rows = [(*a.state[:dims], *a.state[3 : 3 + dims], *a.command[:dims]) for a in flock]
+    rows = [
+        (*a.state[:dims], *a.state[3 : 3 + dims], *a.command[:dims]) if a.present else (np.nan,) * (3 * dims)
+        for a in flock
+    ]
     return np.array(rows).T
 
 
@@ -131,22 +178,31 @@ def decisions(
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent)
     period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
-    said = [plus(state, agent.sent) for state, agent in zip(past, flock, strict=True)]
-    for i in range(len(flock)) if turn is None else turn:
+    sent = number * period - clock(scenario)["delay"] * scenario.flight.dt
+    said = [
+        misled(agent, ("sense", "tell"), sent, plus(state, agent.sent), scenario.dimensions)
+        for state, agent in zip(past, flock, strict=True)
+    ]
+    for i in [k for k, agent in enumerate(flock) if agent.present] if turn is None else turn:
         agent = flock[i]
-        own = plus(agent.state, agent.own)
+        own = misled(agent, ("sense",), time, plus(agent.state, agent.own), scenario.dimensions)
         heard = [
             Heard(h.who, place.beside(own, h.state), h.age)
             for h in hear(scenario, seed, number, i, flock, said, time, place)
         ]
+        rule = scenario.model.wall_reach
+        place.look = place.look if rule is None else answer(rule, "wall_reach", {"p": agent.p})
         senses = Senses.of(place, course, own, time, seed, number, i)
         made = decide(
-            scenario.model, scenario.parameters, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
+            scenario.model, agent.p, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
             time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
             aero=scenario.aero,
         )  # fmt: skip
         agent.rays = float(senses.rays)
         x, y, z = made.command
+        for suffering in agent.faults.values():
+            stuck = suffering.asked("overrule", time, cx=x, cy=y, cz=z)
+            x, y, z = (x, y, z) if stuck is None else stuck
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
         agent.memory = made.memory
 
@@ -173,23 +229,27 @@ def hear(
     k, late = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt
     found = []
     for j, other in enumerate(flock):
-        if j == i:
+        if j == i or not other.present:
             continue
         own, true = flock[i].state, place.beside(flock[i].state, other.state)
         distance = norm(true.x - own.x, true.y - own.y, true.z - own.z)
         in_range = distance <= norm(min(k.range, LIMIT), 0.0, 0.0)  # at exactly the range it is heard
+        reach = min(k.range, LIMIT)
+        carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
+        carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
+        mine, theirs = ahead(flock[i], time), ahead(other, time)
         pair = i * len(flock) + j
         arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
             distance, k
         )
         if k.kind == "constant":
-            if arrives and in_range:
-                found.append(Heard(j, said[j], late))
+            if arrives and in_range and carries:
+                found.append(Heard(j, said[j], late + mine - theirs))
             continue
-        if arrives and in_range and linked(scenario, seed, number, pair, distance):
-            flock[i].packets[j] = (said[j], time - late)
+        if arrives and in_range and carries and linked(scenario, seed, number, pair, distance):
+            flock[i].packets[j] = (said[j], time - late + theirs)
         if in_range and j in flock[i].packets:
-            found.append(extrapolated(j, *flock[i].packets[j], time))
+            found.append(extrapolated(j, *flock[i].packets[j], time + mine))
     return found
 
 
@@ -259,10 +319,13 @@ def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust
     moved = answer(
         body.move,
         "move",
-        given | {"dt": dt, "b": scenario.body, "memory": agent.kept, "wing": scenario.wing},
+        given | {"dt": dt, "b": agent.b, "memory": agent.kept, "wing": scenario.wing},
         body.name,
     )
     velocity, agent.kept = (*moved[:2], moved[2] if three else 0.0), moved[3] if body.Memory else None
+    for suffering in agent.faults.values():
+        told = {f"n{axis}": velocity[c] for c, axis in enumerate("xyz")} | {"dt": dt}
+        velocity = suffering.asked("motion", step * dt, **{k: given[k] for k in MOVING}, **told) or velocity
     integration = choices(scenario.body).get("integration", body.integration)
     vx, vy, vz = s[3:] if integration == "old" else velocity
     agent.state = place.settled(State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity))

@@ -36,31 +36,40 @@ class Scores:
         self.dimensions = float(dimensions)
         self.metrics = tuple(metrics)
         self.q = q
-        self.before: Sequence[State] = ()
+        self.before: dict[int, State] = {}
+        self.who: Sequence[int] = ()
         self.rays: Sequence[float] = ()
-        self.memories: dict[str, list[Record]] = {}
+        self.memories: dict[str, dict[int, Record]] = {}
         self.sums = {
             name: START[how if how in ("min", "max") else "sum"] for m in self.metrics for name, how in _over_time(m)
         }
         self.counts = {"sample": 0, "collision": 0}
 
-    def look(self, clock: str, flock: Sequence[State], time: float, rays: Sequence[float] = ()) -> dict[str, float]:
+    def look(
+        self, clock: str, flock: Sequence[State], time: float, rays: Sequence[float] = (), *,
+        who: Sequence[int] | None = None, count: bool = True,
+    ) -> dict[str, float]:  # fmt: skip
         """Measure the flock now by the metrics of one clock, add to the sums, and return the values.
 
         time : since the start, s; rays : cast by each agent at its last decision
+        who : numbers of those who are there, by default all; count : whether this instant counts
         """
         values: dict[str, float] = {}
-        self.counts[clock] += 1
+        self.counts[clock] += count
+        who = range(len(flock)) if who is None else who
+        if list(who) != list(self.who):
+            self.surveys, self.who = {}, who
         self.time, self.rays = time, rays or [0.0] * len(flock)
         for metric in self.metrics:
             if metric.clock != clock:
                 continue
             sample = self._sample(metric, flock)
             for (name, how), value in zip(_over_time(metric), sample, strict=True):
-                self.sums[name] = combined("sum" if how == "mean" else how, self.sums[name], value)
+                if count:
+                    self.sums[name] = combined("sum" if how == "mean" else how, self.sums[name], value)
                 values[name] = value
         if clock == "collision":
-            self.before = list(flock)
+            self.before = dict(zip(who, flock, strict=True))
         return values
 
     def totals(self) -> dict[str, float]:
@@ -85,7 +94,7 @@ class Scores:
 
     def _agents(self, metric: Metric, rule: Callable[..., Any], flock: Sequence[State], mean: Mean) -> Record:
         if metric.Memory is not None:
-            self.memories.setdefault(metric.name, [metric.Memory()] * len(flock))
+            self.memories.setdefault(metric.name, {})
         if metric.name not in self.surveys:
             self.surveys[metric.name] = of_metric(metric, len(flock), self.q, self.wing)
         survey = self.surveys[metric.name]
@@ -109,8 +118,9 @@ class Scores:
             if metric.Memory is None:
                 terms.append(answer(rule, "agent", given, metric.name))
             else:
-                given["memory"] = self.memories[metric.name][i]
-                term, self.memories[metric.name][i] = answer(rule, "agent", given, metric.name)
+                memories, number = self.memories[metric.name], self.who[i]
+                given["memory"] = memories.get(number, metric.Memory())
+                term, memories[number] = answer(rule, "agent", given, metric.name)
                 terms.append(term)
         assert metric.Agent is not None
         return reduced(metric.Agent, metric.reduce, terms)
@@ -118,7 +128,7 @@ class Scores:
     def _touches(self, metric: Metric, state: State, i: int) -> float:
         if metric.clock != "collision":
             return 0.0
-        return self.place.touches(self.before[i] if self.before else state, state, self.q.r_body)
+        return self.place.touches(self.before.get(self.who[i], state), state, self.q.r_body)
 
     def _pairs(self, metric: Metric, flock: Sequence[State], i: int) -> Record:
         if metric.pair is None:

@@ -34,6 +34,8 @@ def packed(tmp_path):
     for section in ("body", "metrics"):
         text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
         (tmp_path / f"{section}.toml").write_text(text)
+    text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
+    (tmp_path / "faults.toml").write_text(text)
     (tmp_path / "extended.toml").write_text('extends = "evil.toml"\nagents = 4\n')
     version = f'[flown]\nairflock = "{airflock.__version__}"\nprecision = 32\ndevice = "cpu"\nrules = "0"\n'
     text = 'seal = ""\nformat = 1\nconfidence = 0.95\nlimit = []\n[flights]\ncount = 1\nlooks = ""\nuncertain = false\n'
@@ -109,6 +111,14 @@ WAYS = {
     ),
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
+    "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),
+    "fault of an event": (
+        python(
+            'airflock.open("vasarhelyi_2018/4ms", events=[{"step": 0, "kind": "fault", '
+            '"data": {"kind": str(Path("evil.py").absolute())}}]).advance(0.1)'
+        ),
+        CONSENT,
+    ),
     "scenario that extends another": (python('airflock.load("extended.toml")'), CONSENT),
     "open": (python('airflock.open("evil.toml")'), CONSENT),
     "event of a flight": (

@@ -47,7 +47,7 @@ def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
     flown_by(monkeypatch, score)
     steps = harden.harden(load("vasarhelyi_2018/6ms"), range(20))
     assert steps[1].cost == pytest.approx((-0.035,) * 3) and steps[1].gain == pytest.approx((0.07,) * 3)
-    assert [step.kept for step in steps] == [True, True, False, False, False, True]
+    assert [step.kept for step in steps] == [True, True, False, False, True]  # c_frict again would be the same
     assert (
         steps[-1].verdict == "kept: p_rep up" and steps[2].verdict == "undone: gains neither distance nor room at walls"
     )
@@ -91,6 +91,20 @@ def test_walls_come_first_where_they_are_what_is_short(monkeypatch):
 
     flown_by(monkeypatch, score)
     assert "v_shill" in harden.harden(load("vasarhelyi_2018/6ms"), range(5))[1].name
+
+
+def test_agents_brake_earlier_where_they_touch_walls_and_that_helps(monkeypatch):
+    """Every flight touches a wall by the chance of its seed, unless agents brake 5 m earlier (0.5 s twice at 6 m/s)."""
+
+    def score(p, chance):
+        wall = max(0.0, 0.1 - 0.02 * p.r0_shill + 0.01 * chance)
+        return {"fitness": 0.9, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.99, "phi_wall": wall, "f_coll": 1.0}
+
+    flown_by(monkeypatch, score)
+    found = harden.harden(load("vasarhelyi_2018/6ms", {"model.r0_shill": 0.0}), range(20))
+    kept = [step.name for step in found[1:-1] if step.kept]
+    assert kept[0] == "v_shill down, r0_shill up" and "r0_shill up" in kept
+    assert found[0].contacts == 1.0 and found[-1].contacts < 0.1
 
 
 def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):

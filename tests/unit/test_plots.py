@@ -343,6 +343,13 @@ def test_pictures_in_space_project_parallel():
     assert np.allclose([view.right @ view.up, view.right @ view.right, view.up @ view.up], [0.0, 1.0, 1.0])
     stage = Stage(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
     assert stage.picture(1.0).shape == (stage.size[1], stage.size[0], 4)
+    flat = Stage(flight(document=SQUARE), None, None, tail=2.0, height=120, speed=1.0, space=True)
+    flat.picture(12.0)
+    corners = np.array([path.vertices[:4] for path in flat.darts.get_paths()])
+    angle = 12.0 * PACE / RADIUS + np.arange(3) * 2.0 * math.pi / 3.0
+    ring = RADIUS * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(3)])
+    centre = corners[:, 0] + (corners[:, 2] - corners[:, 0]) * (0.6 / 0.82)
+    assert np.allclose(centre, np.column_stack(view(ring)), atol=0.05)
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])

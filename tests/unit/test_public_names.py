@@ -16,7 +16,8 @@ PACKAGES = {"plots"}
 CLASSES = ["AirflockError", "Scenario", "Flight", "Parameters"]
 HOMES = {
     "evolve": "airflock.evolve.run", "certify": "airflock.certify.run", "display": "airflock.display.displays",
-    "identify": "airflock.identify.run", "infer": "airflock.infer.run", "body": "airflock.core.contract",
+    "tune": "airflock.tune.run", "identify": "airflock.identify.run", "infer": "airflock.infer.run",
+    "body": "airflock.core.contract",
 }  # fmt: skip
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__", *CLASSES})
 DOCUMENTED = [*FUNCTIONS, *CLASSES]

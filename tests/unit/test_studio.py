@@ -356,13 +356,17 @@ def test_a_goal_is_moved_and_the_others_stay():
 
 
 def test_what_an_agent_perceives_is_drawn_where_it_is():
-    player = Player("vasarhelyi_2018/real_4ms", FEW, 3)
+    player = Player("vasarhelyi_2018/real_4ms", {**FEW, "model.r0_rep": 50.0}, 3)
     player.fly(400)
-    drawn = Perceiving().of(player.side, 2, 1.0, 6.0)
-    seen = player.flight.look(2)
+    seen = next(seen for seen in map(player.flight.look, range(12)) if len({any(term) for term in seen.terms}) == 2)
+    drawn = Perceiving().of(player.side, seen.agent, 1.0, 6.0)
     heard, _ = drawn.lines["heard"]
+    near = [other for other, term in zip(seen.heard, seen.terms, strict=True) if any(term)]
+    assert 0 < len(near) < len(seen.heard) and f"notices {len(near)}" in drawn.words
     np.testing.assert_allclose(heard[:, 0], np.broadcast_to(seen.true[:3], heard[:, 0].shape))
-    np.testing.assert_allclose(heard[:, 1], [other.state[:3] for other in seen.heard])
+    np.testing.assert_allclose(heard[:, 1], [other.state[:3] for other in near])
+    crossed = drawn.lines["ghosts"][0].reshape(-1, 4, 3).mean(axis=1)
+    np.testing.assert_allclose(crossed, [other.state[:3] for other in seen.heard], atol=1e-6)
     believed = drawn.lines["measured"][0].reshape(-1, 3).mean(axis=0)
     np.testing.assert_allclose(believed, seen.own[:3])
     shaft = drawn.lines["command"][0][0]

@@ -8,7 +8,8 @@ from typing import get_type_hints
 import pytest
 
 import airflock
-from airflock.checking.annotations import RECORDS, SPECIAL, typed_copy
+from airflock.checking.annotations import typed_copy
+from airflock.checking.rule_types import RECORDS, SPECIAL
 from airflock.checking.types import PACKAGE, check_types, scalar, shipped
 from airflock.core.vocabulary import VOCABULARY
 from airflock.errors import RuleError

@@ -1,8 +1,12 @@
 """A wrong command line ends with one line in the words of every other fault, and with status 2."""
 
+import re
+
 import pytest
+from typer.main import get_command
 
 from airflock.cli.main import app, main
+from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
 
 
@@ -51,3 +55,22 @@ def test_what_is_right_ends_well(words, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 0 and capsys.readouterr().out
+
+
+def test_notes_of_a_sweep_that_differ_in_numbers_alone_are_one_line():
+    notes = ["delay = 0.1 s is odd", "no walls", "delay = 0.25 s is odd", "delay = 1e-05 s is odd", "delay = x is odd"]
+    assert list(alike(notes)) == ["delay = 0.1 s is odd (2 more like it)", "no walls", "delay = x is odd"]
+
+
+def texts(command, path=()):
+    """Every help text of a command and of what is below it, with where it stands."""
+    yield (*path, "help"), command.help or ""
+    for parameter in command.params:
+        yield (*path, parameter.name), getattr(parameter, "help", None) or ""
+    for name, below in getattr(command, "commands", {}).items():
+        yield from texts(below, (*path, name))
+
+
+def test_no_square_bracket_of_a_help_is_taken_for_markup():
+    found = {where: re.findall(r"(?<!\\)\[(?!/?bold\])[^\]]*\]", text) for where, text in texts(get_command(app))}
+    assert {where: brackets for where, brackets in found.items() if brackets} == {}

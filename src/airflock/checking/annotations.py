@@ -12,50 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from airflock.checking.rule_types import KNOWN, MEASURES, RECORDS, RESULTS, SPECIAL, kinds_of
 from airflock.core.vocabulary import VOCABULARY
-
-LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
-LAW_NUMBERS = ("preferred_speed", "interaction_range")
-MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
-COLUMNS = "MutableSequence[float]"
-
-# (module, name) behind the words that a rule file need not define itself
-KNOWN = {
-    "Own": ("airflock.core.vocabulary", "Own"),
-    "Percept": ("airflock.core.vocabulary", "Percept"),
-    "Mean": ("airflock.core.vocabulary", "Mean"),
-    "Wing": ("airflock.aero.wing", "Parameters"),
-    "Descent": ("airflock.aero.descent", "Parameters"),
-    "Measured": ("airflock.metrics.parameters", "Parameters"),
-    "Any": ("typing", "Any"),
-    "Literal": ("typing", "Literal"),
-    "Mapping": ("collections.abc", "Mapping"),
-    "MutableSequence": ("collections.abc", "MutableSequence"),
-}
-# names of the contract that are no numbers, wherever they stand
-RECORDS = {
-    "own": "Own", "percept": "Percept", "sums": "Sums", "walls": "Walls", "memory": "Memory", "shared": "Shared",
-    "pair": "Pair", "agents": "Agent", "members": "Member", "clusters": "Cluster", "mean": "Mean", "wing": "Wing",
-    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters",
-}  # fmt: skip
-OF_FLOCK = {
-    **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
-}  # fmt: skip
-# where a word means something else than in the other kinds
-SPECIAL = {
-    "flock": OF_FLOCK,
-    "survey": OF_FLOCK,
-    "workspace": {"n": "int"},
-    "fitness": {"values": "Mapping[str, float]", "agents": "int"},
-    "faults": {"edges": "str"},
-}
-VECTOR = "tuple[float, float, float]"
-RESULTS = {
-    **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
-    "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
-    "pair": "Pair", "linked": "bool", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
-    "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -90,7 +48,7 @@ def typed_copy(text: str, scalar: bool = False) -> TypedCopy:
     tree = ast.parse(text)
     names = _Names(tree)
     functions = [item for item in tree.body if isinstance(item, ast.FunctionDef)]
-    kinds = _kinds({item.name for item in functions})
+    kinds = kinds_of({item.name for item in functions})
     handed = _handed_on(functions)
     insertions = [change for item in tree.body if isinstance(item, ast.ClassDef) for change in _fields(item, names)]
     ends = _ends(text, functions)
@@ -162,18 +120,6 @@ class _Names:
             if word in kind:
                 kind = kind.replace(word, self.known(word))
         return kind
-
-
-def _kinds(functions: set[str]) -> dict[str, str]:
-    """Name of a function → its kind; a helper has none."""
-    kinds: dict[str, str] = {}
-    if "decide" in functions:
-        kinds |= {name: name for name in (*LAW, *LAW_NUMBERS, "workspace")}
-    if "move" in functions:
-        kinds |= {"move": "move", "limits": "limits"}
-    if "sample" in functions or "fitness" in functions:
-        kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
-    return {name: kind for name, kind in kinds.items() if name in functions}
 
 
 def _handed_on(functions: list[ast.FunctionDef]) -> set[tuple[str, str]]:

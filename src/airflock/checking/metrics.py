@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.checking.report import Report, reported
-from airflock.checking.scenes import turn_about_vertical
+from airflock.checking.report import Report, Truths, accepted, reported
+from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.units import OTHERS, Units, factor, rescaled, rescaled_scenario
 from airflock.core.contract import Metric, MetricSet
 from airflock.engine import law
 from airflock.engine.cpu import measure_frames
 from airflock.engine.simulate import plan_of
 from airflock.engine.tables import tables
-from airflock.errors import ScenarioError
 from airflock.metrics.registry import as_set
 from airflock.scenarios import checks
 from airflock.scenarios.files import make
@@ -61,24 +60,23 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     >>> airflock.check_metric("order").broken
     ()
     """
-    found = _named(what) if isinstance(what, str) else as_set(what)
+    found = accepted(checks.metrics_set({"kind": what}, trust=True)) if isinstance(what, str) else as_set(what)
     scenario = _scenario(found, dimensions)
     rng = np.random.default_rng(seed)
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
     turn = turn_about_vertical(rng.uniform(0.5, 2.5))
-    flip = np.diag([1.0, -1.0, 1.0])
     order = rng.permutation(AGENTS)
     shift = np.array([37.0, -19.0, 8.0 * (dimensions == 3), 0.0, 0.0, 0.0])
 
     def same(change: Callable[[Flock], Flock]) -> Callable[[], str]:
         return lambda: _same(scenario, flocks, [change(flock) for flock in flocks], seed)
 
-    truths: dict[str, tuple[str, Callable[[], str]]] = {
+    truths: Truths = {
         "rules": ("no rule holds what a compiler refuses", lambda: _rules(scenario.order_parameters)),
         "reports": ("every value that comes out has a unit and a meaning", lambda: _reports(scenario, flocks[0])),
         "rotation": ("a flock turned about the vertical keeps its values", same(lambda flock: _turned(flock, turn))),
         "translation": ("a flock shifted in space keeps its values", same(lambda flock: flock + shift)),
-        "mirror": ("a flock seen in a mirror keeps its values", same(lambda flock: _turned(flock, flip))),
+        "mirror": ("a flock seen in a mirror keeps its values", same(lambda flock: _turned(flock, MIRROR))),
         "renumbering": ("other numbers of the agents keep the values", same(lambda flock: flock[:, order])),
         "lone agent": ("one agent alone gives numbers", lambda: _numbers(scenario, flocks[0][:, :1])),
         "two agents": ("two agents in one place give numbers", lambda: _numbers(scenario, flocks[0][:, [0, 0]])),
@@ -86,13 +84,6 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     }
     violates = {key: why for metric in found.metrics for key, why in metric.violates.items()}
     return reported(f"metrics {found.name}", truths, violates | dict(found.violates))
-
-
-def _named(name: str) -> MetricSet:
-    found, faults = checks.metrics_set({"kind": name}, trust=True)
-    if faults:
-        raise ScenarioError(faults)
-    return found
 
 
 def _scenario(found: MetricSet, dimensions: int) -> Scenario:

@@ -1,15 +1,16 @@
 """The standing list for a flocking law: symmetries, a lone agent, two agents, time step, units, single precision."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.checking.report import Report, reported
+from airflock.checking.report import Report, Truths, reported
 from airflock.checking.scenes import (
     AGENTS,
+    MIRROR,
     Law,
     Scene,
     Turn,
@@ -86,8 +87,7 @@ def check_model(
     rng = np.random.default_rng(seed)
     scenes = [made.scene(rng) for _ in range(SCENES)]
     turns = [turn_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
-    flip = np.diag([1.0, -1.0, 1.0])
-    truths: dict[str, tuple[str, Callable[[], str]]] = {
+    truths: Truths = {
         "rotation": (
             "a scene turned about the vertical turns the command",
             lambda: _same(made, scenes, [turned(s, t) for s, t in zip(scenes, turns, strict=True)], turns, seed),
@@ -98,7 +98,7 @@ def check_model(
         ),
         "mirror": (
             "a scene seen in a mirror mirrors the command",
-            lambda: _same(made, scenes, [turned(s, flip) for s in scenes], [flip] * SCENES, seed),
+            lambda: _same(made, scenes, [turned(s, MIRROR) for s in scenes], [MIRROR] * SCENES, seed),
         ),
         "renumbering": ("other numbers of the agents leave the command", lambda: _renumbered(made, scenes, rng, seed)),
         "lone agent": ("alone, an agent flies straight on at its preferred speed", lambda: _alone(made, rng)),

@@ -2,8 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
-from airflock.errors import AirflockError, RuleError
+from airflock.errors import AirflockError, RuleError, ScenarioError
+
+# name → what it says, and a check that returns what is wrong, empty if nothing is
+Truths = dict[str, tuple[str, Callable[[], str]]]
+Found = TypeVar("Found")
 
 
 class CheckError(AirflockError, AssertionError):
@@ -50,10 +55,17 @@ class Report:
         return tuple(truth.name for truth in self.truths if truth.fault)
 
 
-def reported(name: str, truths: Mapping[str, tuple[str, Callable[[], str]]], violates: Mapping[str, str]) -> Report:
+def accepted(found: tuple[Found, list[str]]) -> Found:
+    """What was found, of it and its faults; raises a ScenarioError if there are any."""
+    what, faults = found
+    if faults:
+        raise ScenarioError(faults)
+    return what
+
+
+def reported(name: str, truths: Truths, violates: Mapping[str, str]) -> Report:
     """Run all truths and report them; raises CheckError where one breaks that is not declared.
 
-    truths   : name → what it says, and a check that returns what is wrong, empty if nothing is
     violates : name → why a truth does not hold here. One that no list knows is an error, so that none is misspelled.
     """
     unknown = sorted(set(violates) - set(truths))

@@ -18,6 +18,7 @@ from airflock.scenarios.scenario import Scenario
 
 AGENTS = 4  # in a flight
 Turn = NDArray[np.float64]
+MIRROR: Turn = np.diag([1.0, -1.0, 1.0])
 
 
 class Walls(Percept):

@@ -76,6 +76,13 @@ COUNTERPARTS: dict[str, Counterpart] = {
             },
         },
     ),
+    "tune": Counterpart(
+        'airflock.tune("mine.toml", "tuned")', "tune",
+        {
+            "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
+            **{name: name for name in ("budget", "limit", "confidence", "resume", "threads", "trust")},
+        },
+    ),
     "plot": Counterpart(
         'airflock.plot("flight.nc", "series")', "plot",
         {
@@ -161,7 +168,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
-        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads", **TABLE},
+        {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
+         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",
@@ -176,6 +184,6 @@ COUNTERPARTS: dict[str, Counterpart] = {
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (
-    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body",
+    "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "metric", "metric_set", "check_model", "check_body", "check_metric", "quantity", "choice",
 )  # fmt: skip

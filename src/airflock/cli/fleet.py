@@ -20,7 +20,9 @@ def fleet(
     agents: options.Agents = None,
     duration: options.Duration = None,
     vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
-    faults: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="What goes wrong: tables [[fault]].")] = None,
+    faults: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help=r"What goes wrong: tables \[\[fault]].")
+    ] = None,
     against: Annotated[
         str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
     ] = None,

@@ -61,7 +61,7 @@ def harden(
         with options.searching(study, quiet=as_json) as (watch, note):
             steps = evolved_again(found, study, settings, folder, numbers, threads, watch, note)
     else:
-        with options.progress(f"{scenario}: flights", 11 * seeds, quiet=as_json) as done:  # at most
+        with options.progress(f"{scenario}: flights", 15 * seeds, quiet=as_json) as done:  # at most
             steps = harden(found, numbers, cost=cost, threads=threads, done=done)
     write(out, document(found, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:

@@ -79,9 +79,9 @@ def import_tracks(
     precision: options.Precision = 32,
     as_json: options.Json = False,
 ) -> None:
-    """Turn flight logs and animal tracks into a recording that every other verb takes.
+    r"""Turn flight logs and animal tracks into a recording that every other verb takes.
 
-    Columns are recognised by their headers (x [mm], time_us, vel_e, location-lat, ...), or mapped. Positions, signs,
+    Columns are recognised by their headers (x \[mm], time_us, vel_e, location-lat, ...), or mapped. Positions, signs,
     units, clocks, duplicates, jumps and gaps are checked; each fault is one line that says what to write instead.
 
     Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map id:=file --same-clock

@@ -6,7 +6,7 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 import typer
@@ -29,6 +29,7 @@ from airflock.cli import (
     paper,
     run,
     sweep,
+    tune,
     types,
     watch,
 )
@@ -86,29 +87,31 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-app.command("run")(run.run)
-app.command("score")(run.score)
-app.command("watch")(watch.watch)
-app.command("sweep")(sweep.sweep)
-app.command("evolve")(evolve.evolve)
-app.command("harden")(harden.harden)
-app.command("certify")(certify.certify)
-app.command("import")(imports.import_tracks)
-app.command("export")(imports.export)
-app.command("identify")(identify.identify)
-app.command("infer")(infer.infer)
-app.command("plot")(look.plot)
-app.command("video")(look.video)
-app.command("replay")(look.replay)
-app.command("display")(display.display)
-app.command("fleet")(fleet.fleet)
-app.add_typer(fly.app, name="fly")
-app.command("paper")(paper.paper)
-app.command("presets")(inspect.presets)
-app.command("keys")(keys.keys)
-app.command("validate")(inspect.validate)
-app.command("types")(types.types)
-app.command("doctor")(inspect.doctor)
+PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
+    "Fly, measure, look": {
+        "run": run.run, "watch": watch.watch, "plot": look.plot, "video": look.video, "replay": look.replay,
+        "score": run.score, "sweep": sweep.sweep, "display": display.display,
+    },
+    "Search and make safe": {
+        "evolve": evolve.evolve, "harden": harden.harden, "certify": certify.certify,
+        "tune": tune.tune,
+    },
+    "Recordings of others": {
+        "import": imports.import_tracks, "identify": identify.identify, "infer": infer.infer,
+        "export": imports.export,
+    },
+    "Towards real drones": {"fleet": fleet.fleet, "fly": fly.app},
+    "Look something up": {
+        "presets": inspect.presets, "keys": keys.keys, "validate": inspect.validate, "types": types.types,
+        "paper": paper.paper, "doctor": inspect.doctor,
+    },
+}  # fmt: skip
+for _panel, _verbs in PANELS.items():
+    for _name, _verb in _verbs.items():
+        if isinstance(_verb, typer.Typer):
+            app.add_typer(_verb, name=_name, rich_help_panel=_panel)
+        else:
+            app.command(_name, rich_help_panel=_panel)(_verb)
 
 
 def _version(asked: bool) -> None:

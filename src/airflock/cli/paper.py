@@ -1,5 +1,6 @@
 """Verb paper: recompute what a publication reports."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -8,19 +9,33 @@ from airflock.cli import options, tables
 
 
 def paper(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018; or all.")],
     only: Annotated[
         str | None, typer.Option(help="One part only, for instance s2 or fig1.", show_default="all")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A coarse form with few seeds.")] = False,
     seeds: Annotated[int | None, typer.Option(min=2, help="Flights per number.", show_default="the paper's")] = None,
+    breaks: Annotated[
+        bool, typer.Option(help="Make the change that must turn each claim red, and judge it again.")
+    ] = False,
+    keep: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Of all: where what is done is kept.", show_default="the cache")
+    ] = None,
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
     """Recompute a paper's numbers and figures; print each claim with its verdict.
 
+    `all --quick` flies the small form of every paper and fails if a verdict is not the committed one.
+
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
+    if name == "all":
+        _all(quick, keep, threads, as_json, {"--only": only, "--seeds": seeds, "--breaks": breaks})
+        return
+    if breaks:
+        _breaks(name, only, seeds, threads, as_json)
+        return
     from airflock.papers.recompute import paper as recompute
 
     claims = recompute(name, only=only, quick=quick, seeds=seeds, threads=threads)
@@ -30,3 +45,45 @@ def paper(
     from airflock.papers.claims import print_claims
 
     print_claims(claims)
+
+
+def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]) -> None:
+    """Every paper in its small form, against the committed verdicts."""
+    from airflock.engine.store import cache_folder
+    from airflock.errors import AirflockError
+    from airflock.papers import quick as tier
+
+    wrong = [option for option, given in others.items() if given]
+    if wrong or not quick:
+        told = f"{', '.join(wrong)} is of one paper; name it" if wrong else "takes days; add --quick, or name one paper"
+        raise AirflockError(f"all: {told}")
+    before = tier.committed()
+    rows = tier.fly(keep or cache_folder() / "papers" / "quick", tables.say, threads)
+    changed = tier.changed(before, rows)
+    if as_json:
+        tables.emit_json({"claims": [row._asdict() for row in rows], "changed": [row._asdict() for row in changed]})
+    else:
+        for row in changed:
+            typer.echo(f"{row.paper} {row.id}: {row.committed or 'not committed'} is now {row.found or 'not flown'}")
+        typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
+    if changed:
+        raise typer.Exit(1)
+
+
+def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
+    """Each claim under the change that must break it."""
+    from airflock.papers import breaks
+    from airflock.papers.recompute import known
+
+    rows = breaks.fly(known(name), only=only, seeds=seeds, threads=threads)
+    if as_json:
+        tables.emit_json([row._asdict() for row in rows])
+    else:
+        for row in rows:
+            typer.echo(f"{row.id}: {row.result} with {row.change} ({row.ours:.4g}, then {row.changed:.4g})")
+        count = {
+            result: sum(row.result == result for row in rows) for result in (breaks.RED, breaks.GREEN, breaks.UNSHOWN)
+        }
+        typer.echo(", ".join(f"{number} {result}" for result, number in count.items()))
+    if any(row.result == breaks.GREEN for row in rows):
+        raise typer.Exit(1)

@@ -115,10 +115,11 @@ def score(
 def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]
     """Measure recordings, of which the first is being opened, and write or print what was asked for."""
     from airflock.metrics.registry import reports
+    from airflock.recordings.attributes import faults, told_faults
     from airflock.recordings.files import load_recording
     from airflock.recordings.scores import aero_settings, measure, scenario_of
 
-    rows, courses = [], []
+    rows, courses, befell = [], [], []
     about: dict[str, tuple[str, str]] = {}
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
@@ -127,6 +128,7 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
         about |= reports(scenario_of(recording, settings).measures)
         rows.append(values)
         courses.append(course.assign(file=str(path)))
+        befell.append(faults(recording))
     if series is not None:
         import io
 
@@ -139,7 +141,11 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
         atomic.write(series, text.getvalue())
         tables.say(f"saved {series}")
     if as_json:
-        runs = [{"file": str(path), **row} for path, row in zip(files, rows, strict=True)]
+        told = [{"faults": found} if found else {} for found in befell]
+        runs = [{"file": str(path), **row, **more} for path, row, more in zip(files, rows, told, strict=True)]
         tables.emit_json({"runs": runs, **tables.statistics(rows)})
         return
     tables.score_table(", ".join(map(str, files)), rows, {}, about)
+    for path, found in zip(files, befell, strict=True):
+        if found:
+            tables.say(f"{path}: {told_faults(found)}")

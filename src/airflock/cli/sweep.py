@@ -1,7 +1,8 @@
 """Verb sweep: order parameters over ranges of any keys."""
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,16 +50,36 @@ def sweep(
 
     Example: airflock sweep vasarhelyi_2018/32ms --over radio.delay=0:2:5 --over radio.range=80,160,320 --plot map.png
     """
-    from airflock.recordings.sweeps import flown, grid, scenarios_at, shown
+    from airflock.recordings.sweeps import flown
     from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
     with options.gathering(faults):
         options.writable((table, TABLES), (plot, PICTURES))
     fixed: dict[str, Any] = {}
-    axes, scenarios = [], []
     with options.gathering(faults):
         fixed = options.settings(changes, agents, duration)
+    keys, points = _grid(over, plot, faults)
+    scenarios, show = _planned(scenario, points, fixed, law, trust, show, faults)
+    for note in alike(dict.fromkeys(note for found in scenarios for note in found.notes)):
+        tables.say(f"note: {note}")
+    numbers = sound_seeds(range(first_seed, first_seed + seeds))
+    options.compile_aloud(scenarios[0], precision, device)
+    with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
+        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
+        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say)
+    _keep(tidy, keys, show, scenarios[0], table, plot)
+    if as_json:
+        tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
+    else:
+        _print(tidy, keys, show)
+
+
+def _grid(over: list[str], plot: Path | None, faults: list[str]) -> tuple[list[str], list[dict[str, Any]]]:
+    """Keys that are swept and every point of their grid; what is wrong is added to the faults."""
+    from airflock.recordings.sweeps import grid
+
+    axes = []
     for text in over:
         with options.gathering(faults):
             axes.append(axis(text))
@@ -67,19 +88,27 @@ def sweep(
     size = math.prod(len(values) for _, values in axes)
     if size > MOST_VALUES:
         options.refuse([*faults, f"--over: a grid of {size} points is more than {MOST_VALUES}"])
-    points = grid(dict(axes))
+    return list(dict(axes)), grid(dict(axes))
+
+
+def _planned(
+    scenario: str, points: list[dict[str, Any]], fixed: dict[str, Any], law: str | None, trust: bool,
+    show: str | None, faults: list[str],
+) -> tuple[list[Any], str]:  # fmt: skip
+    """The scenario of each point, and the order parameter to show; ends with all faults if there are any."""
+    from airflock.recordings.sweeps import scenarios_at, shown
+
+    scenarios: list[Any] = []
     with options.gathering(faults):
         scenarios = scenarios_at(scenario, points, fixed, law, trust=trust)
     with options.gathering(faults):
         show = shown(show, scenarios)
     options.refuse(faults)
-    for note in dict.fromkeys(note for found in scenarios for note in found.notes):
-        tables.say(f"note: {note}")
-    numbers = sound_seeds(range(first_seed, first_seed + seeds))
-    options.compile_aloud(scenarios[0], precision, device)
-    with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
-        chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
-        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say)
+    return scenarios, str(show)
+
+
+def _keep(tidy: Any, keys: list[str], show: str, scenario: Any, table: Path | None, plot: Path | None) -> None:
+    """Write the table and the picture that were asked for."""
     if table is not None:
         from airflock import atomic
 
@@ -89,12 +118,17 @@ def sweep(
         from airflock.plots.heatmap import heatmap
         from airflock.plots.save import save_figure
 
-        save_figure(heatmap(tidy, list(dict(axes)), show, scenario=scenarios[0]), plot)
+        save_figure(heatmap(tidy, keys, show, scenario=scenario), plot)
         tables.say(f"saved {plot}")
-    if as_json:
-        tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})
-    else:
-        _print(tidy, list(dict(axes)), show)
+
+
+def alike(notes: Iterable[str]) -> Iterator[str]:
+    """The first of all notes that differ in numbers alone, and how many are like it."""
+    kinds: dict[str, list[str]] = {}
+    for note in notes:
+        kinds.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "", note), []).append(note)
+    for first, *more in kinds.values():
+        yield f"{first} ({len(more)} more like it)" if more else first
 
 
 def distinct(keys: Sequence[str], plot: Path | None) -> None:

@@ -17,10 +17,10 @@ def types(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find misspelled parameters and wrong records in rules of your own; nothing of the files runs.
+    r"""Find misspelled parameters and wrong records in rules of your own; nothing of the files runs.
 
     The argument names of a rule say what it is given, so no annotations are needed. Needs mypy: pip install
-    'airflock[types]'.
+    'airflock\[types]'.
 
     Example: airflock types mine.py
     """

@@ -113,6 +113,24 @@ MEMBER = {
 } | {
     "mean": "Mean over the agent's own cluster",
 }
+STATE = {
+    "x": "position, east, m",
+    "y": "the same, north, m",
+    "z": "the same, up, m",
+    "vx": "velocity, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+}
+COMMAND = {
+    "cx": "command, east; m/s or m/s² as the model's COMMAND says",
+    "cy": "the same, north",
+    "cz": "the same, up",
+}
+ONSET = {
+    "since": "time since the fault began, s",
+    **{f"at_{name}": f"true {text}, when the fault began" for name, text in STATE.items()},
+    **{f"at_{name}": f"{text}, when the fault began" for name, text in COMMAND.items()},
+}
 CLUSTER = {
     "n": "members of the cluster",
     "hx": "sum of their headings, east",
@@ -148,6 +166,20 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "sample": {**SAMPLE, "q": "metric parameters"},
     "survey": {**FLOCK, "q": "metric parameters"},
     "within": {"q": "metric parameters"},
+    "sense": {**STATE, **ONSET, "f": "the fault's parameters"},
+    "tell": {**STATE, **ONSET, "f": "the fault's parameters"},
+    "radio": {"reach": "radio.range, m", "since": ONSET["since"], "f": "the fault's parameters"},
+    "clock": {"since": ONSET["since"], "f": "the fault's parameters"},
+    "overrule": {**COMMAND, **ONSET, "f": "the fault's parameters"},
+    "motion": {
+        **{name: BODY[name] for name in ("vx", "vy", "vz", "cx", "cy", "cz", "dt")},
+        "nx": "velocity after the step as the body flew it, east, m/s",
+        "ny": "the same, north, m/s",
+        "nz": "the same, up, m/s",
+        **ONSET,
+        "f": "the fault's parameters",
+    },
+    "leaves": {"f": "the fault's parameters"},
     "fitness": {
         "values": "order parameters of one flight, by name",
         "agents": "number of agents",

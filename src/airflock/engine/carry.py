@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.passes.flock import scratch_of
+from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.state import BEGUN, State
 
 
@@ -16,15 +17,16 @@ def carry(old: State, new: State, step: int) -> None:
     under way by radio stays under way. Sums over time begin anew, what metrics remember of each agent goes on.
     Pairs are looked at again (`held` is new): the new numbers may call a distance a collision that the old did not.
     """
-    _rows(old, new)
-    new.arrays["past"][...] = _under_way(old, new, step)
+    lanes = _lanes(old, new)
+    _rows(old, new, lanes)
+    new.arrays["past"][...] = _under_way(old, new, step, lanes)
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.links and new.plan.links:
-        new.arrays["store"][...] = old.arrays["store"]
+        new.arrays["store"][...] = old.arrays["store"][lanes[: old.agents]][..., lanes]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
-        new.arrays["mem"][...] = old.arrays["mem"]
-    _remembered(old, new)
+        new.arrays["mem"][...] = old.arrays["mem"][:, lanes]
+    _remembered(old, new, lanes)
     if np.array_equal(old.tables.shapes, new.tables.shapes) and old.arrays["later"].shape == new.arrays["later"].shape:
         for name in ("counts", "later", "shapes"):
             new.arrays[name][...] = old.arrays[name]
@@ -34,15 +36,25 @@ def carry(old: State, new: State, step: int) -> None:
     for name in _solved(old, new):
         new.arrays[name][...] = old.arrays[name]
     new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]
+    new.set_whole("agents", old.here)
+    new.fill_own()
 
 
-def _rows(old: State, new: State) -> None:
-    """Rows of the work table, whole lanes, each agent in the slot of the new driver."""
+def _lanes(old: State, new: State) -> NDArray[np.int64]:
+    """Of each lane of the new driver the lane that it takes over; agents that are absent come last.
+
+    A driver that sorts agents by cells may find them in any order; the others have them in the order of their numbers.
+    """
+    found = np.arange(new.arrays["work"].shape[1])
+    if old.slots is not None and not sorted_by_cells(new.plan):
+        there = np.argsort(~old.present, kind="stable")
+        found[: old.agents] = old.slots[there]
+    return found
+
+
+def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
+    """Rows of the work table, whole lanes."""
     work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
-    m, kind = work.shape[1], np.int32 if new.plan.bits == 32 else np.int64
-    slots = np.arange(m)
-    if old.slots is not None and not new.has_slots:
-        slots[: old.agents] = old.slots
     other = {f"body{c}" for c in range(len(new.plan.body.beginnings))} if new.plan.body != old.plan.body else set()
     truth = {*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)}
     for name, place in new.driver.ROWS.items():
@@ -50,20 +62,20 @@ def _rows(old: State, new: State) -> None:
             continue
         source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in truth else None
         if source is not None:
-            work[place] = before[had[source]][slots]
+            work[place] = before[had[source]][lanes]
     if new.has_slots and "order" not in had:
-        work[new.driver.ROWS["order"]].view(kind)[:] = np.arange(m)
+        new.order[:] = np.arange(new.agents)
 
 
-def _under_way(old: State, new: State, step: int) -> NDArray[Any]:
+def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:
     """The ring of past states for the delay of the new plan, (slot, component, lane).
 
     Decision k hears slot k modulo the ring, the states of step k * decide_every - delay. With a shorter delay newer
     states replace what was under way in time; with a longer one the last packet is heard again meanwhile.
     """
-    past, every = old.arrays["past"], old.whole("decide_every")
+    past, every = old.arrays["past"][..., lanes], old.whole("decide_every")
     made = np.empty_like(new.arrays["past"])
-    if not (old.plan.noisy or old.plan.delayed) or every != new.whole("decide_every"):
+    if not old.plan.late or every != new.whole("decide_every"):
         names = [*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)]
         made[:] = new.arrays["work"][[new.driver.ROWS[name] for name in names]]
         return made
@@ -73,7 +85,7 @@ def _under_way(old: State, new: State, step: int) -> NDArray[Any]:
     return made
 
 
-def _remembered(old: State, new: State) -> None:
+def _remembered(old: State, new: State, lanes: NDArray[np.int64]) -> None:
     """What metrics of both plans remember of each agent."""
     places, first = {}, 0
     for metric in old.plan.metrics:
@@ -84,7 +96,7 @@ def _remembered(old: State, new: State) -> None:
         count = len(getattr(metric.Memory, "_fields", ()))
         place = places.get((metric.name, metric.Memory))
         if count and place is not None:
-            new.arrays["memory"][first : first + count] = old.arrays["memory"][place : place + count]
+            new.arrays["memory"][first : first + count] = old.arrays["memory"][place : place + count][:, lanes]
         first += count
 
 

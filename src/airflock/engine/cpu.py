@@ -28,12 +28,19 @@ class Flown:
     values : order parameters combined over time, and the time to each goal (a list, s; nan: never)
     frames : (time, component, agent) or None
     state  : (component, agent) position and velocity at the end; status : 0, or minus the agent that found no room
+    absent : of each agent whether it is absent at the end; None where nobody can be
     """
 
     values: dict[str, Any]
     frames: NDArray[Any] | None
     state: NDArray[Any]
     status: int
+    absent: NDArray[np.bool_] | None = None
+
+    @property
+    def present(self) -> Any:
+        """Of each agent whether it is there at the end; True where all are."""
+        return True if self.absent is None else ~self.absent
 
 
 @cache
@@ -61,13 +68,15 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: s
     state = State(plan, tables, driver_of(plan, device), start)
     steps, every = state.whole("steps"), state.whole("sample_every")
     frames = (
-        np.zeros((steps // every + 1, 3 * plan.dimensions, state.agents), tables.row.dtype) if plan.record else None
+        np.full((steps // every + 1, 3 * plan.dimensions, state.agents), np.nan, tables.row.dtype)
+        if plan.record
+        else None
     )
     with compiling(plan.model.name):
         status = advance(state, 0, steps + 1, frames)
-    if frames is not None and plan.stop:
-        frames = frames[: state.samples()]
-    return Flown(state.values(), frames, state.motion, min(status, 0))
+    if frames is not None and state.ended:
+        frames = frames[: -(-status // every)]
+    return Flown(state.values(), frames, state.motion, min(status, 0), ~state.present if plan.absence else None)
 
 
 BEAT = 0.1  # s; about how long a compiled call flies until Ctrl-C and the like are heard

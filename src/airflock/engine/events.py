@@ -13,7 +13,8 @@ class Event:
     """Something done to a flight before it flew `step`.
 
     kind : change (keys of the scenario), command (of one agent, instead of its law's), push (of one agent, m/s),
-           place (of one agent, m), or branch (another world's random numbers)
+           place (of one agent, m), fault (of some agents), remove (an agent drops out), add (one that was absent
+           joins), or branch (another world's random numbers)
     data : plain values, as the method of `Flight` of the same name takes them
     """
 
@@ -26,7 +27,7 @@ class Event:
         return {"step": self.step, "kind": self.kind, "data": dict(self.data)}
 
 
-KINDS = ("change", "command", "push", "place", "branch")
+KINDS = ("change", "command", "push", "place", "fault", "remove", "add", "branch")
 
 
 def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:

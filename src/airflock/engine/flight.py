@@ -1,6 +1,6 @@
 """Flight: a flight that can be advanced, looked at, changed, kept and branched. Whatever the cuts, the same bits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any, NoReturn
 
@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from airflock import __version__
 from airflock.engine import cpu, failure
+from airflock.engine.beginnings import NEVER
 from airflock.engine.carry import carry
 from airflock.engine.events import Event, agent_number, events_of, vector
 from airflock.engine.look import View, view
 from airflock.engine.moments import Snapshot, Window
+from airflock.engine.onsets import onsets, told
+from airflock.engine.presence import join, leave
 from airflock.engine.simulate import finish, opened
 from airflock.engine.state import State
 from airflock.engine.threads import in_background
 from airflock.errors import FlightError
-from airflock.scenarios.change import changed
+from airflock.scenarios.change import changed, named
 from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
@@ -78,7 +81,7 @@ class Flight:
         self._frames: list[NDArray[Any]] = []
         self._sampled: list[NDArray[Any]] = []
         self._planned = events_of(events)
-        self._coming: tuple[Scenario, dict[str, Any], Future[State]] | None = None
+        self._coming: tuple[Scenario, list[Event], Future[State]] | None = None
         if world:
             self._to_world(world)
         while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
@@ -106,6 +109,19 @@ class Flight:
         """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
         self._begin()
         return self._state.motion
+
+    @property
+    def measured(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
+        self._begin()
+        names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
+        return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
+
+    @property
+    def sent(self) -> NDArray[Any]:
+        """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
+        stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
+        return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
@@ -149,15 +165,15 @@ class Flight:
         frames = None
         if self.records:
             count = -(-last // every) - -(-self.step // every)
-            frames = np.zeros((count, 3 * state.plan.dimensions, state.agents), state.tables.row.dtype)
-        first, before = self.step, state.samples() if frames is not None else 0
+            frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
+        first = self.step
         with cpu.compiling(state.plan.model.name):
             done = cpu.advance(state, first, last, frames, 1 if self._sensed else 0)
         if done < 0:
             raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
         self.step, self._sensed = done, False
         if frames is not None:
-            frames = frames[: state.samples() - before] if state.ended else frames
+            frames = frames[: -(-done // every) - -(-first // every)] if state.ended else frames
             self._frames.append(frames)
             self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
         if not state.finite:
@@ -165,7 +181,8 @@ class Flight:
 
     def _fail(self, first: int) -> NoReturn:
         """Say which agent stopped being finite, and at which step from `first` on."""
-        bad = int(np.flatnonzero(~np.isfinite(self._state.motion).all(axis=0))[0])
+        lost = ~np.isfinite(self._state.motion).all(axis=0) & self._state.present
+        bad = int(np.flatnonzero(lost)[0])
         twin = self.again()
         twin._fly_to(first)
         for event in twin._planned:
@@ -220,9 +237,9 @@ class Flight:
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
         """
-        number = agent_number(agent, self.agents)
         self._take_over()
         self._begin()
+        number = self._there(agent)
         if not self.decides or self._sensed or self._state.plan.sequential:
             return view(self.scenario, self._state, number, self.step, self.seed, self.world)
         kept = self._state.buffer.copy()
@@ -269,7 +286,7 @@ class Flight:
 
         value : one number per axis, m/s, m/s² or a direction, as the law commands
         """
-        number, unit = agent_number(agent, self.agents), COMMANDS.get(self.scenario.model.command, "")
+        number, unit = self._there(agent), COMMANDS.get(self.scenario.model.command, "")
         given = vector("command", value, self.scenario.dimensions, unit)
         self.sense()
         self._put("c", number, given)
@@ -286,18 +303,19 @@ class Flight:
         the old scenario until the next `advance` after the new one is ready.
         Raises ScenarioError, and the flight is as it was.
         """
+        return self._change(settings, Event(self.step, "change", dict(settings)), wait)
+
+    def _change(self, settings: Mapping[str, Any], event: Event, wait: bool) -> "Flight":
+        """Set keys of the scenario anew, as an event says."""
         if self._state.ended or self.step > self._steps:
             raise FlightError(f"{self.scenario.name}: the flight has ended at t = {self.time:g} s; nothing can change")
         base = self._coming[0] if self._coming else self.scenario
-        known = self._coming[1] if self._coming else {}
+        known = self._coming[1] if self._coming else []
         new = changed(base, settings)
-        state = opened(
-            new, self.seed, self.precision, self.records, world=self.world, device=self.device,
-            given_start=self._state.plan.given_start,
-        )  # fmt: skip
+        state = self._opened(new, self._state.plan.absence)
         if state.whole("steps") < self.step:
             raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
-        said = {**known, **settings}
+        said = [*known, event]
         if state.driver is self._state.driver or wait:
             self._coming = None
             self._take(new, said, state)
@@ -316,19 +334,29 @@ class Flight:
             (new, said, compiled), self._coming = self._coming, None
             self._take(new, said, compiled.result())
 
-    def _take(self, scenario: Scenario, settings: Mapping[str, Any], state: State) -> None:
+    def _take(self, scenario: Scenario, events: Sequence[Event], state: State) -> None:
         """Go on as another scenario."""
         self._begin()
+        if self._state.plan.absence and not state.plan.absence:  # somebody left while the change waited
+            state = self._opened(scenario, absence=True)
         if self.step > self._since:
             begin = self._since * self.scenario.flight.dt
             self.windows.append(Window(self.scenario, begin, self.time, self.scores()))
         carry(self._state, state, self.step)
-        self._note("change", **settings)
+        for event in events:
+            self._note(event.kind, **event.data)
         self.scenario, self._state, self._steps, self._since = scenario, state, state.whole("steps"), self.step
+
+    def _opened(self, scenario: Scenario, absence: bool) -> State:
+        """State of this flight under a scenario; nothing is in it yet."""
+        return opened(
+            scenario, self.seed, self.precision, self.records, world=self.world, device=self.device,
+            given_start=self._state.plan.given_start, absence=absence,
+        )  # fmt: skip
 
     def push(self, agent: int, velocity: Any) -> "Flight":
         """Add to an agent's velocity, m/s, one number per axis: a gust, a collision, a hand."""
-        number = agent_number(agent, self.agents)
+        number = self._there(agent)
         given = vector("velocity", velocity, self.scenario.dimensions, "m/s")
         self._begin()
         self._put("v", number, given, add=True)
@@ -337,7 +365,7 @@ class Flight:
 
     def place(self, agent: int, position: Any) -> "Flight":
         """Put an agent somewhere else, m, one number per axis."""
-        number = agent_number(agent, self.agents)
+        number = self._there(agent)
         given = vector("position", position, self.scenario.dimensions, "m")
         self._begin()
         self._put("", number, given)
@@ -345,10 +373,86 @@ class Flight:
         self._note("place", agent=number, position=given)
         return self
 
-    def event(self, kind: str, **data: Any) -> "Flight":
+    # -------------------------------------------------------------------------------------------- single agents
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Of each agent whether it is there."""
+        return self._state.present
+
+    @property
+    def faults(self) -> list[dict[str, Any]]:
+        """Faults that have begun: kind, agent, and when they begin and end (s; None: never)."""
+        return told(self._state.tables.due, self.step, self.scenario.flight.dt)
+
+    def fault(
+        self, kind: str, agents: Sequence[int] | int | None = None, *, wait: bool = True, **numbers: Any
+    ) -> "Flight":
+        """Let a fault begin, as an entry of [[faults]] with at = now does. A new window of scores begins.
+
+        kind   : such as "motor"; agents : whom it hits
+        numbers : of the kind, such as share=0.2; lasts (s), number (how many, drawn); or group instead of agents
+        wait   : as in `change`
+        Raises ScenarioError, and the flight is as it was.
+        """
+        given = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
+        base = self._coming[0] if self._coming else self.scenario
+        at = (self.step + (1 if self._sensed else 0)) * self.scenario.flight.dt
+        entry = {"kind": kind, "at": at, **given, **numbers}
+        data = {"kind": kind, **given, **numbers}
+        return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", data), wait)
+
+    def remove(self, agent: int, reason: str = "") -> "Flight":
+        """Let an agent drop out: it has landed or failed. From now on nobody meets, hears, feels or counts it.
+
+        reason : for the list of events
+        """
+        number = self._there(agent)
+        self._begin()
+        self._let_come_and_go()
+        leave(self._state, [number])
+        self._note("remove", agent=number, **({"reason": str(reason)} if reason else {}))
+        return self
+
+    def add(self, agent: int, position: Any, velocity: Any = None) -> "Flight":
+        """Let an agent that is absent join, as agents join at the start: the others know at once where it is.
+
+        position, velocity : one number per axis, m and m/s; by default at rest
+        """
+        number = agent_number(agent, self.agents)
+        if self.present[number]:
+            raise FlightError(f"add: agent {number} is there already")
+        dims = self.scenario.dimensions
+        at = vector("position", position, dims, "m")
+        v = vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
+        join(self._state, number, at, v)
+        self._note("add", agent=number, position=at, velocity=v)
+        return self
+
+    def _there(self, agent: Any) -> int:
+        """Number of an agent that is there. Raises FlightError in one line."""
+        number = agent_number(agent, self.agents)
+        if not self.present[number]:
+            raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")
+        return number
+
+    def _let_come_and_go(self) -> None:
+        """Go on with a driver that knows who is absent; in the same window of scores."""
+        if self._state.plan.absence:
+            return
+        old, state = self._state, self._opened(self.scenario, absence=True)
+        carry(old, state, self.step)
+        for name in ("sums", "values"):
+            state.arrays[name][:] = old.arrays[name]
+        state.arrays["there"][:] = (self.step - self._since) * self.agents
+        self._state = state
+
+    def event(self, kind: str, /, **data: Any) -> "Flight":
         """Do what an event says: the method of the same name."""
         if kind == "change":
             return self.change(data)
+        if kind == "fault":
+            return self.fault(**{"kind": "", **data})
         if kind == "branch":
             self._to_world(data.get("world"))
             return self
@@ -365,7 +469,7 @@ class Flight:
         rows[:, agent] = np.array(values, rows.dtype) + (rows[:, agent] if add else 0)
         self._state.put(names, rows)
 
-    def _note(self, kind: str, **data: Any) -> None:
+    def _note(self, kind: str, /, **data: Any) -> None:
         self.events.append(Event(self.step, kind, data))
 
     # ------------------------------------------------------------------------------------------------ branching
@@ -375,7 +479,7 @@ class Flight:
         return Snapshot(
             __version__, self.origin, self.scenario, self._state, self._state.buffer.copy(), self.step, self._sensed,
             self._since, tuple(self.events), tuple(self.windows), tuple(self._frames),
-            tuple(self._sampled),
+            tuple(self._sampled), self._state.tables.due,
         )  # fmt: skip
 
     def restore(self, snapshot: Snapshot) -> "Flight":
@@ -392,6 +496,7 @@ class Flight:
         if self._state is not snapshot.state:
             self._state = snapshot.state.twin()
         self._state.buffer[:] = snapshot.bytes
+        self._state.expect(snapshot.due)
         self.scenario, self.step, self._sensed = snapshot.scenario, snapshot.step, snapshot.sensed
         self._since, self._steps = snapshot.begin, self._state.whole("steps")
         self.events, self.windows = list(snapshot.events), list(snapshot.windows)
@@ -420,6 +525,10 @@ class Flight:
             raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
         self.world = world
         self._state.set_whole("world", world)
+        if self._state.plan.faults:
+            before = [onset for onset in self._state.tables.due if onset.step < self.step]
+            coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
+            self._state.expect((*before, *coming))
         self._note("branch", world=world)
 
     def again(self) -> "Flight":

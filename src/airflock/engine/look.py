@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from airflock.body import radio
@@ -10,7 +10,8 @@ from airflock.core import agent as one
 from airflock.core import random
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
-from airflock.engine.state import NEVER, State
+from airflock.engine.beginnings import NEVER
+from airflock.engine.state import State
 from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
 from airflock.world import edges
@@ -50,14 +51,15 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     truth = motion(state, "")
     own = measured[agent]
     heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
-    near = one.answer(model.reach, "reach", {"p": scenario.parameters}, model.name) if model.reach else math.inf
+    p = _parameters(scenario, state, agent)
+    near = one.answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
     terms = []
     for other in heard:
         if model.neighbour is None:
             break
         given = one.pair_percept(own, Heard(other.who, _beside(scenario, own, other.state), other.age), agent)
         far = given["r"] > near
-        rule = one.answer(model.neighbour, "neighbour", given | {"p": scenario.parameters}, model.name)
+        rule = one.answer(model.neighbour, "neighbour", given | {"p": p}, model.name)
         terms.append(type(rule)(*(0.0 for _ in rule)) if far else rule)
     memory = model.Memory(*(float(x) for x in state.arrays["mem"][:, _slot(state, agent)])) if model.Memory else None
     command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
@@ -65,6 +67,12 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
         agent, number * every * scenario.flight.dt, truth[agent], own, heard, tuple(terms),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
     )  # fmt: skip
+
+
+def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
+    """Numbers of the law, with the agent's own where they differ among agents."""
+    own = zip(state.plan.varied, state.tables.own[:, agent].tolist(), strict=True)
+    return replace(scenario.parameters, **{name: value for (letter, name), value in own if letter == "p"})
 
 
 def motion(state: State, prefix: str) -> list[Motion]:
@@ -91,25 +99,43 @@ def _heard(
 ) -> Iterator[Heard]:
     """Everybody in range whose packet agent i has: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
+    clocks, reach = _clocks(state), _reach(state, i)
     late = clock(scenario)["delay"] * scenario.flight.dt
     now = number * state.whole("decide_every") * scenario.flight.dt
     for j in range(n):
+        if not state.present[j]:
+            continue
         true = _beside(scenario, truth[i], truth[j])
         distance = math.dist(true[:3], truth[i][:3])
         if j == i or distance > min(k.range, 1e8):
             continue
         if plan.links:
-            packet = state.arrays["store"][i, :, j].tolist()
+            packet = state.arrays["store"][_slot(state, i), :, _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             if stamp <= NEVER / 10.0:
                 continue
-            age, flat = now - stamp, [0.0] * (3 - axes)
+            age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
             at, v = packet[:axes], packet[axes : 2 * axes]
             yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age)
+        elif distance * distance > reach[j]:
+            continue
         elif not plan.lossy or random.uniform(
             random.words(seed, random.LOSS, world, number, i * n + j)[0]
         ) >= radio.lost(distance, k):
-            yield Heard(j, said[j], late)
+            yield Heard(j, said[j], late + clocks[i] - clocks[j])
+
+
+def _reach(state: State, i: int) -> list[float]:
+    """Square of how far agent i hears each other one, m², where faults leave less than the radio's range."""
+    if not state.plan.suffers("radio"):
+        return [math.inf] * state.agents
+    out, into = state.rows(["reach_out", "reach_in"]).astype(float)
+    return [min(found, float(into[i])) for found in out.tolist()]
+
+
+def _clocks(state: State) -> list[float]:
+    """How far the clock of each agent is ahead, s."""
+    return [float(ahead) for ahead in state.rows(["clock"])[0]] if state.plan.suffers("clock") else [0.0] * state.agents
 
 
 def _beside(scenario: Scenario, own: Motion, other: Motion) -> Motion:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.events import Event
+from airflock.engine.onsets import Onset
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
 
@@ -40,3 +41,4 @@ class Snapshot:
     windows: tuple[Window, ...]
     frames: tuple[NDArray[Any], ...]
     sampled: tuple[NDArray[Any], ...]
+    due: tuple[Onset, ...]

@@ -6,13 +6,14 @@ from typing import Any
 
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
+from airflock.core.fault import Fault
 from airflock.core.parameters import choices
 from airflock.world import arena, edges, excursion, rays
 from airflock.world.place import obstacle_rule, raised
 
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
-    "seed_high", "corners", "obstacles", "faces_0", "faces_1",
+    "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born",
 )  # fmt: skip
 
 
@@ -24,12 +25,14 @@ class Build:
     record      : keep every sample (position, velocity, command) besides the running sums
     given_start : the flight starts from positions and velocities that are handed over
     grid        : neighbours by cells, all cores for one flock; else all pairs, one core
+    absence     : agents may be absent: they lie behind those who are there (`engine.presence`)
     """
 
     bits: int = 32
     record: bool = False
     given_start: bool = False
     grid: bool = False
+    absence: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,8 @@ class Plan:
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
     sequential: one agent after another perceives, decides and moves
+    faults    : kinds of fault that may occur
+    varied    : numbers that differ among agents, as (letter, name); each is a row
     """
 
     model: Model
@@ -89,6 +94,8 @@ class Plan:
     obstacle: Callable[..., Any] = arena.convex_obstacle
     polygon: bool = False
     raised: bool = False
+    faults: tuple[Fault, ...] = ()
+    varied: tuple[tuple[str, str], ...] = ()
     build: Build = Build()
 
     def built(self, **changes: Any) -> "Plan":
@@ -114,6 +121,39 @@ class Plan:
     def grid(self) -> bool:
         """Whether neighbours are found by cells."""
         return self.build.grid
+
+    @property
+    def absence(self) -> bool:
+        """Whether agents may be absent."""
+        return self.build.absence
+
+    def suffers(self, *rules: str) -> tuple[Fault, ...]:
+        """Kinds of fault that have one of these rules."""
+        return tuple(kind for kind in self.faults if any(rule in kind.rules for rule in rules))
+
+    @property
+    def believes(self) -> bool:
+        """Whether what agents measure of themselves is not the truth: it has rows of its own."""
+        return self.noisy or bool(self.suffers("sense"))
+
+    @property
+    def late(self) -> bool:
+        """Whether what is heard comes from the ring of past states."""
+        return self.noisy or self.delayed
+
+    @property
+    def told(self) -> bool:
+        """Whether what others hear of an agent is not the truth: it has rows of its own."""
+        return self.late or bool(self.suffers("sense", "tell"))
+
+    @property
+    def perturbed(self) -> bool:
+        """Whether distances as perceived are not the true ones, which decide who is in range."""
+        return self.told or self.believes or self.links or bool(self.suffers("radio"))
+
+    def varies(self, letter: str) -> bool:
+        """Whether a number of this record differs among agents."""
+        return any(of == letter for of, _ in self.varied)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -183,7 +223,9 @@ def make_plan(
     """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
     surfaces, beyond = arena_surfaces(world)
     usual: dict[str, str | float] = {
-        name: number for name, number in model.usual.items() if getattr(parameters, name) == number
+        name: number
+        for name, number in model.usual.items()
+        if getattr(parameters, name) == number and ("p", name) not in options.get("varied", ())
     }
     return Plan(
         model=model,

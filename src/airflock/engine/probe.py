@@ -3,12 +3,14 @@
 import math
 import traceback
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.contract import Model
-from airflock.core.vocabulary import PAIR, SURFACE, Own, Percept, asks
+from airflock.core.fault import RULES, Fault
+from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
 from airflock.engine import law
 from airflock.engine.passes.flock import shapes_of
 from airflock.errors import RuleError
@@ -50,6 +52,21 @@ def probe(model: Model, parameters: Any) -> None:
     if not isinstance(answer, tuple) or len(answer) != expected:
         shape = "x, y, z, Memory(...)" if expected == 4 else "x, y, z"
         raise RuleError(f"{_place(model.decide)}: {model.name}.decide must return {shape}")
+
+
+@cache
+def probe_fault(kind: Fault) -> None:
+    """The same for the rules of a kind of fault."""
+    names = {name for rule in kind.rules for name in VOCABULARY[rule]}
+    given: dict[str, Any] = {name: 0.5 + 0.1 * k for k, name in enumerate(sorted(names))}
+    given["f"] = kind.Parameters()
+    for name, rule in kind.rules.items():
+        law.check(rule)
+        answer = _call(rule, name, given, kind.name)
+        count, what = RULES[name]
+        found = len(answer) if isinstance(answer, tuple) else 1
+        if found != count:
+            raise RuleError(f"{_place(rule)}: {kind.name}.{name} returns {found} of {count} numbers: {what}")
 
 
 def _shared(model: Model, given: dict[str, Any]) -> Any:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import cpu, devices, failure
+from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
-from airflock.engine.probe import probe
+from airflock.engine.probe import probe, probe_fault
 from airflock.engine.state import State
 from airflock.engine.tables import clock, tables
 from airflock.engine.threads import in_threads
@@ -32,16 +32,20 @@ def plan_of(
     metrics: tuple[Metric, ...] | None = None,
     grid: bool | None = None,
     given_start: bool = False,
+    absence: bool = False,
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
     grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
     given_start : the start is handed over with each flight
+    absence     : agents may be absent; where a fault takes agents out they may in any case
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
     _probed(scenario.model, tuple(choices(scenario.parameters).items()))
-    wind = scenario.wind
+    wind, kinds = scenario.wind, scenario.fault_kinds
+    for kind in kinds:
+        probe_fault(kind)
     return make_plan(
         scenario.model,
         scenario.parameters,
@@ -53,6 +57,7 @@ def plan_of(
             record=record,
             given_start=given_start,
             grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+            absence=absence or any(kind.leaves is not None for kind in kinds),
         ),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
@@ -70,6 +75,8 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        faults=kinds,
+        varied=scenario.varied,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )
@@ -116,6 +123,8 @@ def fly(
         plan = plan.built(given_start=True)
         start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
+    if chosen != "cuda":
+        needs.check(scenario, plan)
     return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
 
 
@@ -168,7 +177,7 @@ def _first_bad(flown: cpu.Flown) -> int | None:
     """First agent whose state is not finite."""
     import numpy as np
 
-    bad = np.flatnonzero(~np.isfinite(flown.state).all(axis=0))
+    bad = np.flatnonzero(~np.isfinite(flown.state).all(axis=0) & flown.present)
     return int(bad[0]) if bad.size else None
 
 
@@ -197,17 +206,20 @@ def opened(
     world: int = 0,
     *,
     given_start: bool = False,
+    absence: bool = False,
     device: str = "cpu",
 ) -> State:
     """State of a flight before its first step.
 
     start       : as in `fly`; given_start : whether agents have been given their places already, so that none are drawn
+    absence     : as in `plan_of`
     device      : cpu, or python, in double precision and with all pairs
     Raises FlightError where `start` cannot be flown.
     """
-    plan = plan_of(scenario, precision=precision, record=record)
+    plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     if device == "python":
         plan = plan.built(grid=False, bits=64)
+    needs.check(scenario, plan)
     given = None
     if start is not None:
         given = sound_start(scenario, plan, start)
@@ -315,6 +327,8 @@ def _pays(scenario: Scenario) -> bool:
         and perfect
         and scenario.radio.kind == "constant"
         and scenario.flight.update == "synchronous"
+        and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
+        and not any(letter == "p" for letter, _ in scenario.varied)
         and _has_room(scenario)
     )
 

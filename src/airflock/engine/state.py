@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -9,17 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import NEVER, beginning, memories
+from airflock.engine.onsets import Onset, strike
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.presence import leave
+from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached, samples, sums_of
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
 LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
-NEVER = -1e9  # s; time stamp of a packet that has not come
 ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
 GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
 BEGUN = 4  # place in `held` of the mark that agents have their places
@@ -49,12 +53,14 @@ class State:
             own["work"][driver.ROWS[f"body{c}"]] = begin
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
+        self.fill_own()
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
         components = plan.dimensions
         self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
         self.no_frames = np.zeros((0, 3 * components, agents), real)
+        self.solved = tuple(name for name, _ in kept)  # arrays that rules of the whole flock go on from
         # what is used within a call only: its pages of zeros cost nothing until they are written
         self.solvers = tuple(
             tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
@@ -92,11 +98,47 @@ class State:
 
         half   : as in `passes.driver.flight`
         frames : (sample, component, agent), filled with the samples of these steps where the plan records
+
+        It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
+        due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
+        step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
+        for stop in [*(step for step in due if step > first or not half & 1), last]:
+            if step < stop or stop == last:
+                rest = None if frames is None else frames[-(-step // every) - skipped :]
+                done = self._fly(step, stop, half, rest)
+                if done != stop or stop == last:
+                    return done
+                step, half = stop, 0
+            self._strike(stop)
+        return step
+
+    def _strike(self, step: int) -> None:
+        """Let begin what is due before a step."""
+        if not self.begun and self._fly(step, step, 0, None) < 0:
+            return  # said when the step is flown
+        for onset in self.tables.due:
+            if onset.step == step and onset.leaves:
+                leave(self, [onset.agent])
+            elif onset.step == step:
+                strike(self, onset)
+
+    def _fly(self, first: int, last: int, half: int, frames: NDArray[Any] | None) -> int:
+        """One call of the driver. An instant with fewer than two of several agents is not counted."""
+        few = self.begun and self.here < min(2, self.agents)
+        if few and not self.here:
+            self.arrays["there"][1] += self.agents * (last - first)  # time passes
+            return last
         before, after = self._given
-        return int(
+        kept = self.arrays["sums"].copy() if few else None
+        done = int(
             self.driver.advance(first, last, half, *before, self.no_frames if frames is None else frames, *after)
         )
+        if kept is not None:
+            self.arrays["sums"][:] = kept
+        if self.plan.absence and done > first and not half & 2:
+            self.arrays["there"] += np.array([self.here, self.agents]) * (done - first)
+        return done
 
     @property
     def ended(self) -> bool:
@@ -107,6 +149,37 @@ class State:
     def begun(self) -> bool:
         """Whether agents have their places."""
         return bool(self.arrays["held"][BEGUN] > 0.5)
+
+    @property
+    def here(self) -> int:
+        """How many agents are there."""
+        return int(self.arrays["whole"][AGENTS])
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Of each agent whether it is there."""
+        slots = self.slots
+        return np.ones(self.agents, bool) if slots is None else slots < self.here
+
+    @property
+    def dt(self) -> float:
+        """Motion step as the driver reads it, s."""
+        first = 0
+        for letter, names in self.plan.records.items():
+            if letter == "c":
+                return float(self.arrays["row"][first + names.index("dt")])
+            first += len(names)
+        raise KeyError("c")
+
+    def fill_own(self) -> None:
+        """Write the numbers that differ among agents, each to its agent."""
+        slots = self.slots if self.begun else None
+        for (letter, name), values in zip(self.plan.varied, self.tables.own, strict=True):
+            row = self.driver.ROWS.get(own_row(letter, name))
+            if row is not None:
+                lane = self.arrays["work"][row]
+                lane[: self.agents][slice(None) if slots is None else slots] = values
+                lane[self.agents :] = values[0]
 
     @property
     def finite(self) -> bool:
@@ -125,6 +198,10 @@ class State:
         made = State(self.plan, self.tables, self.driver, self.start)
         made.buffer[:] = self.buffer
         return made
+
+    def expect(self, due: tuple[Onset, ...]) -> None:
+        """Have these faults to come, instead of those before."""
+        self.tables = replace(self.tables, due=due)
 
     def look_at_pairs(self) -> None:
         """Forget how far pairs are apart: what was changed from outside may have brought them together."""
@@ -154,29 +231,41 @@ class State:
 
     @property
     def has_slots(self) -> bool:
-        """Whether the agents of a large flock lie in slots (`passes.slots`)."""
+        """Whether agents lie in slots (`passes.slots`): those of a large flock, and where some may be absent."""
         return "order" in self.driver.ROWS
+
+    @property
+    def order(self) -> NDArray[Any]:
+        """Number of the agent in each slot, where agents have slots; writes through."""
+        kind = np.int32 if self.plan.bits == 32 else np.int64
+        found: NDArray[Any] = self.arrays["work"][self.driver.ROWS["order"], : self.agents].view(kind)
+        return found
 
     @property
     def slots(self) -> NDArray[Any] | None:
         """Slot of each agent by number, where agents have slots."""
         if not self.has_slots:
             return None
-        kind = np.int32 if self.plan.bits == 32 else np.int64
-        order = self.arrays["work"][self.driver.ROWS["order"], : self.agents].view(kind)
+        order = self.order
         slots = np.empty_like(order)
         slots[order] = np.arange(self.agents)
         return slots
 
     @property
     def motion(self) -> NDArray[Any]:
-        """Positions (m) and velocities (m/s), (component, agent)."""
+        """Positions (m) and velocities (m/s), (component, agent); nan of those who are absent."""
         found: NDArray[Any] = self.arrays["work"][self._motion, : self.agents]
+        if self.begun:
+            found[:, self.here :] = np.nan
         return found if (slot := self.slots) is None else found[:, slot]
 
     def values(self) -> dict[str, Any]:
         """Order parameters over the time that the sums hold, and when each goal was reached."""
-        return combined(self.plan, self.arrays["sums"]) | goals_reached(self.plan, self.arrays["reached"])
+        found = combined(self.plan, self.arrays["sums"]) | goals_reached(self.plan, self.arrays["reached"])
+        if self.plan.absence:
+            there, of = self.arrays["there"].tolist()
+            found["present"] = there / of if of else 1.0
+        return found
 
     def samples(self) -> int:
         """Number of samples that the sums hold."""
@@ -185,6 +274,7 @@ class State:
     def reset_sums(self) -> None:
         """Begin the sums over time anew. What a metric remembers of each agent stays: contacts go on."""
         self.arrays["sums"][:] = sums_of(self.plan)[1]
+        self.arrays["there"][:] = 0.0
 
 
 class Layout(NamedTuple):
@@ -236,7 +326,7 @@ def _layout(
         "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
         "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
         "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
-        "labels": ((2, m), label),
+        "labels": ((2, m), label), "there": ((2,), np.float64),
     }  # fmt: skip
     shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
     shaped |= {name: (size, real) for name, size in kept}
@@ -263,15 +353,3 @@ def rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
     first = -room.ctypes.data % LINE
     found: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
     return found
-
-
-def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
-    """What metrics remember of each agent, at its start: (field, lane)."""
-    blocks = [beginning(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
-    return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
-
-
-def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
-    """The defaults of a Memory for each of m lanes: (field, lane)."""
-    starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
-    return np.repeat(np.array(starts, real)[:, None], m, axis=1)

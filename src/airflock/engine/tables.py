@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.body import dryden, wind
+from airflock.engine.onsets import Onset, onsets, row_values
 from airflock.engine.plan import WHOLE, Plan
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, Clock, Geometry
@@ -33,6 +34,8 @@ class Tables:
     shapes, nodes, links : what stands in the scene, as in `scenes.tree`
     later : (shape, 8) bounds (m), time (s) and number of each shape that appears while flying
     goals : (goal, 3) points in their order, m
+    own   : (number, agent) what differs among agents, in the plan's order
+    due   : faults in the order of their steps
     """
 
     row: NDArray[Any]
@@ -45,6 +48,8 @@ class Tables:
     links: NDArray[np.int64]
     later: NDArray[Any]
     goals: NDArray[Any]
+    own: NDArray[Any]
+    due: tuple[Onset, ...] = ()
 
     def changed(self, **whole: int) -> "Tables":
         """The same world with other integers, by their names in `plan.WHOLE`."""
@@ -151,6 +156,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     counts = families + [0] * (2 - len(families))
     whole = times | {
         "agents": scenario.agents,
+        "born": scenario.agents,
         "world": world,
         "seed_low": seed & 0xFFFFFFFF,
         "seed_high": (seed >> 32) & 0xFFFFFFFF,
@@ -170,4 +176,6 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
         nodes=scene.nodes.astype(real),
         links=scene.links,
         goals=scenario.waypoints().astype(real),
+        own=row_values(scenario, plan, seed).astype(real),
+        due=onsets(scenario, seed, world) if plan.faults else (),
     )

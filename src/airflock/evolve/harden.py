@@ -20,12 +20,11 @@ from airflock.evolve.after import interval
 from airflock.evolve.folder import plain
 from airflock.evolve.landscape import ZERO, why_zero
 from airflock.evolve.space import declared
-from airflock.evolve.steps import RECIPE, Measured, Step, Table, against, flown, moved, recipe
+from airflock.evolve.steps import RECIPE, ROOM, Measured, Step, Table, against, flown, moved, recipe
 from airflock.scenarios import formats
 from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
 
-WALLS = ("v_shill down, r0_shill up",)  # steps that are about walls: tried first where those are short
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 COST = 0.05  # of fitness, at most
@@ -49,7 +48,8 @@ def harden(
     seeds : sequence of int
         Seeds of the flights of each step; the result is judged on as many seeds after the largest of them.
     steps : sequence of Step
-        What is tried, one after another; those about walls first where walls are what is short.
+        What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
+        first where that is what is short.
     cost : float
         Fitness that may be given up in all.
     threads : int, optional
@@ -79,8 +79,14 @@ def harden(
     scenario = loaded(scenario)
     trial = _Trial(scenario, recipe(scenario, steps)[0], seeds, cost, threads, done)
     found = [trial.first]
-    short_of_walls = trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0)
-    for step in sorted(steps, key=lambda step: step.name not in WALLS) if short_of_walls else steps:
+    hit = float((trial.optimum["n_coll"] > 0.0).mean())
+    touched = trial.touches()
+    order = [*steps, *ROOM] if touched else list(steps)
+    if trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0):
+        order.sort(key=lambda step: not step.earlier)
+    for step in order:
+        found += trial.tried(step)
+    for step in ROOM if trial.touches() and not touched else ():
         found += trial.tried(step)
     found.append(trial.on_fresh_seeds())
     return found
@@ -101,7 +107,7 @@ class _Trial:
         self.scenario, self.cost, self.threads, self.done = scenario, cost, threads, done
         self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
-        self.kept = [optimum]
+        self.kept, self.seen = [optimum], [optimum[1]]
         self.first = against(self.optimum, self.optimum, *optimum)
         if float(self.optimum["fitness"].max()) < ZERO:
             told = {name: values.tolist() for name, values in self.optimum.items()}
@@ -111,13 +117,18 @@ class _Trial:
     def _fly(self, parameters: Mapping[str, float], seeds: Sequence[int]) -> Table:
         return flown(self.scenario, [parameters], seeds, self.threads, self.done)[0]
 
+    def touches(self) -> bool:
+        """Whether agents touch walls or obstacles in some flight of what was kept so far."""
+        return "phi_wall" in self.table and float(self.table["phi_wall"].max()) > 0.0
+
     def tried(self, step: Step) -> list[Measured]:
         """The step and, where it breaks something or costs too much, half of it."""
         found = []
         for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
             parameters = moved(self.scenario, self.kept[-1][1], step, part)
-            if parameters == self.kept[-1][1]:
+            if parameters in self.seen:  # nothing changes, or it was undone before
                 break
+            self.seen.append(parameters)
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
             gains = _gains(self.table, table)
@@ -169,7 +180,9 @@ def _gains(before: Table, after: Table) -> bool:
     wider = interval((after["r_min"] - before["r_min"]).tolist())[2] > 0.0
     if "phi_wall" not in before:
         return wider
-    return wider or interval((before["phi_wall"] - after["phi_wall"]).tolist())[2] > 0.0
+    fewer = 1.0 * (before["phi_wall"] > 0.0) - 1.0 * (after["phi_wall"] > 0.0)
+    smaller = before["phi_wall"] - after["phi_wall"]
+    return wider or any(interval(change.tolist())[2] > 0.0 for change in (smaller, fewer))
 
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from airflock.core.agent import State
 from airflock.fleet.faults import Fault
 from airflock.fleet.lockstep import Fleet, start_states
 from airflock.fleet.prepare import card_document, limits_of
+from airflock.many_tests import holm
 from airflock.onboard.card import Card, card_of, hash_of
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import dataset
@@ -157,17 +158,8 @@ def table(simulated: Sequence[Mapping[str, Any]], flown: Sequence[Mapping[str, A
         flat = error <= 1e-9 * max(1.0, abs(gap))  # the same difference at each seed: no test of it
         z = math.nan if flat and abs(gap) > 1e-9 else (0.0 if flat else gap / error)
         lines.append(Line(name, float(a.mean()), float(b.mean()), error, z, math.erfc(abs(z) / math.sqrt(2.0))))
-    return holm(lines)
-
-
-def holm(lines: Sequence[Line]) -> list[Line]:
-    """The lines with p corrected by Holm's step-down method, in their order."""
-    order = sorted((line for line in lines if math.isfinite(line.p)), key=lambda line: line.p)
-    corrected, most = {}, 0.0
-    for k, line in enumerate(order):
-        most = max(most, min(1.0, (len(order) - k) * line.p))
-        corrected[line.name] = most
-    return [line._replace(p=corrected.get(line.name, math.nan)) for line in lines]
+    corrected = holm([line.p for line in lines])
+    return [line._replace(p=p) for line, p in zip(lines, corrected, strict=True)]
 
 
 def sampled(scenario: Scenario, period: float) -> Scenario:

@@ -22,7 +22,7 @@ STEPS = 3  # of a climb
 FREE = 1e-9  # m²: least variance
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
 # fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
-BEYOND = (0.0075, 0.04)
+BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
 
 

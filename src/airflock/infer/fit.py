@@ -193,6 +193,7 @@ def _at(model: Model, start: Array, free: Sequence[int], spans: Sequence[int] | 
 def search(model: Model, start: Array, begin: Array, spans: Sequence[int], seed: int, say: Callable[[], None]) -> Array:
     """The best place found over the whole range of the named numbers, on a few spans: by climbs and by CMA-ES.
 
+    start : a place whose named numbers are defaults, from which is climbed, too
     begin : places of the named numbers to begin from, best first
     """
     import warnings
@@ -201,7 +202,7 @@ def search(model: Model, start: Array, begin: Array, spans: Sequence[int], seed:
 
     named = list(range(model.named))
     best, lowest = start.copy(), math.inf
-    for x in begin[:STARTS]:
+    for x in (start[named], *begin[:STARTS]):
         u = start.copy()
         u[named] = x
         found = climb(model, u, named, spans, rough=True)

@@ -51,6 +51,7 @@ class Law:
 
     gain, error : log-likelihood of held-out steps above that of going straight on, and its standard error
     ahead       : share of spans in which it predicts better
+    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
     criterion   : Akaike's, of the fit, below that of going straight on; negative is better
     inside      : share of held-out differences within the 95 % that are predicted
     missed      : share of what is explained with a free sum of forces added that the law alone leaves over, 0 to 1
@@ -61,6 +62,7 @@ class Law:
     gain: float
     error: float
     ahead: float
+    price: float
     criterion: float
     inside: float
     missed: float
@@ -95,7 +97,7 @@ class Inferred:
     def document(self) -> dict[str, Any]:
         """A scenario file's content: the best law with its numbers; raises AirflockError where there is none."""
         if self.best is None:
-            raise AirflockError(f"infer: {self.verdict}; there is no scenario to write")
+            raise AirflockError(f"infer: {self.verdict}; nothing can be written")
         scenario = self.best.candidate.scenario
         found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
         found.pop("published", None)
@@ -270,6 +272,7 @@ def _law(
     left, gained = left_over(model, found.place, spans_of_fit), max(straight.score.loss() - found.score.loss(), 0.0)
     return Law(
         name, float(ahead.sum()), float(np.sqrt(spans) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
+        0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
         2.0 * (bare[0] - bare[1]), held.inside,
         left / max(gained + left, 1e-9), numbers, model.law, found, maps(model, found.place, scale, spans_of_fit),
         held.surprise,
@@ -279,7 +282,7 @@ def _law(
 def _verdict(laws: list[Law]) -> tuple[Law | None, str]:
     """The law that explains the tracks, if one does, and the line that says so."""
     best = laws[0]
-    if not (best.gain > SURE * best.error and best.ahead >= MOST):
+    if not (best.gain > max(SURE * best.error, best.price) and best.ahead >= MOST):
         return None, "none of these explains the tracks better than going straight on"
     missed = (
         f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""

@@ -17,7 +17,8 @@ SETTLING = 10  # frames after an entry that are not counted
 BEGINNING = 5  # frames from which the velocity at an entry is taken
 SPAN = 12.0  # s; spans are what is held out, and what errors are taken over
 SPANS = (8, 400)  # least and largest number of spans
-FEW = 40  # frames below which nothing is inferred
+SHORT = 30  # frames; no span is shorter
+FEW = 4 * SHORT  # frames below which nothing is inferred
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ def tracks_of(
         sure &= own["confidence"].transpose("time", "individual").values >= 1.0  # not those that were bridged
     seen = np.where(sure[:, None], seen, np.nan)
     length = len(time) * period
-    parts = int(np.clip(round(length / span), *SPANS))
+    parts = int(np.clip(round(length / span), min(SPANS[0], len(time) // SHORT), min(SPANS[1], len(time) // SHORT)))
     cuts = np.linspace(0, len(time), parts + 1).astype(int)
     spans = tuple((int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True))
     found = restated(Tracks(period, seen, np.zeros(sure.shape, np.int8), np.zeros_like(seen), spans, name, box), seen)

@@ -5,10 +5,11 @@ avoidance, separation, cohesion, alignment, goal, previous movement. The thesis 
 is 1 m here and a second has 60 frames.
 
 Differences from the thesis, each because its text leaves the point open or its listing contradicts its text:
-* Separation, cohesion and goal suggest movements at p.speed towards or away from a point; the listings return bare
-  offsets of up to 40 m beside a cap of 1 m per frame, which would always be cut to the first of them.
-* Separation from several neighbours adds the inverse vectors d / d² (the listing returns the first neighbour's -d);
-  method = "turn" adds the turned headings.
+* Separation from several neighbours adds their inverse vectors -d, a metre being a metre per frame (the listing returns
+  that of the first neighbour it finds); method = "turn" adds the turned headings, at p.speed. separation = "normalised"
+  adds -d / d² and suggests p.speed that way: opposed by cohesion it cancels at any distance, and boids meet.
+* Cohesion and goal suggest movements at p.speed towards a point. The listing of cohesion returns the bare offset of up
+  to 40 m, beside a cap of 1 m per frame (cohesion = "printed"): goal and alignment are then cut off.
 * Cohesion goes to the mean position as the text says; the listing has the sign reversed and divides by the neighbours
   without the agent itself. Alignment divides by all whom it adds up.
 * The ray ahead lies along what the other oracles suggest together, as the comment of the 3-D listing says, so that
@@ -63,6 +64,12 @@ class Parameters(Record):
     margin: float = quantity(0.1, "m", low=0.0, high=100.0, source="our choice", meaning="added to the radius of casts")
     scheme: str = choice("5", ("1", "2", "3", "4", "5"), source="Kidger, section 4.3", meaning="recombination scheme")
     method: str = choice("away", ("away", "turn"), source="Kidger, section 4.1.1", meaning="separation 2 or 1")
+    separation: str = choice(
+        "printed", ("printed", "normalised"), source="4.1.1; ours", meaning="length of separation 2: bare, or p.speed"
+    )
+    cohesion: str = choice(
+        "normalised", ("normalised", "printed"), source="ours; 4.1.3", meaning="length of cohesion: p.speed, or bare"
+    )
     cast: str = choice("swept", ("swept", "thin"), source="ours; the thesis", meaning="cast spheres or thin rays")
     ahead: str = choice("suggested", ("suggested", "movement"), source="4.6.2; 4.2", meaning="where rays start")
     first: str = choice("axis", ("axis", "point"), source="ours; the thesis", meaning="what of the spiral lies ahead")
@@ -70,7 +77,7 @@ class Parameters(Record):
 
 
 class Sums(NamedTuple):
-    """Separation (1/m, or turned headings), neighbours' velocities (m/s) and number, their offsets (m) and number."""
+    """Separation (m/s as printed, else without a scale), neighbours' velocities (m/s), offsets (m) and numbers."""
 
     sx: float
     sy: float
@@ -129,9 +136,10 @@ def sight(p):
 def turned_away(dx, dy, dz, r, hx, hy, hz, p):
     """Own heading, turned away from a neighbour by an angle that grows as it nears (separation 1, section 4.1.1).
 
-    The angle is (1 - r/r_sep) 2 pi 0.05 pi, about 0.99 rad at contact.
+    The angle is (1 - d/r_sep) 2 pi 0.05 pi, with d (m) from surface to surface: about 0.99 rad at contact.
     """
-    angle = (1.0 - r / p.r_sep) * 0.1 * math.pi * math.pi
+    apart = max(r - 2.0 * p.radius, 0.0)
+    angle = (1.0 - apart / p.r_sep) * 0.1 * math.pi * math.pi
     along = dx * hx + dy * hy + dz * hz
     wx = along * hx - dx
     wy = along * hy - dy
@@ -149,7 +157,7 @@ def neighbour(dx, dy, dz, r, dvx, dvy, dvz, vx, vy, vz, hx, hy, hz, p):
     if p.method == "turn":
         sx, sy, sz = turned_away(dx, dy, dz, r, hx, hy, hz, p)
     else:
-        k = -1.0 / (r * r)
+        k = -FRAMES if p.separation == "printed" else -1.0 / (r * r)
         sx = k * dx
         sy = k * dy
         sz = k * dz
@@ -200,9 +208,11 @@ def movement(t, p):
 
 def others(t, own, sums, percept, p):
     """The tally after all oracles but obstacle avoidance."""
-    k = p.speed / norm(sums.sx, sums.sy, sums.sz)
+    k = 1.0
+    if (p.method == "turn") | (p.separation == "normalised"):
+        k = p.speed / norm(sums.sx, sums.sy, sums.sz)
     t = take(t, k * sums.sx, k * sums.sy, k * sums.sz, p.s_sep, p)
-    k = p.speed / norm(sums.cx, sums.cy, sums.cz)
+    k = FRAMES / (sums.n_cohes + 1.0) if p.cohesion == "printed" else p.speed / norm(sums.cx, sums.cy, sums.cz)
     t = take(t, k * sums.cx, k * sums.cy, k * sums.cz, p.s_cohes, p)
     some = min(sums.n_align, 1.0)
     k = some / (sums.n_align + 1.0)

@@ -67,7 +67,7 @@ class Claim(Statement):
 
     def as_dict(self) -> dict[str, Any]:
         """The claim as plain values, without what it does not have."""
-        return {key: value for key, value in asdict(self).items() if value not in (None, "") and not _lost(value)}
+        return {key: value for key, value in asdict(self).items() if value not in (None, "", {}) and not _lost(value)}
 
 
 def verdict_of(claim: "Claim") -> str:
@@ -127,9 +127,17 @@ def header(paper: str, command: str, seeds: int | None = None, told: str = SEEDS
     seeds : flights per number, if others than the paper's; told : which seeds they are
     """
     from airflock import __version__
+    from airflock.papers.texts import texts
 
     whole = command + (f" --seeds {seeds}" if seeds else "")
-    return {"paper": paper, "command": whole, "seeds": told, "version": __version__, "precision": "32 bits"}
+    return {
+        "paper": paper,
+        "command": whole,
+        "seeds": told,
+        "version": __version__,
+        "texts": texts(),
+        "precision": "32 bits",
+    }
 
 
 def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) -> None:
@@ -148,7 +156,7 @@ def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) 
     for claim in claims:
         entry = tomlkit.table()
         for key, value in claim.as_dict().items():
-            entry.add(key, _rounded(value))
+            entry.add(key, _inline(value) if isinstance(value, Mapping) else _rounded(value))
         table.append(entry)
     document.add("claim", table)
     try:
@@ -261,6 +269,14 @@ def _numbers(claim: Claim) -> str:
 def _lost(value: Any) -> bool:
     """Not finite: the ratio to a count of 0, say, which TOML readers and JSON do not agree on."""
     return isinstance(value, float) and not math.isfinite(value)
+
+
+def _inline(value: Mapping[str, Any]) -> Any:
+    import tomlkit
+
+    table = tomlkit.inline_table()
+    table.update(value)
+    return table
 
 
 def _rounded(value: Any) -> Any:

@@ -11,6 +11,7 @@ from airflock.engine.simulate import score_flights
 from airflock.engine.threads import in_threads
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
+from airflock.scenarios.change import remade
 from airflock.scenarios.scenario import Scenario
 
 Progress = Callable[[str, int, int], None]  # title, flights done, flights in all
@@ -21,20 +22,27 @@ class Flights:
     """How a paper's flights are flown.
 
     quick : fewer seeds, coarser maps; seeds : flights per number instead of the paper's
+    changes : keys that are set in every scenario, for `airflock.papers.breaks`
     """
 
     quick: bool = False
     seeds: int | None = None
     threads: int | None = None
     progress: Progress | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)
     flown: int = field(default=0, init=False)
 
     def count(self, full: int, quick: int) -> int:
         """Number of seeds: what was asked for, else the paper's or a quick number."""
         return self.seeds or (quick if self.quick else full)
 
+    def as_changed(self, scenario: Scenario) -> Scenario:
+        """The scenario with the changes set."""
+        return with_changes(scenario, self.changes) if self.changes else scenario
+
     def score(self, title: str, scenarios: Mapping[Any, Scenario], seeds: int | Mapping[Any, int]) -> pd.DataFrame:
         """Order parameters of every scenario with seeds 0, 1, ...; index (key, seed), in the order given."""
+        scenarios = {key: self.as_changed(scenario) for key, scenario in scenarios.items()}
         pairs = [(k, s) for k in scenarios for s in range(seeds if isinstance(seeds, int) else seeds[k])]
         rows = score_flights(
             [scenarios[k] for k, _ in pairs],
@@ -47,6 +55,7 @@ class Flights:
 
     def courses(self, title: str, scenario: Scenario, seeds: int) -> list[pd.DataFrame]:
         """Order parameters over time of each seed's flight; index time in s."""
+        scenario = self.as_changed(scenario)
         over_time(simulate(scenario, 0))  # compiles both drivers once, before threads ask for them
 
         def job(seed: int) -> Callable[[], pd.DataFrame]:
@@ -69,6 +78,18 @@ class Flights:
         if self.progress:
             self.progress(title, 0, total)
         return count
+
+
+def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """A scenario with keys set anew; a text like "times 0.5" multiplies what the scenario has."""
+    settings = {}
+    for key, value in changes.items():
+        if isinstance(value, str) and value.startswith("times "):
+            section, _, name = key.rpartition(".")
+            owner = scenario.records[section] if section else scenario.flight
+            value = getattr(owner, name) * float(value.removeprefix("times "))
+        settings[key] = value
+    return remade(scenario, settings)
 
 
 @contextmanager

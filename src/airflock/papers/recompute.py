@@ -48,12 +48,17 @@ def paper(
     Traceback (most recent call last):
     airflock.errors.AirflockError: vasarhely_2018: no such paper; did you mean vasarhelyi_2018?
     """
+    claims: list[Claim] = import_module(f"airflock.papers.{known(name)}").PAPER.run(
+        only=only, quick=quick, seeds=seeds, threads=threads
+    )
+    return claims
+
+
+def known(name: str) -> str:
+    """The name of a paper, if there is one; raises AirflockError with the nearest one."""
     if name not in PAPERS:
         near = get_close_matches(name, PAPERS, n=1)
         raise AirflockError(
             f"{name}: unknown paper; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(PAPERS)}"
         )
-    claims: list[Claim] = import_module(f"airflock.papers.{name}").PAPER.run(
-        only=only, quick=quick, seeds=seeds, threads=threads
-    )
-    return claims
+    return name

@@ -8,7 +8,7 @@ names in braces.
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from importlib import resources
 from typing import Any
 
@@ -42,7 +42,10 @@ class Statement:
     bound     : condition that is asked for, on the names of `airflock.papers.bounds`
     published, published_sd : what the quote prints, and nothing else
     unit      : of the numbers, if not SI
-    fails_if  : a change of a rule, a number or a time under which the bound is missed
+    fails_if  : a change of a rule, a number or a time under which the bound is missed, in words
+    breaks    : the same as keys of a scenario, set in every flight of the part, as `airflock.papers.breaks` flies it;
+                `times 0.5` halves a number
+    part      : which part of the paper measures it; else the first word of the id
     verdict   : of a statement without a bound: qualitative only, not testable or not flown yet
     reason    : why it has none; command : what would fly it
     changed   : what was judged before, with date and reason
@@ -60,6 +63,8 @@ class Statement:
     published_sd: float | None = None
     unit: str = ""
     fails_if: str = ""
+    breaks: Mapping[str, Any] = field(default_factory=dict)
+    part: str = ""
     verdict: str = ""
     reason: str = ""
     command: str = ""
@@ -81,7 +86,7 @@ def read(text: str, name: str) -> dict[str, Statement]:
         entries = tomllib.loads(text)["statement"]
     except (tomllib.TOMLDecodeError, KeyError) as fault:
         raise AirflockError(f"{name}: {fault}") from fault
-    known = {field.name for field in fields(Statement)}
+    known = {each.name for each in fields(Statement)}
     found: dict[str, Statement] = {}
     wrong: list[str] = []
     for entry in _expanded(entries):

@@ -54,7 +54,7 @@ class Stage:
         self.tail, self.speed = tail, speed
         self.world = world = world_of(recording)
         self.view, self.solid = self._seen(recording, first)
-        left, right, bottom, top = extent(self._raised(first), world, self.view, margin=0.03)
+        left, right, bottom, top = extent(first, world, self.view, margin=0.03)
         if self.solid is not None:
             left, right, bottom, top = self.solid.box
         head = 0.085 * (top - bottom)  # for title and clock
@@ -120,19 +120,11 @@ class Stage:
             return solid.view, solid
         if self.oblique:
             return view_of(3), None
-        return (view_of(2) if self.flat else View(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))), None
-
-    def _raised(self, paths: Paths) -> Paths:
-        """Paths with as many axes as are seen."""
-        if not (self.flat and self.oblique):
-            return paths
-        return Paths(paths.times, *(np.pad(part, ((0, 0), (0, 1), (0, 0))) for part in paths[1:]))
+        return view_of(2), None
 
     def _stand(self, axes: Any, recording: xr.Dataset, first: Paths) -> None:
         """Walls, obstacles and what stands in a scene."""
         for corners, obstacle in walls(self.world):
-            if corners.shape[1] == 2 and self.oblique:
-                corners = np.pad(corners, ((0, 0), (0, 1)))
             x, y = self.view(corners)
             color = style.RED if obstacle else style.BLUE
             if obstacle and self.flat:
@@ -143,13 +135,12 @@ class Stage:
             axes.imshow(self.solid.colour, extent=self.solid.box, interpolation="antialiased", zorder=0, aspect="equal")
             axes.set(xlim=axes.get_xlim())
             return
-        around = [np.column_stack(self.view(_as_deep(line, self.view))) for line in scenery(recording, first)]
+        around = [np.column_stack(self.view(line)) for line in scenery(recording, first)]
         axes.add_collection(LineCollection(around, colors=style.GREY, linewidths=0.6, alpha=0.6), autolim=False)
 
     def _place(self, instant: float) -> Array:
         """Positions of all agents (axis, agent), m."""
-        place = _between(self.paths.times, self.paths.position, instant, self._leap)
-        return np.pad(place, ((0, 1), (0, 0))) if self.flat and self.oblique else place
+        return _between(self.paths.times, self.paths.position, instant, self._leap)
 
     @property
     def _leap(self) -> Array | None:
@@ -161,8 +152,7 @@ class Stage:
     def _pace(self, instant: float) -> tuple[Array, Array, Array]:
         """Velocities of all agents along the picture, and their speeds, m/s."""
         values = _between(self.paths.times, self.paths.velocity, instant)
-        seen = np.pad(values, ((0, 1), (0, 0))) if self.flat and self.oblique else values
-        return *self.view(seen, axis=0), np.sqrt((values**2).sum(0))
+        return *self.view(values, axis=0), np.sqrt((values**2).sum(0))
 
     def _set_tails(self, instant: float) -> None:
         begin = max(instant - self.tail, float(self.paths.times[0]))
@@ -180,12 +170,6 @@ class Stage:
         age = (moments[1:] - instant) / self.tail
         colors[:, 3] = np.repeat(np.clip(0.6 * (1.0 + age), 0.02, 1.0), past.shape[2])
         self.tails.set_color(colors[kept])  # type: ignore[arg-type]
-
-
-def _as_deep(line: Array, view: View) -> Array:
-    """A line with as many axes as a projection has."""
-    axes = len(view.right)
-    return line[:, :axes] if line.shape[1] >= axes else np.pad(line, ((0, 0), (0, axes - line.shape[1])))
 
 
 def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: Paths) -> Any:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from airflock.errors import RecordingError
 from airflock.plots import style
 from airflock.plots.scene import details_of, name_of, window
+from airflock.plots.series import Pen
 from airflock.recordings.scores import measure
 
 FEW = 10.0  # sub-swarms or collisions up to which their axis is linear
@@ -19,11 +20,13 @@ def flocked(
     *,
     start: float | None = None,
     stop: float | None = None,
+    smooth: float | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> Figure:
     """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
 
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
+    smooth      : window of the means of shares, s, as in `series`
     """
     values, course = measure(recording, settings)
     if "flocked" not in course:
@@ -33,8 +36,9 @@ def flocked(
     figure = style.Picture(7.0, 4.2)
     figure.set_layout_engine("constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-    handles = upper.plot(course.index, course["flocked"], color=style.BLUE, linewidth=1.1, label="flocked")
-    handles += upper.plot(course.index, course["polarisation"], color=style.GREEN, linewidth=0.7, label="polarisation")
+    pen = Pen(course, smooth)
+    handles = pen.draw(upper, course["flocked"], style.BLUE, "flocked")
+    handles += pen.draw(upper, course["polarisation"], style.GREEN, "polarisation")
     for time in values.get("time_to_goal", []):
         if begin <= time <= end:
             upper.axvline(time, color=style.ORANGE, linewidth=0.7, zorder=0)
@@ -49,5 +53,5 @@ def flocked(
     lower.set_ylim(bottom=0.0)
     style.dress(lower, "time (s)", "number")
     style.legend(lower, lower.get_lines(), columns=2)
-    style.overall(figure, name_of(recording), details_of(recording))
+    style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
     return figure

@@ -163,9 +163,11 @@ class View(NamedTuple):
     up: Array
 
     def __call__(self, points: Array, axis: int = 1) -> tuple[Array, Array]:
-        """Picture coordinates of points whose given axis holds their components; both m."""
+        """Picture coordinates of points whose given axis holds their components; both m. A plane lies at height 0."""
         moved = np.moveaxis(points, axis, -1)
-        return moved @ self.right, moved @ self.up
+        known = min(moved.shape[-1], len(self.right))
+        moved = moved[..., :known]
+        return moved @ self.right[:known], moved @ self.up[:known]
 
 
 def view_of(axes: int, azimuth_deg: float = -60.0, elevation_deg: float = 25.0) -> View:

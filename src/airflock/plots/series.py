@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from airflock.errors import AirflockError
 from airflock.plots import style
 from airflock.plots.scene import details_of, name_of, window
+from airflock.recordings.attributes import faults
 from airflock.recordings.scores import over_time, scenario_of
 
 CORR, VEL, LAP = r"$\phi^{\mathrm{corr}}$", r"$\phi^{\mathrm{vel}}/v^{\mathrm{flock}}$", r"$\phi^{\mathrm{LAP}}$"
 STEADY = 1e-4  # share of its value by which a steady value differs
+NAMED = 8  # faults that are named where they begin; more are lines only
 SHARE = 200.0  # of a course that is shown, its smoothing window
 NEAREST, NEAREST_MEAN = r"min $r_{ij}^{\mathrm{min}}$", r"mean $r_{ij}^{\mathrm{min}}$"
 
@@ -39,7 +41,7 @@ def series(
     if "flocked" in course:
         from airflock.plots.flocked import flocked
 
-        return flocked(recording, start=start, stop=stop, settings=settings)
+        return flocked(recording, start=start, stop=stop, smooth=smooth, settings=settings)
     if not {"phi_corr", "phi_vel", "phi_lap"} <= set(course):
         return _each(recording, course, smooth)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0
@@ -59,9 +61,23 @@ def series(
         right.set_ylim(0.0, 1.35 * float(course["r_min_mean"].max()))
     style.legend(upper, handles, columns=4, above=True)
     _rotation(lower, course, style.PURPLE, LAP, pen)
+    _mark_faults(recording, course, upper, lower)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
     style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
     return figure
+
+
+def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
+    """A line where each fault begins, with its kind and agent where there are few."""
+    shown = [told for told in faults(recording) if course.index[0] <= told["begin"] <= course.index[-1]]
+    for told in shown:
+        for axes in (upper, lower):
+            axes.axvline(told["begin"], color="0.55", linewidth=0.7, linestyle=":", zorder=0)
+        if len(shown) <= NAMED:
+            label = f" {told['kind']} ({told['agent']})"
+            lower.text(
+                told["begin"], 0.98, label, transform=lower.get_xaxis_transform(), rotation=90, va="top", fontsize=6
+            )
 
 
 class Pen:

@@ -14,11 +14,12 @@ import xarray as xr
 
 from airflock.doors import from_outside, json_object
 from airflock.errors import RecordingError, bounded
+from airflock.faults.registry import KINDS
 from airflock.scenarios.files import MODELS
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"
-EVENTS = "airflock_events"
+EVENTS, FAULTS = "airflock_events", "airflock_faults"
 
 
 def check_format(recording: xr.Dataset, where: str = "recording") -> None:
@@ -76,11 +77,37 @@ def events(recording: xr.Dataset) -> list[Any]:
     return found
 
 
+def faults(recording: xr.Dataset) -> list[dict[str, Any]]:
+    """Faults that befell agents in flight: kind, agent, and when they began and ended (s; None: they did not end)."""
+    found = (_object(recording, FAULTS) or {}).get("faults", [])
+    sound = isinstance(found, list) and all(
+        isinstance(entry, Mapping) and {"kind", "agent", "begin", "end"} <= set(entry) and _instant(entry["begin"])
+        for entry in found
+    )
+    if not sound:
+        raise RecordingError(f"recording: attribute {FAULTS} is damaged: it holds no list of faults")
+    return [dict(entry) for entry in found]
+
+
+def told_faults(found: list[dict[str, Any]], most: int = 6) -> str:
+    """Faults in one line for a person: what, who and when."""
+    lines = [f"{each['kind']} of agent {each['agent']} at {each['begin']:g} s" for each in found[:most]]
+    more = f", and {len(found) - most} more" if len(found) > most else ""
+    return f"{len(found)} fault{'s' if len(found) > 1 else ''}: {', '.join(lines)}{more}"
+
+
+def _instant(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0.0 <= value < 1e9
+
+
 def flown_with_own_law(recording: xr.Dataset) -> bool:
-    """Whether the law was the user's own, which is not in the recording."""
+    """Whether the law, or a kind of fault, was the user's own, which is not in the recording."""
     document = scenario_document(recording)
-    kind = (document or {}).get("model", {}).get("kind")
-    return document is not None and (LAW in recording.attrs or kind not in MODELS)
+    if document is None:
+        return False
+    kind, faults = document.get("model", {}).get("kind"), document.get("faults", [])
+    own = [entry for entry in faults if isinstance(entry, Mapping) and entry.get("kind") not in KINDS]
+    return LAW in recording.attrs or kind not in MODELS or bool(own)
 
 
 def checksum(recording: xr.Dataset) -> str:

@@ -19,7 +19,9 @@ from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.engine.tables import clock
 from airflock.errors import FlightError
+from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
+from airflock.recordings.perception import finish_keeping, sound
 from airflock.scenarios.files import MODELS, loaded
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
@@ -35,6 +37,7 @@ def simulate(
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
     events: Sequence[Event | Mapping[str, Any]] = (),
+    keep: Sequence[str] = (),
 ) -> xr.Dataset:
     """Fly a scenario once and return the recording, sampled every `metrics.period`.
 
@@ -54,6 +57,10 @@ def simulate(
         Told what auto picked.
     events : sequence of mappings, optional
         What is done to the flight on its way, as `Flight.events` or `recordings.attributes.events` tell it.
+    keep : sequence of str
+        measured: the variables measured_position and measured_velocity, as agents last measured their own; heard: the
+        variable age (time, receiver, sender), s since what was last heard had been sent, nan where nothing was. The
+        flight's bits are the same.
 
     Returns
     -------
@@ -80,13 +87,17 @@ def simulate(
     """
     seed = sound_seed(seed)
     scenario = loaded(scenario).in_flight(seed)
+    sound(keep, events, scenario)
     device = picked([scenario], device, precision=precision, record=True, say=say)
     if device in DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
+        perceived = finish_keeping(flight, keep) if keep else {}
         flight.finish()
-        return recording_of(flight)
-    if events:
-        raise FlightError(f"events: a flight on device = {device} takes none; choose device = cpu or python")
+        return recording_of(flight).assign(perceived)
+    if events or keep:
+        raise FlightError(
+            f"{'events' if events else 'keep'}: a flight on device = {device} takes none; choose device = cpu or python"
+        )
     flown = fly(scenario, seed, precision=precision, record=True, start=start, device=device)
     assert flown.frames is not None
     times = np.arange(len(flown.frames)) * clock(scenario)["sample_every"] * scenario.flight.dt
@@ -121,6 +132,8 @@ def recording_of(flight: Flight) -> xr.Dataset:
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}
     if flight.events:
         attributes["airflock_events"] = json.dumps({"events": [plain(event.plain()) for event in flight.events]})
+    if flight.faults:
+        attributes[FAULTS] = json.dumps({"faults": plain(flight.faults)})
     return dataset(flight.frames, scenario.dimensions, flight.frame_times, attributes, scenario.model.command)
 
 
@@ -150,6 +163,9 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
         kind = table.get("kind") if isinstance(table, dict) else None
         if isinstance(kind, str) and kind.endswith(".py"):
             table["kind"] = PurePath(kind).stem
+    for entry in document.get("faults", ()):
+        if str(entry.get("kind", "")).endswith(".py"):
+            entry["kind"] = PurePath(entry["kind"]).stem
     return document
 
 

@@ -47,7 +47,8 @@ def dataset(
         name: (DIMENSIONS, frames[:, c * dimensions : (c + 1) * dimensions, None, :], {"units": units[name]})
         for c, name in enumerate(names)
     }
-    variables["confidence"] = (("time", "keypoint", "individual"), np.ones((count, 1, agents), np.float32))
+    there = np.isfinite(frames[:, None, :dimensions]).all(axis=2).astype(np.float32)  # 0 of those who are absent
+    variables["confidence"] = (("time", "keypoint", "individual"), there)
     fixed = {"source_software": "airflock", "ds_type": "poses", "fps": 1.0 / period, "time_unit": "seconds"}
     return xr.Dataset(variables, coordinates, {**fixed, **attributes})
 

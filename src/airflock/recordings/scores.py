@@ -148,11 +148,11 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = plan_of(scenario, precision=precision)
+    plan = plan_of(scenario.alike(), precision=precision)
     q = scenario.measured_by()
     every = {"sample_every": q.period, "collide_every": q.collision_period or period}
     steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
-    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    numbers = tables(scenario.alike(), plan, 0).changed(agents=frames.shape[2], **steps)
     _refuse_gaps(plan, present)
     values, series = cpu.measure_frames(plan, numbers, frames, period, present=present)
     names = [name for name, _, _ in columns(plan.metrics)]
@@ -231,12 +231,13 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
     if not _in_file(_kind(document, "metrics"), SETS):
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if not _in_file(_kind(document, "body"), BODIES):
-        document = {**document, "body": {}}
+        document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)
     kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
+    stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
     return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
 
 

@@ -30,7 +30,16 @@ def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         for name, section, known in (("measures", "metrics", SETS), ("vehicle", "body", BODIES))
         if f"{section}.kind" not in settings and document.get(section, {}).get("kind", "") not in ("", *known)
     }
-    return make(document, scenario.name, settings, law=None if shipped else scenario.model, **own)
+    kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
+    if "faults" not in settings and "faults" in document:
+        document["faults"] = named(scenario)
+    return make(document, scenario.name, settings, law=None if shipped else scenario.model, kinds=kinds, **own)
+
+
+def named(scenario: Scenario) -> list[dict[str, Any]]:
+    """The entries of [[faults]], with kinds from files of the user's own by the names that they have in the flight."""
+    given = scenario.document.get("faults", ())
+    return [{**entry, "kind": found.fault.name} for entry, found in zip(given, scenario.faults, strict=True)]
 
 
 def variant(

@@ -65,4 +65,14 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None
         if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
+    faults = result.get("faults")
+    if isinstance(faults, list):
+        result["faults"] = [_fault_with_path(entry, folder) for entry in faults]
     return result
+
+
+def _fault_with_path(entry: Any, folder: Path) -> Any:
+    name = entry.get("kind") if isinstance(entry, Mapping) else None
+    if not isinstance(name, str) or not name.endswith(".py") or Path(name).is_absolute() or not is_file(folder / name):
+        return entry
+    return {**entry, "kind": str((folder / name).absolute())}

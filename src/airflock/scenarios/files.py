@@ -10,10 +10,11 @@ from typing import Any
 
 from airflock.core.contract import Body, MetricSet, Model, model
 from airflock.core.contract import body as gathered_body
+from airflock.core.fault import Fault, fault
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import AirflockError, ScenarioError
 from airflock.metrics.registry import as_set
-from airflock.scenarios import checks, formats, geometry, places, schema, short_keys, units, wings
+from airflock.scenarios import checks, faulty, formats, geometry, groups, places, schema, short_keys, units, wings
 from airflock.scenarios.advice import advice
 from airflock.scenarios.extends import extended
 from airflock.scenarios.ground import file_faults, with_ground
@@ -25,7 +26,7 @@ MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
     "dimock_2003",
 )  # fmt: skip
-TOP = ("model", *SECTIONS, "agents", "duration", "dt", "update", "published", "title")
+TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 
 
 def presets() -> dict[str, Path]:
@@ -53,6 +54,7 @@ def load(
     *,
     metrics: Any = None,
     body: Any = None,
+    faults: Any = None,
     trust: bool = False,
 ) -> Scenario:
     """Scenario from a preset's name or a file.
@@ -73,6 +75,9 @@ def load(
         ours, or a namespace such as globals(); likewise the name of a set or a file.
     body : optional
         A body of your own carries the agents: a `Body`, a namespace, or a name or file.
+    faults : optional
+        Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
+        `airflock.fault` gives, or a list of these.
     trust : bool
         Whether code that the file names, or a file that it extends, may run: a law, a body, order parameters.
 
@@ -102,6 +107,7 @@ def load(
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
         document, own = _given(document, metrics, body)
+        own["kinds"] = _kinds(faults)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, told = with_ground(document, settings or {}, folder)
         own["notes"] += told
@@ -192,6 +198,7 @@ def make(
     law: Model | None = None,
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
+    kinds: Mapping[str, Fault] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
@@ -199,6 +206,7 @@ def make(
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle : a model, a metric set, a body given directly, not by name
+    kinds : kinds of fault given directly, by name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
@@ -233,18 +241,49 @@ def make(
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
+    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
+    faults += more
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     published = _published(merged.get("published", {}))
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
-        name=where, model=found, vehicle=vehicle, measures=measures, published=published, document=merged, **parts
-    )
+        name=where, model=found, vehicle=vehicle, measures=measures, published=published, document=merged, **parts,
+        **single,
+    )  # fmt: skip
     faults = places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    notes = (*notes, *left_out, *told, *converted, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
+    notes = (*notes, *left_out, *told, *converted, *told_of, *_notes(scenario), *advice(scenario))
+    notes = (*notes, *places.place_notes(scenario))
     return replace(scenario, notes=notes)
+
+
+def _individuals(
+    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, vehicle: Body, folder: Path | None,
+    kinds: Mapping[str, Fault] | None, trust: bool,
+) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
+    """Groups and faults of a scenario, notes, and what is wrong with them."""
+    if not {"groups", "faults"} & set(merged) or parts["flight"] is None:
+        return {}, [], []
+    count, flight = int(parts["flight"].agents), parts["flight"]
+    records = {"body": vehicle.Parameters} | ({"model": found.Parameters} if found else {})
+    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records)
+    faults += groups.group_faults(flocks, found)
+    sequential = flight.update == "sequential"
+    made, told, more = faulty.entries(
+        merged.get("faults", ()), count, flocks, sequential, folder, own=kinds, trust=trust
+    )
+    return {"groups": flocks, "faults": made}, notes + told, faults + more
+
+
+def _kinds(given: Any) -> dict[str, Fault]:
+    """Kinds of fault that the caller gives, by name."""
+    if given is None:
+        return {}
+    several = given if isinstance(given, (list, tuple)) else [given]
+    found = [kind if isinstance(kind, Fault) else fault(kind) for kind in several]
+    return {kind.name: kind for kind in found}
 
 
 def _beside(scene: Any, folder: Path | None) -> Any:

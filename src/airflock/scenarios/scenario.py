@@ -10,9 +10,12 @@ from airflock.aero import wing as wings
 from airflock.body import radio, sensors, wind
 from airflock.core import random
 from airflock.core.contract import Body, Metric, MetricSet, Model
+from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
 from airflock.metrics import parameters as metric_parameters
+from airflock.scenarios.faulty import Entry
 from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
@@ -27,6 +30,7 @@ class Scenario:
     body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
     vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
+    groups    : agents that share numbers; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
     notes     : what was adjusted, for a person to read
@@ -55,6 +59,8 @@ class Scenario:
     flight: Flight
     vehicle: Body
     measures: MetricSet
+    groups: tuple[Group, ...] = ()
+    faults: tuple[Entry, ...] = ()
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -99,6 +105,26 @@ class Scenario:
     def order_parameters(self) -> tuple[Metric, ...]:
         """The metrics that measure a flight."""
         return self.measures.of(self.metrics)
+
+    @property
+    def fault_kinds(self) -> tuple[Fault, ...]:
+        """Kinds of fault that may occur."""
+        duration = self.flight.duration
+        return tuple(dict.fromkeys(entry.fault for entry in self.faults if entry.occurs(duration)))
+
+    @property
+    def varied(self) -> tuple[tuple[str, str], ...]:
+        """Numbers that differ among agents, as (letter, name)."""
+        return varied(self.groups, {"p": self.parameters, "b": self.body})
+
+    def own_numbers(self, letter: str, name: str, seed: int) -> list[float]:
+        """One number of every agent, with its tolerance as a seed draws it."""
+        record = self.parameters if letter == "p" else self.body
+        return own_numbers(self.groups, self.agents, letter, name, record, seed)
+
+    def alike(self) -> "Scenario":
+        """The same scenario without groups and faults: what a recording is measured by."""
+        return replace(self, groups=(), faults=()) if self.groups or self.faults else self
 
     def in_flight(self, seed: int) -> "Scenario":
         """The scenario of one flight: where scene.draw = "flight", with the scene that this flight draws."""

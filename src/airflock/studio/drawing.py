@@ -107,9 +107,7 @@ class Drawing:
             Flock(side, number * step + (middle - stage.centre) * (1.0, 1.0, 0.0) * bool(number))
             for number, (side, stage) in enumerate(zip(sides, self.stages, strict=True))
         ]
-        speeds = [float(np.sqrt((flock.velocity**2).sum(1)).max()) for flock in self.flocks]
-        wanted = [float(side.scenario.measured_by().v_flock or 0.0) for side in sides]
-        self.top = max(1.5 * max(wanted), 1.1 * max(speeds), 1e-3)
+        self.top = max(1.5 * usual_speed(side) for side in sides)
         count = sum(len(flock.position) for flock in self.flocks)
         self.size = self.span * min(1.0, (100.0 / count) ** 0.25) / MARGIN
         with view.atomic():
@@ -128,9 +126,7 @@ class Drawing:
     def _stage(self, side: Side) -> Stage:
         stage = stage_of(side.scenario, side.motion[0])
         if side.scenario.world.arena == "none" and not stage.solids:
-            speed = float(np.sqrt((side.motion[1] ** 2).sum(1)).max())
-            speed = max(float(side.scenario.measured_by().v_flock or 0.0), 1.1 * speed / 1.5)
-            stage = stage._replace(span=max(stage.span, OPEN * speed))
+            stage = stage._replace(span=max(stage.span, OPEN * usual_speed(side)))
         return stage
 
     def _build(self) -> None:
@@ -179,9 +175,10 @@ class Drawing:
         velocity = np.vstack([flock.velocity for flock in flocks])
         if not np.isfinite(position).all():
             return
-        tone = colours.colours(
-            self.way, np.vstack([f.position for f in flocks]), velocity, self.top, self.stages[0].height
-        )
+        usual = float(np.quantile(np.sqrt((velocity**2).sum(1)), 0.95))
+        self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
+        own = np.vstack([flock.position for flock in flocks])
+        tone = colours.colours(self.way, own, velocity, self.top, self.stages[0].height)
         self._flash(tone)
         trail, anew = tone.copy(), False
         if chosen is not None:
@@ -246,6 +243,14 @@ class Drawing:
     def places(self) -> NDArray[Any]:
         """Places in the scene of the agents of all sides, (agent, 3) m."""
         return np.vstack([flock.position + flock.offset for flock in self.flocks])
+
+
+def usual_speed(side: Side) -> float:
+    """Speed at which a flock may be expected to fly, m/s: what its law prefers, or at least what it flies at now."""
+    scenario = side.scenario
+    known = scenario.model.preferred_speed or (lambda _: scenario.metrics.v_flock or 0.0)
+    now = float(np.sqrt((side.motion[1] ** 2).sum(1)).max()) / 1.3
+    return max(float(known(scenario.parameters)), now) or float(scenario.measured_by().v_flock or 1.0)
 
 
 def _world(side: Side) -> Any:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from airflock.engine.flight import Flight
 
 KEPT = 600  # points of a chart
-MOST_LINKS = 4000
+MOST_LINKS = 2500
 BINS = 40  # of a histogram
 
 

@@ -69,6 +69,9 @@ class Measuring(Room):
     def chart(self) -> None:
         """Add the present moment and draw everything."""
         flocks, two = self.drawing.flocks, len(self.sides) > 1
+        for side in self.sides:
+            if side.speeds.edges[-1] < self.drawing.top:
+                side.speeds = measures.Histogram(self.drawing.top)
         flights = [flock.side.flight for flock in flocks]
         self.scores = [
             side.note(flock.side.flight, flock.velocity, flock.pairs)

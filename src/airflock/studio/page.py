@@ -56,15 +56,23 @@ class Page:
     def run(self) -> None:
         """Fly and draw in real time until the page is stopped."""
         now = drawn = charted = time.perf_counter()
+        acted = False
         while self._running:
             last, now = now, time.perf_counter()
             moved = self.player.tick(now - last)
             chart = now - charted >= 1.0 / CHARTS
-            if moved or chart:
+            if moved or acted or chart:
                 self.frame(chart)
             charted = now if chart else charted
             drawn = max(drawn + 1.0 / FRAMES, now)
-            time.sleep(max(drawn - time.perf_counter(), 0.001))
+            acted = self._answer_until(drawn)
+
+    def _answer_until(self, end: float) -> bool:
+        """Do at once what a hand asks for, until the next frame is due. Whether anything was done."""
+        acted = self.player.wait(0.001)  # the threads of the page's server come first
+        while self._running and (left := end - time.perf_counter()) > 0.0:
+            acted = self.player.wait(left) or acted
+        return acted
 
     def stand(self) -> None:
         """Draw and list everything anew: the flights are others than before."""

@@ -105,15 +105,21 @@ class Perceiving:
 
 
 def _neighbours(seen: Seen, own: NDArray[Any], size: float) -> dict[str, Any]:
-    """Lines to whom it hears; crosses where it believes them to be, and itself."""
+    """Lines to those whom its law takes notice of; crosses where it believes all to be whom it hears, and itself."""
     at = np.array([other.state[:3] for other in seen.heard]).reshape(-1, 3)
+    noticed = at[np.array(_noticed(seen), bool)]
     believed = np.array(seen.own[:3])[None]
     far = float(np.linalg.norm(believed - own)) > 0.05 * size
     return {
-        "heard": (np.stack([np.broadcast_to(own, at.shape), at], 1), None),
+        "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),
         "ghosts": (crosses(at, 0.5 * size), None),
         "measured": (crosses(believed, 0.7 * size) if far else NONE, None),
     }
+
+
+def _noticed(seen: Seen) -> list[bool]:
+    """Of each that is heard, whether the law made anything of it; all where the law has no rule of one neighbour."""
+    return [any(term) for term in seen.terms] if seen.terms else [True] * len(seen.heard)
 
 
 def crosses(places: NDArray[Any], half: float) -> NDArray[Any]:
@@ -129,6 +135,8 @@ def _about(seen: Seen, scenario: Scenario) -> list[str]:
     wish = ", ".join(f"{part:.2f}" for part in seen.command)
     unit = {"velocity": " m/s", "acceleration": " m/s²"}.get(scenario.model.command, "")
     heard = f"hears {len(seen.heard)} others, at most {oldest:.2g} s old"
+    if sum(_noticed(seen)) < len(seen.heard):
+        heard += f"; its law notices {sum(_noticed(seen))}"
     crossed = f"{_dash(colours.PURPLE, '✕')} where they were heard"
     if off > 0.0:
         crossed += f" {_dash(colours.BLUE, '✕')} where it believes to be, {off:.2g} m off"

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from time import perf_counter
 from typing import Any
 
@@ -16,6 +15,7 @@ from airflock.errors import AirflockError, StudioError
 from airflock.recordings.files import save
 from airflock.replays import replay
 from airflock.scenarios.scenario import Scenario
+from airflock.studio.asked import Asked
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.saving import flown_again, toml_of
@@ -57,7 +57,7 @@ class Player:
         self.hand = 0  # which side the controls act on
         self._rate = 1e4  # motion steps per second, as measured
         self.fault: Callable[[str], None] = lambda line: None  # is told of everything that was refused
-        self._asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._asked = Asked()
         self._open()
 
     def _open(self) -> None:
@@ -130,9 +130,13 @@ class Player:
         """Do something before the next frame; from any thread."""
         self._asked.put(action)
 
+    def wait(self, seconds: float) -> bool:
+        """Wait for some seconds of real time, or until something was asked for and done. Whether it was."""
+        return self._asked.rung(seconds) and self._asked.answer(self._safely)
+
     def tick(self, elapsed: float) -> bool:
         """Do what was asked for, then fly what is due after `elapsed` s of real time. Whether anything moved."""
-        asked = self._answer()
+        asked = self._asked.answer(self._safely)
         if self.paused or self.failure or any(side.flight.over for side in self.sides):
             return asked
         steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
@@ -141,16 +145,6 @@ class Player:
         began, moved = perf_counter(), self.fly(steps)
         self._rate = steps / max(perf_counter() - began, 1e-6)
         return moved or asked
-
-    def _answer(self) -> bool:
-        done = False
-        while True:
-            try:
-                action = self._asked.get_nowait()
-            except Empty:
-                return done
-            done = True
-            self._safely(action)
 
     def _safely(self, action: Callable[[], None]) -> None:
         """Do something; a fault of the user's is a note on the page and a line in the terminal, and nothing else."""

@@ -11,6 +11,7 @@ from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
+from airflock.engine.stages.state import own_row
 from airflock.world import edges
 
 JIT = "@njit(**JIT)"
@@ -40,9 +41,9 @@ class Builder:
     def row(self, name: str) -> int:
         """Index of a row of the work table; unperturbed perception shares the rows of the truth."""
         plan = self.plan
-        if not plan.noisy and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:
+        if not plan.believes and name in {f"m{a}" for a in "xyz"} | {f"mv{a}" for a in "xyz"}:
             name = name[1:]
-        if not (plan.noisy or plan.delayed) and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
+        if not plan.told and name in {f"h{a}" for a in "xyz"} | {f"hv{a}" for a in "xyz"}:
             name = name[1:]
         return self.rows.setdefault(name, len(self.rows))
 
@@ -75,6 +76,15 @@ class Builder:
                 lines.append(f"{letter} = {kind}({values})")
             offset += len(fields)
         return lines
+
+    def own(self, letter: str) -> tuple[list[str], str]:
+        """Lines that make the record of agent i of the rows of what differs among agents, and its name."""
+        if not self.plan.varies(letter):
+            return [], letter
+        fields = self.plan.records[letter]
+        kind = self.source.record(letter.upper() * 2, fields)
+        values = [f"{own_row(letter, f)}[i]" if (letter, f) in self.plan.varied else f"{letter}.{f}" for f in fields]
+        return [f"own_{letter} = {kind}({', '.join(values)})"], f"own_{letter}"
 
     def whole(self, *names: str) -> list[str]:
         """Lines that read integers of this world."""

@@ -8,9 +8,10 @@ from airflock.core.vocabulary import Own, asks
 from airflock.engine.passes import flock, grid, percept, scene
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
-from airflock.engine.specialise.values import Call
+from airflock.engine.specialise.values import Call, argument
+from airflock.engine.stages import faults, surfaces
 from airflock.engine.stages import neighbours as meeting
-from airflock.engine.stages import surfaces
+from airflock.engine.stages.state import own_row
 from airflock.engine.stages.words import live
 
 EXTREME = {"min": "least", "max": "most"}
@@ -68,6 +69,7 @@ def decide(build: Builder) -> None:
     used = set(asks(model.decide, "decide", model.name))
     memory = getattr(model.Memory, "_fields", ()) if "memory" in used else ()
     lines = build.records(" ".join(["p c", *(name for name in ("wing", "aero") if name in used)]))
+    lines += build.bind([own_row(letter, name) for letter, name in plan.varied if letter == "p"])
     lines += build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
     lines += build.bind([f"c{a}" for a in axes])
     body = [f"v{a} = mv{a}[i]" for a in axes] + ([] if plan.dimensions == 3 else ["vz = ZERO"])
@@ -95,7 +97,9 @@ def decide(build: Builder) -> None:
         lines += build.bind([f"goal_{a}" for a in axes]) if plan.own else []
         body += scene.look(build, model)
         body += [f"percept = {percept.record(build)}({percept.values(build)})"]
-    body += [f"o = {build.call(model.decide, 'decide', {'period': 'c.period'}, model.name)}"]
+    own, p = build.own("p")
+    body = [*own, *body]
+    body += [f"o = {build.call(model.decide, 'decide', {'period': 'c.period', 'p': p}, model.name)}"]
     body += [f"c{a}[i] = o[{c}]" for c, a in enumerate(axes)]
     body += [f"mem[{c}, i] = o[3][{c}]" for c in range(len(memory))]
     if "percept" in used and model.sight is not None:
@@ -103,6 +107,13 @@ def decide(build: Builder) -> None:
         body += ["rays_[i] = real(counts[0])"]
     percept.bind(build)
     build.stage("decide", "k_, n, time, row, whole, work, mem, edges, spans, scene", lines, build.each(body))
+
+
+def overrule(build: Builder) -> None:
+    """Function overrule: faults of the commands, where there are such kinds."""
+    if build.plan.suffers("overrule"):
+        made = specialise(build, faults.overrule, time=argument("time"))
+        build.stage("overrule", "n, time, row, work", made.once, made.body, made.answer)
 
 
 def _asked(build: Builder, sums: list[int]) -> list[int]:

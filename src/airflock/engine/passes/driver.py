@@ -58,18 +58,20 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     axes = plan.axes
     perceive.snapshot(build)
     perceive.perceive(build)
+    perceive.tune(build)
     perceive.receive(build)
     decide.neighbours(build)
     decide.boundaries(build)
     flock.flock(build)
     decide.decide(build)
+    decide.overrule(build)
     move.begin(build)
     move.move(build)
     for clock in _clocks(plan):
         measure.measure(build, clock)
     lines = build.whole("agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring")
     lines += build.records("q c") + ["n = agents", SPAN, "late = real(delay) * c.dt"]
-    heard_late = plan.noisy or plan.delayed
+    heard_late = plan.late
     start = ["status = begin(n, m, row, whole, work, edges, spans, start, scene)"]
     start += [*branch("status < 0", ["return status"]), *slots.numbered(build)]
     start += loop("slot in range(ring)", ["snapshot(slot, m, work, past)"]) if heard_late else []
@@ -81,6 +83,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     sense = [*(sense if heard_late else []), *_world(build, "c.dt")]
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
+    choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
         choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
         choose += slots.rearrange(build)
@@ -89,6 +92,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
+    choose += ["overrule(n, time, row, work)"] if plan.suffers("overrule") else []
     step = ["time = real(step) * c.dt"]
     if plan.sequential:  # who senses and who moves alternate: there is no place to cut a step
         step += sense

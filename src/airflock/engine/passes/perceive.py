@@ -3,6 +3,7 @@
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
+from airflock.engine.stages import faults
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages import receive as hearing
 
@@ -17,6 +18,13 @@ def perceive(build: Builder) -> None:
     """Function perceive: own state as measured, the others' as heard."""
     made = specialise(build, measuring.perceive, decision=argument("k"))
     build.function("perceive(k, slot, m, row, whole, work, ring, words)", made.lines, "return 0")
+
+
+def tune(build: Builder) -> None:
+    """Function tune: what faults leave of radios and clocks, where there are such kinds."""
+    if build.plan.suffers("radio", "clock"):
+        made = specialise(build, faults.tune, decision=argument("k_"))
+        build.function("tune(k_, m, row, work)", made.lines, "return 0")
 
 
 def receive(build: Builder) -> None:

@@ -44,7 +44,7 @@ def look(build: Builder, model: Model) -> list[str]:
     if not sees(build):
         return [*lines, "gathered = 0"]
     position = f"mx[i], my[i], {build.z('mz[i]')}"
-    sight = build.call(model.sight, "sight", {}, model.name)
+    sight = build.call(model.sight, "sight", {"p": build.own("p")[1]}, model.name)
     return [*lines, f"gathered = {build.source.name(bvh.gather)}({position}, {sight}, shapes, nodes, links, near)"]
 
 

@@ -15,7 +15,12 @@ EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about
 
 
 def slotted(plan: Plan) -> bool:
-    """Whether agents have slots: not where rules of the whole flock know them by number."""
+    """Whether agents have slots: where they are sorted, and where some may be absent, who lie behind the others."""
+    return plan.absence or sorted_by_cells(plan)
+
+
+def sorted_by_cells(plan: Plan) -> bool:
+    """Whether agents are put beside those they meet: not where rules of the whole flock know them by number."""
     return plan.grid and not plan.sequential and not owners(plan)
 
 
@@ -26,7 +31,7 @@ def numbered(build: Builder) -> list[str]:
 
 def rearrange(build: Builder) -> list[str]:
     """Lines that now and then move all agents to where they were just sorted to; sums lend their memory meanwhile."""
-    if not build.slots:
+    if not sorted_by_cells(build.plan):
         return []
     body = [*opened(build), "kept = totals_[:n]"]
     for table in ("work", "mem", "memory"):

@@ -204,6 +204,22 @@ class Expressions:
 
     _ListComp = _GeneratorExp
 
+    def _DictComp(self, node: ast.DictComp, scope: Scope) -> object:
+        (part,) = node.generators
+        found = {}
+        for item in self.value(part.iter, scope):
+            inner = Scope(scope.text, dict(scope.known))
+            self.bind(part.target, item, inner)
+            found[self.value(node.key, inner)] = self.value(node.value, inner)
+        return found
+
+    def _Dict(self, node: ast.Dict, scope: Scope) -> object:
+        found: dict[Any, Any] = {}
+        for key, value in zip(node.keys, node.values, strict=True):
+            made = self.value(value, scope)
+            found |= made if key is None else {self.value(key, scope): made}
+        return found
+
     def _Call(self, node: ast.Call, scope: Scope) -> object:
         called = self.value(node.func, scope)
         if called is words.ask:
@@ -235,12 +251,16 @@ class Expressions:
     def _asked(self, node: ast.Call, scope: Scope) -> ast.expr:
         """A call of a rule with what it asks for, in its order; nothing else that is offered is looked at."""
         rule = self.value(node.args[0], scope)
-        offered = {k.arg: k.value for k in node.keywords}
+        offered: dict[str, Any] = {k.arg: k.value for k in node.keywords if k.arg}
+        known: dict[str, Any] = {}
+        for keyword in node.keywords:
+            known |= self.value(keyword.value, scope) if keyword.arg is None else {}
         names = inspect.signature(rule).parameters
         for name in names:
-            if name not in offered:
+            if name not in offered and name not in known:
                 raise scope.fault(node, f"{rule.__name__} asks for {name}, which is not offered")
-        return ast.Call(given(rule.__name__, "rule", rule), [self.expr(offered[n], scope) for n in names], [])
+        handed = [self.printed(known[n], node, scope) if n in known else self.expr(offered[n], scope) for n in names]
+        return ast.Call(given(rule.__name__, "rule", rule), handed, [])
 
     def helper(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> object:
         """Value of a helper that consists of a docstring and an expression, in place of its call."""

@@ -107,12 +107,15 @@ class _Statements(Expressions):
                 rows[name] = given(name, "word" if name[0] == "u" and name[1:].isdigit() else "row")
             return rows[name]
 
+        record, letters = self.build.source.record, dict.fromkeys(letter for letter, _ in plan.varied)
+        kinds = {letter: record(letter.upper() * 2, plan.records[letter]) for letter in letters}
+        own = {"own": {letter: ast.Name(kind, LOAD) for letter, kind in kinds.items()}}
         number: object = given("order", "number") if self.build.slots else Itself()
         standing = {
             "plan": plan,
             "model": plan.model,
             "flock": Flock(take, plan.dimensions, number),
-            "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records}),
+            "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records} | own),
             "whole": SimpleNamespace(**{name: given(name, "whole") for name in WHOLE}),
             "agents": Loop("n", agents=True),
             "lanes": Loop("m", agents=True),

@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, most, wants
+from airflock.engine.stages.faults import hinder, lasts
+from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, most, real, wants
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
@@ -19,25 +20,30 @@ def fields(record: Any) -> range:
 
 
 def remembered(i: int, flock: Flock, *, plan: Plan) -> Any:
-    """What the body of agent i remembers; None if it keeps no memory."""
-    return kept(plan.body.Memory, i, flock)
+    """What the body of agent i remembers."""
+    return plan.body.Memory(*[flock.body[c][i] for c in fields(plan.body.Memory)]) if plan.body.Memory else None
 
 
-def kept(record: Any, i: int, flock: Flock) -> Any:
-    """What a body whose Memory is this record remembers of agent i."""
-    return None if record is None else record(*[flock.body[c][i] for c in fields(record)])
-
-
-def respond(lanes: Iterable[int], flock: Flock, numbers: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan) -> None:
-    """Velocities by the rule of the body."""
+def respond(
+    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
+) -> None:
+    """Velocities by the rule of the body, and by those of its faults."""
     v, command = flock.velocity, flock.command
     for i in lanes:
         t = ask(
             plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
             mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
             gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
-            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers.b, wing=numbers.wing,
+            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers_of(i, "b", flock, numbers, plan=plan),
+            wing=numbers.wing,
         )  # fmt: skip
+        for kind in plan.suffers("motion"):
+            on = lasts(i, kind, time, flock, numbers)
+            s = hinder(i, t, kind, time, flock, numbers, plan=plan)
+            t = (
+                choose(on, s[X], t[X]), choose(on, s[Y], t[Y]), choose(on, s[Z], t[Z]),
+                *([t[3]] if plan.body.Memory else []),
+            )  # fmt: skip
         for a in range(plan.dimensions):
             v[a][i] = t[a]
         for c in fields(plan.body.Memory):
@@ -58,13 +64,14 @@ def move(
         noise()
         for a in range(plan.dimensions):
             g[a] = flock.outer[a] if plan.dimensions == 3 or step % 2 == 0 else flock.outer[a + 2]
+    time = real(step) * numbers.c.dt
     wx = ZERO
     wy = ZERO
     wz = ZERO
     if plan.windy:
         wx, wy, wz = gusts()
     if plan.integration != "old":
-        respond(lanes, flock, numbers, g, wx, wy, wz, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     fastest = ZERO
     for i in agents:
         fastest = most(fastest, sum(v[a][i] * v[a][i] for a in range(plan.dimensions)))
@@ -72,7 +79,7 @@ def move(
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
-        respond(lanes, flock, numbers, g, wx, wy, wz, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     if plan.edge:
         for i in agents:
             for a in range(plan.dimensions):

@@ -7,7 +7,7 @@ from typing import Any
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     HALF,
     LIMIT,
@@ -30,6 +30,24 @@ from airflock.engine.stages.words import (
 from airflock.world.edges import nearest_image
 
 
+def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Square of how far agent i hears agent j, m². Over links the last packet that came is heard on and on."""
+    return (
+        least(least(range2, flock.reach_in[i]), flock.reach_out[j])
+        if plan.suffers("radio") and not plan.links
+        else range2
+    )
+
+
+def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
+    """How old the data of agent j are, as the clocks of both tell, s."""
+    return (
+        flock.age[j]
+        if plan.lossy or plan.links
+        else (late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late)
+    )
+
+
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
     agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, late: float,
     receive: Callable[[int], None], *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
@@ -41,21 +59,25 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     sums    : each field of Sums that is summed, and how it is reduced
     images  : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
-    axes, p, k, w = range(plan.dimensions), numbers.p, numbers.k, numbers.w
+    axes, k, w = range(plan.dimensions), numbers.k, numbers.w
     heard_position = flock.latest_position if plan.links else flock.heard_position
     heard_velocity = flock.latest_velocity if plan.links else flock.heard_velocity
     selective = plan.lossy or plan.links
-    true_range = plan.noisy or plan.delayed or plan.links  # who is in range is a matter of true distances
+    true_range = plan.perturbed  # who is in range is a matter of true distances
     # A neighbour at exactly the range or the reach counts. Squares of distances that carry the guard TINY, which only
     # double precision can tell, are compared with squares that carry it, too.
     exact = plan.bits == 64
     range_ = least(k.range, LIMIT)
     range2 = range_ * range_ + TINY if exact and not true_range else range_ * range_
-    if model.reach is not None:
-        near = least(ask(model.reach, p=p), LIMIT)
+    if model.reach is not None and not plan.varies("p"):
+        near = least(ask(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if exact else near * near
     for i in agents:
         ii = integer(i)
+        own_p = numbers_of(i, "p", flock, numbers, plan=plan)
+        if model.reach is not None and plan.varies("p"):
+            near = least(ask(model.reach, p=own_p), LIMIT)
+            near2 = near * near + TINY if exact else near * near
         if selective:
             receive(i)
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
@@ -95,7 +117,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                 if plan.periodic:
                     for a in axes:
                         o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-                ok = (sum(o[a] * o[a] for a in axes) <= range2) & (integer(j) != ii)
+                ok = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
             else:
                 ok = (r2 <= range2) & (integer(j) != ii)
             if model.reach is not None:
@@ -105,7 +127,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             t = ask(
                 model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z], dv=speed,
                 vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
-                age=flock.age[j] if selective else late, lower=ONE if integer(j) < ii else ZERO, p=p,
+                age=heard_age(i, j, late, flock, plan=plan), lower=ONE if integer(j) < ii else ZERO, p=own_p,
             )  # fmt: skip
             for c, how in sums:
                 total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))

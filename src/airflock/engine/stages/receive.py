@@ -7,10 +7,27 @@ from airflock.body import radio
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, real, vector
+from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, least, real, vector
 from airflock.world.edges import nearest_image
 
 LOSS, LINK = random.LOSS, random.LINK
+
+
+def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
+    """Number by which random numbers know the pair, whoever else is there."""
+    return flock.number[i] * whole.born + flock.number[j] if plan.absence else i * n + j
+
+
+def drawn(i: int, j: int, n: int, decision: int, stream: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
+    """Random words of the pair."""
+    return random.draw(
+        pair_number(i, j, n, flock, whole, plan=plan), decision, stream, whole.world, whole.seed_low, whole.seed_high
+    )
+
+
+def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
+    """A time (s) as the clock of agent i tells it."""
+    return time + flock.clock[i] if plan.suffers("clock") else time
 
 
 def receive(
@@ -41,12 +58,12 @@ def receive(
         else:
             d = math.sqrt(sum((x[a][j] - x[a][i]) * (x[a][j] - x[a][i]) for a in axes) + TINY)
         if plan.lossy:
-            w0, w1, w2, w3 = random.draw(i * n + j, decision, LOSS, whole.world, whole.seed_low, whole.seed_high)
+            w0, w1, w2, w3 = drawn(i, j, n, decision, LOSS, flock, whole, plan=plan)
             arrives = random.uniform(w0) >= radio.lost(d, k)
         else:
             arrives = True
         if plan.links:
-            w0, w1, w2, w3 = random.draw(i * n + j, decision, LINK, whole.world, whole.seed_low, whole.seed_high)
+            w0, w1, w2, w3 = drawn(i, j, n, decision, LINK, flock, whole, plan=plan)
             miss_fast = (ONE - radio.received(d, ZERO, k)) ** fast
             miss_slow = (ONE - radio.received(d, ONE, k)) ** slow
             got = (
@@ -54,11 +71,13 @@ def receive(
                 & (d <= (farthest if plan.bits == 64 else k.range))
                 & (random.uniform(w0) >= miss_fast * miss_slow)
             )
+            if plan.suffers("radio"):
+                got = got & (d * d <= least(flock.reach_in[i], flock.reach_out[j]) + TINY)
             if got:
                 for c, row in enumerate(said):
                     store[i, c, j] = row[j]
-                store[i, 2 * dims, j] = time - late
-            flock.age[j] = time - store[i, 2 * dims, j]
+                store[i, 2 * dims, j] = by_clock(time - late, j, flock, plan=plan)
+            flock.age[j] = by_clock(time, i, flock, plan=plan) - store[i, 2 * dims, j]
             flock.heard[j] = ONE if store[i, 2 * dims, j] > -1e8 else ZERO
             for a in axes:
                 flock.latest_position[a][j] = store[i, a, j] + store[i, a + dims, j] * flock.age[j]
@@ -66,4 +85,4 @@ def receive(
                 flock.latest_velocity[a][j] = store[i, a + dims, j]
         else:
             flock.heard[j] = ONE if arrives else ZERO
-            flock.age[j] = late
+            flock.age[j] = late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late

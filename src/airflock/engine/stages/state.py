@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from airflock.engine.plan import Plan
 from airflock.engine.stages.words import NOTHING
 
 Row = Any  # one number per agent: row[i]
@@ -43,6 +44,8 @@ class Flock:
     heard, age                           : whether that agent hears each other one (1 or 0), and how old that is, s
     own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
     sent_error, sent_drift               : the same of what is sent to others
+    reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
+    clock                                : how far its clock is ahead, s
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body                                 : what the body remembers, by field of its Memory
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
@@ -76,3 +79,50 @@ class Flock:
     def age(self) -> Row:
         """How old that is, s."""
         return self._take("age")
+
+    @property
+    def reach_out(self) -> Row:
+        """Square of how far the packets of each agent carry, m²; negative where nobody hears it."""
+        return self._take("reach_out")
+
+    @property
+    def reach_in(self) -> Row:
+        """Square of how far each agent hears, m²; negative where it hears nobody."""
+        return self._take("reach_in")
+
+    @property
+    def clock(self) -> Row:
+        """How far the clock of each agent is ahead, s."""
+        return self._take("clock")
+
+    def fault(self, kind: str, what: str) -> Row:
+        """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
+        return self._take(fault_row(kind, what))
+
+    def own(self, letter: str, name: str) -> Row:
+        """A number that differs among agents."""
+        return self._take(own_row(letter, name))
+
+
+def fault_row(kind: str, what: str) -> str:
+    """Name of the row with one number of a kind of fault."""
+    return f"fault_{kind}_{what}"
+
+
+def own_row(letter: str, name: str) -> str:
+    """Name of the row with a number that differs among agents."""
+    return f"number_{letter}_{name}"
+
+
+def numbers_of(i: int, letter: str, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
+    """Record of numbers of agent i: that of the flock, with its own where they differ among agents."""
+    return (
+        numbers.own[letter](
+            *[
+                flock.own(letter, name)[i] if (letter, name) in plan.varied else getattr(getattr(numbers, letter), name)
+                for name in plan.records[letter]
+            ]
+        )
+        if plan.varies(letter)
+        else getattr(numbers, letter)
+    )

@@ -5,7 +5,7 @@ from typing import Any
 
 from airflock.core.contract import Model
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
 from airflock.world import bvh, polygon
 
@@ -17,10 +17,19 @@ def feel(i: int, surface: Any, flock: Flock, numbers: Any, *, plan: Plan, model:
         v[a] = flock.measured_velocity[a][i]
     t = ask(
         model.boundary, distance=surface.distance, nx=surface.nx, ny=surface.ny, nz=surface.nz,
-        vx=v[X], vy=v[Y], vz=v[Z], p=numbers.p,
+        vx=v[X], vy=v[Y], vz=v[Z], p=numbers_of(i, "p", flock, numbers, plan=plan),
     )  # fmt: skip
     for c in live(model.Walls, plan.dimensions):
         flock.walls[c][i] += t[c]
+
+
+def reach_of(i: int, look: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> Any:
+    """How far agent i feels surfaces, m: as far as all, or by its own numbers."""
+    return (
+        least(ask(model.wall_reach, p=numbers_of(i, "p", flock, numbers, plan=plan)), LIMIT)
+        if plan.varies("p") and model.wall_reach is not None
+        else look
+    )
 
 
 def faced(
@@ -47,8 +56,11 @@ def sides(
     x = flock.measured_position
     for e in range(whole.corners):
         for i in agents:
-            f = polygon.wall(x[X][i], x[Y][i], x[Z][i], edges, e, whole.corners, look)
-            if f.distance < look:
+            f = polygon.wall(
+                x[X][i], x[Y][i], x[Z][i], edges, e, whole.corners,
+                reach_of(i, look, flock, numbers, plan=plan, model=model),
+            )  # fmt: skip
+            if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
                 feel(i, f, flock, numbers, plan=plan, model=model)
     for i in agents:
         f = polygon.outside(x[X][i], x[Y][i], x[Z][i], edges, whole.corners)
@@ -85,6 +97,9 @@ def boundaries(
     if plan.scene:
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:
             for i in agents:
-                f = bvh.nearest_of(x[X][i], x[Y][i], x[Z][i], look, ground, shapes, nodes, links)
-                if f.distance < look:
+                f = bvh.nearest_of(
+                    x[X][i], x[Y][i], x[Z][i], reach_of(i, look, flock, numbers, plan=plan, model=model), ground,
+                    shapes, nodes, links,
+                )  # fmt: skip
+                if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
                     feel(i, f, flock, numbers, plan=plan, model=model)

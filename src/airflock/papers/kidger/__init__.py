@@ -1,15 +1,16 @@
 """Kidger, An Investigation into Drone Swarms & Swarm Intelligence: shown there by videos, here by numbers.
 
-Parts: conduct (collisions in four scenes, erratic and slow flights), schemes (five ways to recombine, in a city and a
-forest), corners (thin walls), tuning (every radius and scale), presets (final, natural and poor),
-shepherd (the negative goal), cost (time per boid and frame), learnt (its first wish: parameters learnt from its
-measures), display (its second).
+Parts: readings (what the thesis leaves open about separation), conduct (collisions in four scenes, erratic and slow
+flights), schemes (five ways to recombine, in a city and a forest), corners (thin walls), tuning (every radius and
+scale), presets (final, natural and poor), shepherd (the negative goal), cost (time per boid and frame), learnt (its
+first wish: parameters learnt from its measures), display (its second).
 """
 
-from airflock.papers.kidger import conduct, corners, cost, display, learnt, presets, schemes, shepherd, tuning
+from airflock.papers.kidger import conduct, corners, cost, display, learnt, presets, readings, schemes, shepherd, tuning
 from airflock.papers.paper import Paper, by_modules
 
 MODULES = {
+    "readings": readings,
     "conduct": conduct,
     "schemes": schemes,
     "corners": corners,

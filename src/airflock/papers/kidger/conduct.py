@@ -75,7 +75,7 @@ def fly(flights: Flights) -> Flown:
     seeds = flights.count(SEEDS, 3)
     short = {"duration": 20.0} if flights.quick else {}
     scenes = {name: load(preset, {**keys, **short}) for name, (preset, keys) in SCENES.items()}
-    cases = {name: load(preset, keys) for name, (preset, keys) in RECORDED.items()}
+    cases = {name: flights.as_changed(load(preset, keys)) for name, (preset, keys) in RECORDED.items()}
 
     def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
         return lambda: measures(simulate(scenario, seed))

@@ -53,7 +53,8 @@ def fly(flights: Flights) -> Flown:
     scenarios = {(s, k): load(f"kidger/{s}", {"model.scheme": k, **short}) for s in SCENES for k in SCHEMES}
     table = flights.score("Five schemes in two scenes", scenarios, flights.count(SEEDS, 3))
     most = 20 if flights.quick else EVENTS
-    events = {s: overruled(load(f"kidger/{s}", {"model.scheme": "2", "duration": 20.0}), most) for s in SCENES}
+    second = {"model.scheme": "2", "duration": 20.0}
+    events = {s: overruled(flights.as_changed(load(f"kidger/{s}", second)), most) for s in SCENES}
     minute = {"model.scheme": "4", "duration": 20.0 if flights.quick else 60.0}
     tops = {(s, n): load(f"kidger/{s}", {"model.most": n, **minute}) for s in SCENES for n in range(1, 7)}
     return Flown(table, events, flights.score("Scheme 4 by N", tops, flights.count(FEW, 2)))

@@ -29,7 +29,7 @@ def fly(flights: Flights) -> Flown:
     still = {**OPEN, "goals.points": [[80.0, 0.0, 40.0]], "duration": 10.0, "goals.radius": 0.01}
     farther: dict[float, list[float]] = {}
     for scale in (-0.25, 0.25):
-        scenario = load("kidger/city", {**still, "model.s_goal": scale})
+        scenario = flights.as_changed(load("kidger/city", {**still, "model.s_goal": scale}))
         goal = scenario.waypoints()[0]
         farther[scale] = []
         for seed in range(seeds):

@@ -133,7 +133,7 @@ def _speeds(case: str) -> tuple[int, ...]:
 
 
 def _kept(flights: Flights, name: str, v: int, scored: int, recorded: int) -> pd.DataFrame:
-    scenario = CASES[name].scenario(v)
+    scenario = flights.as_changed(CASES[name].scenario(v))
     text = f"{json.dumps(provenance(scenario, 0, 32))}\n{scored} {recorded}"  # whatever decides the bits
     folder = cache_folder() / "papers" / "vasarhelyi_2018" / "tuning"
     path = folder / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.csv"

@@ -1,0 +1,56 @@
+"""What the words of the vocabulary are: a number, a record, a column of numbers; and what each kind of rule returns."""
+
+LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
+LAW_NUMBERS = ("preferred_speed", "interaction_range")
+MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
+COLUMNS = "MutableSequence[float]"
+
+# (module, name) behind the words that a rule file need not define itself
+KNOWN = {
+    "Own": ("airflock.core.vocabulary", "Own"),
+    "Percept": ("airflock.core.vocabulary", "Percept"),
+    "Mean": ("airflock.core.vocabulary", "Mean"),
+    "Wing": ("airflock.aero.wing", "Parameters"),
+    "Descent": ("airflock.aero.descent", "Parameters"),
+    "Measured": ("airflock.metrics.parameters", "Parameters"),
+    "Any": ("typing", "Any"),
+    "Literal": ("typing", "Literal"),
+    "Mapping": ("collections.abc", "Mapping"),
+    "MutableSequence": ("collections.abc", "MutableSequence"),
+}
+# names of the contract that are no numbers, wherever they stand
+RECORDS = {
+    "own": "Own", "percept": "Percept", "sums": "Sums", "walls": "Walls", "memory": "Memory", "shared": "Shared",
+    "pair": "Pair", "agents": "Agent", "members": "Member", "clusters": "Cluster", "mean": "Mean", "wing": "Wing",
+    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters",
+}  # fmt: skip
+OF_FLOCK = {
+    **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
+}  # fmt: skip
+# where a word means something else than in the other kinds
+SPECIAL = {
+    "flock": OF_FLOCK,
+    "survey": OF_FLOCK,
+    "workspace": {"n": "int"},
+    "fitness": {"values": "Mapping[str, float]", "agents": "int"},
+    "faults": {"edges": "str"},
+}
+VECTOR = "tuple[float, float, float]"
+RESULTS = {
+    **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
+    "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
+    "pair": "Pair", "linked": "bool", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
+    "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
+}  # fmt: skip
+
+
+def kinds_of(functions: set[str]) -> dict[str, str]:
+    """Name of a function → its kind; a helper has none."""
+    kinds: dict[str, str] = {}
+    if "decide" in functions:
+        kinds |= {name: name for name in (*LAW, *LAW_NUMBERS, "workspace")}
+    if "move" in functions:
+        kinds |= {"move": "move", "limits": "limits"}
+    if "sample" in functions or "fitness" in functions:
+        kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
+    return {name: kind for name, kind in kinds.items() if name in functions}

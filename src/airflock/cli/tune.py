@@ -1,0 +1,104 @@
+"""Verb tune: from a scenario of one's own to a set that is evolved, hardened and certified."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from airflock.cli import options, tables
+
+
+def tune(
+    scenario: Annotated[str, typer.Argument(metavar="FILE|PRESET", help="Your drones, field and speed.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of everything.", show_default=False)],
+    budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 20min or 2h.")] = "20min",
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit", "-l", metavar="LIMIT", help="As in certify; repeatable.", show_default="r_coll at 0.01/h"
+        ),
+    ] = None,
+    confidence: Annotated[float, typer.Option(help="Of the certificate.")] = 0.95,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue what is in the folder.")] = False,
+    changes: options.Set = None,
+    trust: options.Trust = False,
+    agents: options.Agents = None,
+    duration: options.Duration = None,
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+) -> None:
+    """Start, evolve, harden, certify, report: tuned.toml to fly, certificate.toml, and report.html to sign.
+
+    Numbers of the law that the file does not give are scaled to its speed. Exit status 1 where a limit is not shown.
+
+    Example: airflock tune mine.toml --budget 20min --out tuned
+    """
+    from airflock.cli.certify import time_of
+    from airflock.scenarios.files import load
+    from airflock.tune.run import tune
+
+    faults: list[str] = []
+    seconds, found = 1.0, None
+    with options.gathering(faults):
+        seconds = time_of(budget)
+    with options.gathering(faults):
+        found = load(scenario, options.settings(changes, agents, duration), trust=trust)
+    options.refuse(faults)
+    assert found is not None
+    options.compile_aloud(found, 32, "cpu")
+    how: dict[str, Any] = {"confidence": confidence, "resume": resume, "threads": threads, "trust": trust}
+    with _stages(as_json) as (watch, note):
+        made = tune(found, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
+    if as_json:
+        tables.emit_json(made.document())
+    else:
+        _print(made)
+    if not made.shown:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
+    """A line that moves: the stage, and how far the search is."""
+    import sys
+
+    if quiet or not sys.stderr.isatty():
+        yield None, None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    shape = (TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+    with Progress(*shape, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        task = bar.add_task("first flights", total=None)
+
+        def watch(p: Any) -> None:
+            best = "" if p.best is None else f", best {p.best:.4f}"
+            bar.update(
+                task, completed=p.done, total=p.total, description=f"search: generation {p.generation + 1}{best}"
+            )
+
+        def note(text: str) -> None:
+            bar.update(task, description=text, total=None)
+
+        yield watch, note
+
+
+def _print(made: Any) -> None:
+    from rich.console import Console
+
+    console = Console()
+
+    def line(text: str) -> None:
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    for note in made.notes:
+        line(f"start: {note}")
+    r = made.result
+    line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")
+    line(f"hardened: {made.steps[-1].verdict}" if made.steps else f"not hardened: {made.why}")
+    for text in made.certificate.statements:
+        line(text)
+    line(f"saved {made.folder}: tuned.toml, certificate.toml, report.html, figures.pdf")

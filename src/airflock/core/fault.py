@@ -1,0 +1,126 @@
+"""The contract of a fault: plain rules, each for the stage of a flight that it disturbs.
+
+A kind of fault is a module with `Parameters` and one or more of seven rules. Its argument names are the declaration, as
+of every rule (`core.vocabulary`). A driver asks a rule only while the fault lasts, and holds it only if a scenario
+names its kind.
+"""
+
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from airflock.core.contract import names_of
+from airflock.core.parameters import Parameters, choices, number_names
+from airflock.core.vocabulary import asks
+from airflock.errors import RuleError
+
+# rule → how many numbers it returns, and what they are
+RULES: Mapping[str, tuple[int, str]] = {
+    "sense": (6, "position (m) and velocity (m/s) that the agent believes and sends"),
+    "tell": (6, "position (m) and velocity (m/s) that it sends instead"),
+    "radio": (2, "how far its packets carry and how far it hears, m; negative for not at all"),
+    "clock": (1, "how far its clock is ahead, s"),
+    "overrule": (3, "the command that reaches its body"),
+    "motion": (3, "its velocity after the step, m/s"),
+    "leaves": (1, "time from the fault's beginning until it is absent, s"),
+}
+KEYS = ("kind", "at", "until", "lasts", "per_hour", "agents", "group", "number")  # of an entry of [[faults]]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A kind of fault: parameters and rules, gathered from a module or any namespace.
+
+    name       : how scenarios refer to it
+    Parameters : record of its numbers (`core.parameters.Parameters`)
+    sense      : what it makes of the own state as measured, which the law acts on and others are sent
+    tell       : what it makes of the state that is sent, after `sense`
+    radio      : what is left of the radio's range, outwards and inwards
+    clock      : how far the clock is ahead, which stamps packets and tells the age of others'
+    overrule   : what it makes of a command, after the law
+    motion     : what it makes of a motion step, after the body
+    leaves     : when the agent drops out of the flight for good
+    """
+
+    name: str
+    Parameters: type
+    sense: Callable[..., Any] | None = None
+    tell: Callable[..., Any] | None = None
+    radio: Callable[..., Any] | None = None
+    clock: Callable[..., float] | None = None
+    overrule: Callable[..., Any] | None = None
+    motion: Callable[..., Any] | None = None
+    leaves: Callable[..., float] | None = None
+    doc: str = ""
+
+    def __hash__(self) -> int:
+        return hash((self.name, *(getattr(self, kind) for kind in RULES)))
+
+    @property
+    def rules(self) -> dict[str, Callable[..., Any]]:
+        """Its rules by the stage that asks them."""
+        return {kind: getattr(self, kind) for kind in RULES if getattr(self, kind) is not None}
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of its numbers, in declared order."""
+        return number_names(self.Parameters)
+
+    @cached_property
+    def record(self) -> type:
+        """NamedTuple of its numbers, which its rules are handed as `f`."""
+        return namedtuple(self.name.title().replace("_", ""), self.fields)  # type: ignore[misc]
+
+    @property
+    def onset(self) -> tuple[str, ...]:
+        """What of the agent's state its rules want to know as it was when the fault began, such as "at_x"."""
+        asked = {name for kind, rule in self.rules.items() for name in asks(rule, kind, self.name)}
+        return tuple(sorted(name for name in asked if name.startswith("at_")))
+
+
+def fault(namespace: Any, name: str = "") -> Fault:
+    """Gather a kind of fault from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds any of the rules sense, tell, radio, clock, overrule, motion and leaves, and Parameters if they need any
+        numbers.
+    name : str, optional
+        How the kind is called; by default the namespace's.
+
+    Returns
+    -------
+    Fault
+        To be given to `airflock.load(..., faults=...)`.
+
+    Raises
+    ------
+    RuleError
+        If it has no rule, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Sluggish:
+    ...     def motion(vx, vy, vz, nx, ny, nz):
+    ...         return vx + 0.5 * (nx - vx), vy + 0.5 * (ny - vy), vz + 0.5 * (nz - vz)
+    >>> sorted(airflock.fault(Sluggish).rules)
+    ['motion']
+    """
+    found, name = names_of(namespace, name)
+    rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
+    if not rules:
+        raise RuleError(f"fault {name} has no rule; give one or more of {', '.join(RULES)}")
+    for kind, rule in rules.items():
+        asks(rule, kind, name)
+    record = found.get("Parameters", Parameters)
+    taken = [key for key in number_names(record) if key in KEYS]
+    if taken:
+        raise RuleError(f"fault {name}: Parameters.{taken[0]}: the name has a meaning of its own in [[faults]]")
+    made = Fault(name, record, doc=str(found.get("__doc__") or ""), **rules)
+    if choices(record()):
+        raise RuleError(f"fault {name}: Parameters holds a choice; make a kind of its own for each")
+    return made

@@ -1,0 +1,22 @@
+"""Beginnings: what agents and pairs carry before they have flown or heard anything."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.plan import Plan
+
+NEVER = -1e9  # s; time stamp of a packet that has not come
+
+
+def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
+    """What metrics remember of each agent, at its start: (field, lane)."""
+    blocks = [beginning(metric.Memory, m, real) for metric in plan.metrics if metric.Memory is not None]
+    return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
+
+
+def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
+    """The defaults of a Memory for each of m lanes: (field, lane)."""
+    starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
+    return np.repeat(np.array(starts, real)[:, None], m, axis=1)

@@ -1,0 +1,76 @@
+"""Needs: how much memory a flight takes on this machine, judged before it is compiled and flown.
+
+What grows with the flock is counted: rows of numbers, past states that a delay asks for, a packet of each pair where
+radio links lose some, the grid, and the frames of a recording.
+"""
+
+import os
+from pathlib import Path
+
+from airflock.engine.cuda.memory import most_below
+from airflock.engine.passes import grid
+from airflock.engine.plan import Plan
+from airflock.engine.state import lanes
+from airflock.engine.tables import clock
+from airflock.errors import FlightError
+from airflock.scenarios.scenario import Scenario
+
+SHARE = 0.9  # of the free memory that one flight may take
+ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the laws here keep 20 to 60
+LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container
+
+
+def check(scenario: Scenario, plan: Plan) -> None:
+    """Refuse a flight that this machine's memory cannot hold; raises FlightError with the number that fits."""
+    free = free_memory()
+    if free is None:
+        return
+    room, needed = int(SHARE * free), bytes_of(scenario, plan, scenario.agents)
+    if needed <= room:
+        return
+    fit = most_below(scenario.agents, lambda agents: bytes_of(scenario, plan, agents) <= room)
+    told = [f"agents = {scenario.agents} needs about {needed / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"]
+    told.append(f"about {fit} agents fit")
+    frames = _frames(scenario, plan, scenario.agents)
+    if frames > 0 and needed - frames <= room:
+        share = (room - needed + frames) / frames
+        told.append(f"or a recording of {share * scenario.flight.duration:.3g} s, or samples further apart")
+    raise FlightError(f"{scenario.name}: {'; '.join(told)}")
+
+
+def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
+    """Bytes that a flight of so many agents takes, about."""
+    times, real, width, states = clock(scenario), plan.bits // 8, lanes(agents), 2 * plan.dimensions
+    kept = len(getattr(plan.model.Memory, "_fields", ()))
+    kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
+    past = times["ring"] * states if plan.noisy or plan.delayed else 0
+    numbers = (ROWS + kept + past) * width + (agents * (states + 1) * width if plan.links else 0)
+    cells = 8 * grid.CHUNKS * (grid.CELLS * agents + grid.SPARE) if plan.grid else 0
+    return real * numbers + cells + _frames(scenario, plan, agents)
+
+
+def _frames(scenario: Scenario, plan: Plan, agents: int) -> int:
+    """Bytes of the frames of a recording, as they are flown and as they are handed over."""
+    if not plan.record:
+        return 0
+    times = clock(scenario)
+    return 2 * (times["steps"] // times["sample_every"] + 1) * 3 * plan.dimensions * agents * plan.bits // 8
+
+
+def free_memory() -> int | None:
+    """Bytes that this process may still take: of the machine, or of its container if that is less; None if unknown."""
+    found = []
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                found.append(1024 * int(line.split()[1]))
+    except (OSError, ValueError):
+        names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
+        if {"SC_PHYS_PAGES", "SC_PAGE_SIZE"} <= set(names):
+            found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    for limit in map(Path, LIMITS):
+        try:
+            found.append(int(limit.read_text(encoding="ascii")))
+        except (OSError, ValueError):  # no container, or one without a limit
+            continue
+    return min(found, default=None)

@@ -1,0 +1,138 @@
+"""Onsets: when faults begin and whom they hit, drawn beforehand; and the columns that are written when they do."""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from airflock.core import random
+from airflock.core.fault import Fault
+from airflock.core.vocabulary import asks
+from airflock.engine.plan import Plan
+from airflock.engine.stages.state import fault_row
+from airflock.scenarios.faulty import Entry
+from airflock.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    from airflock.engine.state import State
+
+ENDLESS = 1e9  # s; how long a fault lasts that does not end
+HOUR = 3600.0  # s
+
+
+class Onset(NamedTuple):
+    """A fault of one agent that begins, or an agent that drops out.
+
+    step  : before which it begins
+    kind  : of the fault; agent : whom it hits
+    lasts : s; ENDLESS without an end
+    numbers : of the kind, by name
+    leaves  : the agent is absent from now on, by a fault that has begun earlier
+    """
+
+    step: int
+    kind: str
+    agent: int
+    lasts: float
+    numbers: tuple[float, ...]
+    leaves: bool = False
+
+
+def onsets(scenario: Scenario, seed: int, world: int = 0) -> tuple[Onset, ...]:
+    """All faults of a flight in the order of their steps."""
+    found: list[Onset] = []
+    for number, entry in enumerate(scenario.faults):
+        found += _of_entry(scenario, entry, number, seed, world)
+    return tuple(sorted(found, key=lambda onset: onset.step))
+
+
+def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[Onset]:
+    dt, kind = scenario.flight.dt, entry.fault
+    numbers = tuple(float(getattr(entry.numbers, name)) for name in kind.fields)
+    for occurrence, at in enumerate(_times(scenario, entry, number, seed, world)):
+        ends = min(entry.lasts, entry.until - at, ENDLESS)
+        lasts = ends if ends >= ENDLESS else round(ends / dt) * dt
+        if lasts <= 0.0:
+            continue
+        step = round(at / dt)
+        gone = _leaves(kind, entry)
+        for agent in _hit(scenario, entry, number, occurrence, seed, world):
+            yield Onset(step, kind.name, agent, lasts, numbers)
+            if gone < lasts:
+                yield Onset(step + round(gone / dt), kind.name, agent, lasts, numbers, leaves=True)
+
+
+def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int) -> Iterator[float]:
+    """When a fault begins, s: once, or with exponential waiting times."""
+    if entry.at is not None:
+        if entry.at < scenario.flight.duration:
+            yield entry.at
+        return
+    time, occurrence = 0.0, 0
+    while entry.per_hour > 0.0:
+        word = random.words(seed, random.FAULT, world, occurrence, number)[0]
+        time -= HOUR / entry.per_hour * math.log(random.uniform(word))
+        occurrence += 1
+        if time >= min(scenario.flight.duration, entry.until):
+            return
+        yield time
+
+
+def _hit(scenario: Scenario, entry: Entry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+    """Whom an occurrence hits: all who may be, or so many of them, drawn without going back."""
+    may = entry.agents
+    if entry.number is None or entry.number >= len(may):
+        return list(may)
+    draw = {agent: random.words(seed, random.FAULT, world, occurrence, agent, 1 + number)[0] for agent in may}
+    return sorted(sorted(may, key=lambda agent: (draw[agent], agent))[: entry.number])
+
+
+def _leaves(kind: Fault, entry: Entry) -> float:
+    """How long after its beginning a fault takes the agent out of the flight, s; inf for never."""
+    if kind.leaves is None:
+        return math.inf
+    given = {"f": kind.record(*(getattr(entry.numbers, name) for name in kind.fields))}
+    return float(kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))))
+
+
+def strike(state: "State", onset: Onset) -> None:
+    """Write the columns of a fault that begins. An agent that is absent is hit by nothing."""
+    slot = onset.agent if state.slots is None else int(state.slots[onset.agent])
+    if slot >= state.here:
+        return
+    plan: Plan = state.plan
+    kind = next((kind for kind in plan.faults if kind.name == onset.kind), None)
+    if kind is None:
+        return
+    work, rows = state.arrays["work"], state.driver.ROWS
+    real, dt = work.dtype.type, state.dt
+    values: dict[str, Any] = {"onset": real(onset.step) * real(dt), "lasts": onset.lasts}
+    values |= dict(zip(kind.fields, onset.numbers, strict=True))
+    values |= {name: work[rows[name[3:]], slot] for name in kind.onset if name[3:] in rows}
+    for name, value in values.items():
+        row = rows.get(fault_row(kind.name, name))
+        if row is not None:
+            work[row, slot] = value
+
+
+def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
+    """Faults that have begun before a step, as plain values: kind, agent, when they begin and end (s; None: never)."""
+    return [
+        {
+            "kind": onset.kind,
+            "agent": onset.agent,
+            "begin": onset.step * dt,
+            "end": None if onset.lasts >= ENDLESS else onset.step * dt + onset.lasts,
+        }
+        for onset in due
+        if onset.step < step and not onset.leaves
+    ]
+
+
+def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
+    """Numbers that differ among agents, (number, agent): of their groups, with the tolerances of manufacture."""
+    made = np.zeros((len(plan.varied), scenario.agents))
+    for c, (letter, name) in enumerate(plan.varied):
+        made[c] = scenario.own_numbers(letter, name, seed)
+    return made

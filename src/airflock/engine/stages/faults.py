@@ -1,0 +1,94 @@
+"""Faults: the one place where a flight asks the rules of faults, each in the stage that it disturbs.
+
+A fault of an agent is a column: when it began, how long it lasts (0 where there is none), its numbers, and what its
+rules want to know of that moment. Columns are written between two steps (`engine.onsets`); here they are only read.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from airflock.core.fault import Fault
+from airflock.engine.plan import Plan
+from airflock.engine.stages.state import Axes, Flock
+from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, ask, choose, least, most, real
+
+
+def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
+    """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
+    return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
+        time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
+    )
+
+
+def about(i: int, kind: Fault, time: Any, flock: Flock, *, plan: Plan) -> Any:
+    """What every rule of a fault may ask for: `since`, its numbers `f`, and what was so when it began."""
+    return {
+        "since": most(time - flock.fault(kind.name, "onset")[i], ZERO),
+        "f": kind.record(*[flock.fault(kind.name, name)[i] for name in kind.fields]),
+        **{name: flock.fault(kind.name, name)[i] if name[-1] in plan.axes else ZERO for name in kind.onset},
+    }
+
+
+def mislead(
+    lanes: Iterable[int], kind: Fault, rule: Callable[..., Any] | None, time: Any, position: Axes, velocity: Axes,
+    flock: Flock, numbers: Any, *, plan: Plan,
+) -> None:  # fmt: skip
+    """Disturb states by the rule `sense` or `tell` of a kind of fault.
+
+    time : at which these states were taken, s
+    """
+    for i in lanes:
+        t = ask(
+            rule, x=position[X][i], y=position[Y][i], z=position[Z][i], vx=velocity[X][i], vy=velocity[Y][i],
+            vz=velocity[Z][i], **about(i, kind, time, flock, plan=plan),
+        )  # fmt: skip
+        on = lasts(i, kind, time, flock, numbers)
+        for a in range(plan.dimensions):
+            position[a][i] = choose(on, t[a], position[a][i])
+        for a in range(plan.dimensions):
+            velocity[a][i] = choose(on, t[a + 3], velocity[a][i])
+
+
+def tune(lanes: Iterable[int], decision: int, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+    """Find how far each agent is heard and hears at a decision, and how far its clock is ahead."""
+    time = real(decision) * numbers.c.period
+    if plan.suffers("radio"):
+        reach = least(numbers.k.range, LIMIT)
+        for i in lanes:
+            out = reach
+            into = reach
+            for kind in plan.suffers("radio"):
+                on = lasts(i, kind, time, flock, numbers)
+                t = ask(kind.radio, reach=reach, **about(i, kind, time, flock, plan=plan))
+                out = least(out, choose(on, t[0], reach))
+                into = least(into, choose(on, t[1], reach))
+            flock.reach_out[i] = choose(out < ZERO, -ONE, out * out)
+            flock.reach_in[i] = choose(into < ZERO, -ONE, into * into)
+    if plan.suffers("clock"):
+        for i in lanes:
+            ahead = ZERO
+            for kind in plan.suffers("clock"):
+                on = lasts(i, kind, time, flock, numbers)
+                t = ask(kind.clock, **about(i, kind, time, flock, plan=plan))
+                ahead = ahead + choose(on, t, ZERO)
+            flock.clock[i] = ahead
+
+
+def overrule(agents: Iterable[int], flock: Flock, numbers: Any, time: float, *, plan: Plan) -> None:
+    """Disturb the commands that laws have just given."""
+    c = flock.command
+    for i in agents:
+        for kind in plan.suffers("overrule"):
+            t = ask(kind.overrule, cx=c[X][i], cy=c[Y][i], cz=c[Z][i], **about(i, kind, time, flock, plan=plan))
+            on = lasts(i, kind, time, flock, numbers)
+            for a in range(plan.dimensions):
+                c[a][i] = choose(on, t[a], c[a][i])
+
+
+def hinder(i: int, moved: Any, kind: Fault, time: Any, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
+    """What the rule `motion` of a kind of fault makes of a motion step, m/s."""
+    return ask(
+        kind.motion, vx=flock.velocity[X][i], vy=flock.velocity[Y][i], vz=flock.velocity[Z][i],
+        cx=flock.command[X][i], cy=flock.command[Y][i], cz=flock.command[Z][i],
+        nx=moved[X], ny=moved[Y], nz=moved[Z], dt=numbers.c.dt, **about(i, kind, time, flock, plan=plan),
+    )  # fmt: skip

@@ -1,0 +1,4 @@
+"""Layer 2: faults of one agent, one kind per file: plain rules that a flight asks while the fault lasts.
+
+Copy the shape of `motor.py` for a kind of your own; docs/faults.md shows one.
+"""

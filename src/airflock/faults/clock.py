@@ -1,0 +1,21 @@
+"""Clock: the agent's clock is ahead. It stamps its packets, and tells how old those of others are, by it.
+
+Only who asks for ages can tell: extrapolation over two links (radio.kind = "links"), and laws that ask for `age`.
+"""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """A constant error of the time."""
+
+    ahead: float = quantity(1.0, "s", low=-1e4, high=1e4, source="our choice", meaning="how far the clock is ahead")
+
+
+def clock(f):
+    """How far it is ahead, s."""
+    return f.ahead

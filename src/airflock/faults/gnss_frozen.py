@@ -1,0 +1,6 @@
+"""GNSS frozen: the receiver goes on telling the last position; the agent believes it, and sends it to the others."""
+
+
+def sense(vx, vy, vz, at_x, at_y, at_z):
+    """Position (m) as it was; the velocity, which inertial sensors hold for a while, is right."""
+    return at_x, at_y, at_z, vx, vy, vz

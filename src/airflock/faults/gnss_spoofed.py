@@ -1,0 +1,20 @@
+"""GNSS spoofed: a stranger's signal makes the agent believe a track of its own, which it sends to the others."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """A straight track from the place where the fault began."""
+
+    east: float = quantity(3.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the track")
+    north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="the same, north")
+    up: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="the same, up")
+
+
+def sense(at_x, at_y, at_z, since, f):
+    """Position (m) and velocity (m/s) of the track, whatever the agent does."""
+    return at_x + f.east * since, at_y + f.north * since, at_z + f.up * since, f.east, f.north, f.up

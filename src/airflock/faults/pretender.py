@@ -1,0 +1,20 @@
+"""Pretender: the agent knows where it is and tells the others another place."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """Where it pretends to be, from where it is."""
+
+    east: float = quantity(20.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, east")
+    north: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="the same, north")
+    up: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="the same, up")
+
+
+def tell(x, y, z, vx, vy, vz, f):
+    """Position (m) off by the offset; the velocity (m/s) is true."""
+    return x + f.east, y + f.north, z + f.up, vx, vy, vz

@@ -1,0 +1,18 @@
+"""Radio range: a damaged antenna reaches less far, in both directions."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """What is left of the range."""
+
+    share: float = quantity(0.25, "1", low=0.0, high=1.0, source="our choice", meaning="share of radio.range")
+
+
+def radio(reach, f):
+    """Ranges outwards and inwards, m."""
+    return f.share * reach, f.share * reach

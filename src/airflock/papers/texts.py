@@ -1,0 +1,20 @@
+"""Texts: a hash of all that decides what a flight gives and how it is judged, for committed pages and kept flights."""
+
+import hashlib
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+FOLDERS = ("core", "models", "body", "aero", "world", "metrics", "engine", "scenarios", "presets", "papers")
+
+
+@cache
+def texts() -> str:
+    """Hash of the rules, the engine, the presets and the papers of this version: 16 hexadecimal digits."""
+    found = hashlib.sha256()
+    root = Path(str(resources.files("airflock")))
+    for folder in FOLDERS:
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                found.update(path.relative_to(root).as_posix().encode() + b"\n" + path.read_bytes())
+    return found.hexdigest()[:16]

@@ -1,0 +1,181 @@
+"""The faults of a scenario file: the entries of [[faults]], each checked as a whole."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from airflock.core.fault import KEYS, Fault, fault
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import quantity
+from airflock.core.vocabulary import asks
+from airflock.errors import AirflockError
+from airflock.faults.registry import KINDS
+from airflock.scenarios import schema, units
+from airflock.scenarios.groups import Group, members
+from airflock.scenarios.own_code import own_code
+
+PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
+MOST = 255  # entries of a file: each draws by a number of its own
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing(Record):
+    """When a fault begins and ends, and how many it hits; beside the numbers of its kind."""
+
+    at: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it begins")
+    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends, and no other begins")
+    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; without it, to the end")
+    per_hour: float | None = quantity(
+        None, "1", low=0.0, high=1e6, meaning="how often it hits the flock in an hour, at random, instead of at"
+    )
+    number: float | None = quantity(
+        None,
+        "1",
+        low=1.0,
+        high=1e7,
+        meaning="how many it hits at once, drawn; by default all, with per_hour one",
+    )
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One entry of [[faults]].
+
+    fault    : its kind; numbers : the kind's parameters
+    agents   : whom it may hit; number : how many of them at once, drawn; None for all
+    at       : when it begins, s; None where it comes at random
+    per_hour : how often it hits the flock in an hour, at random
+    until, lasts : when and after how long it ends, s; inf for never
+    """
+
+    fault: Fault
+    numbers: Any
+    agents: tuple[int, ...]
+    number: int | None
+    at: float | None
+    per_hour: float
+    until: float = math.inf
+    lasts: float = math.inf
+
+    def occurs(self, duration: float) -> bool:
+        """Whether it may occur in a flight of this duration, s."""
+        begin = 0.0 if self.at is None else self.at
+        due = self.per_hour > 0.0 if self.at is None else self.at < duration
+        return due and self.lasts > 0.0 and self.until > begin and bool(self.agents)
+
+
+def entries(
+    given: Any, agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None = None, *,
+    own: Mapping[str, Fault] | None = None, trust: bool = False,
+) -> tuple[tuple[Entry, ...], list[str], list[str]]:  # fmt: skip
+    """Entries of [[faults]], notes of converted units, and everything that is wrong with them, one line each.
+
+    own : kinds that the caller gives, by name
+    """
+    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(e, Mapping) for e in given):
+        return (), [], ["faults is not a list of tables; write [[faults]]"]
+    if len(given) > MOST:
+        return (), [], [f"faults: {len(given)} entries are more than {MOST}"]
+    found: list[Entry] = []
+    notes: list[str] = []
+    faults: list[str] = []
+    kinds = {**KINDS, **(own or {})}
+    for number, table in enumerate(given):
+        entry, told, wrong = _entry(f"faults[{number}]", table, agents, groups, sequential, folder, kinds, trust)
+        notes += told
+        faults += wrong
+        found += [entry] if entry and not wrong else []
+        if entry is not None:
+            if kinds.get(entry.fault.name, entry.fault) != entry.fault:
+                faults.append(f"faults[{number}].kind: {entry.fault.name} is the name of another kind already")
+            kinds[entry.fault.name] = entry.fault
+    return tuple(found), notes, faults
+
+
+def _entry(
+    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group], sequential: bool, folder: Path | None,
+    kinds: Mapping[str, Fault], trust: bool,
+) -> tuple[Entry | None, list[str], list[str]]:  # fmt: skip
+    kind, faults = _kind(where, table.get("kind"), folder, kinds, trust)
+    if kind is None:
+        return None, [], faults
+    names = ("kind", "agents", "group")
+    timing = {key: value for key, value in table.items() if key in KEYS and key not in names}
+    rest = {key: value for key, value in table.items() if key not in KEYS}
+    document = {where: timing, f"{where} ": rest}
+    document, notes, wrong = units.converted(document, {where: Timing, f"{where} ": kind.Parameters})
+    faults += wrong
+    when, wrong = schema.check(where, document[where], Timing)
+    faults += wrong
+    numbers, wrong = schema.check(where, document[f"{where} "], kind.Parameters)
+    faults += wrong
+    who, wrong = _who(where, table, agents, groups)
+    faults += wrong
+    if sequential and PERCEPTION & set(kind.rules):
+        faults.append(
+            f"{where}.kind = {kind.name!r} disturbs what agents know of each other; update = 'sequential' is for agents"
+            " that see each other as they are"
+        )
+    if when is None or numbers is None or who is None:
+        return None, notes, faults
+    faults += _when_faults(where, when, kind, numbers, len(who))
+    count = 1 if when.number is None and when.per_hour is not None else when.number
+    entry = Entry(
+        kind, numbers, who, None if count is None else int(count), when.at, when.per_hour or 0.0,
+        math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
+    )  # fmt: skip
+    return entry, notes, faults
+
+
+def _kind(
+    where: str, name: Any, folder: Path | None, kinds: Mapping[str, Fault], trust: bool
+) -> tuple[Fault | None, list[str]]:
+    """A kind by its name, or from a user's own file, which runs only with `trust`."""
+    if isinstance(name, str) and name in kinds:
+        return kinds[name], []
+    if isinstance(name, str) and name.endswith(".py"):
+        try:
+            return fault(own_code(f"{where}.kind", name, folder, trust=trust), Path(name).stem), []
+        except AirflockError as wrong:
+            return None, str(wrong).splitlines()
+    near = get_close_matches(str(name), kinds, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(kinds)}, or a file that ends in .py"
+    return None, [f"{where}.kind = {name!r} is no kind of fault; {hint}"]
+
+
+def _who(
+    where: str, table: Mapping[str, Any], agents: int, groups: Sequence[Group]
+) -> tuple[tuple[int, ...] | None, list[str]]:
+    """Whom an entry may hit."""
+    if "agents" in table and "group" in table:
+        return None, [f"{where} names agents and a group; give one of them"]
+    if "agents" in table:
+        return members(f"{where}.agents", table["agents"], agents)
+    if "group" not in table:
+        return tuple(range(agents)), []
+    named = {group.name: group.agents for group in groups}
+    if table["group"] in named:
+        return named[table["group"]], []
+    known = f"known: {', '.join(named)}" if named else "the scenario has none; write [[groups]]"
+    return None, [f"{where}.group = {table['group']!r} is no group; {known}"]
+
+
+def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) -> list[str]:
+    """What is wrong with times and numbers that are sound alone."""
+    faults = []
+    if (when.at is None) == (when.per_hour is None):
+        faults.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
+    if when.until is not None and when.lasts is not None and when.at is not None:
+        faults.append(f"{where} says when it ends twice; give until or lasts")
+    if when.at is not None and when.until is not None and when.until <= when.at:
+        faults.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
+    if when.number is not None and (when.number != int(when.number) or when.number > may):
+        faults.append(f"{where}.number = {when.number:g} is not a whole number up to {may}, the agents that it may hit")
+    if kind.leaves is not None and (when.lasts is not None or (when.at is not None and when.until is not None)):
+        given = {"f": kind.record(*(getattr(numbers, name) for name in kind.fields))}
+        if kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))) <= 0.0:
+            faults.append(f"{where}: {kind.name} does not end, as who drops out stays out; leave out until and lasts")
+    return faults

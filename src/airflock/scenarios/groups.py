@@ -1,0 +1,192 @@
+"""The groups of a scenario file: agents that share numbers of model and body, and how far each agent is off them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from inspect import signature
+from typing import Any
+
+from airflock.core import random
+from airflock.core.contract import Model
+from airflock.core.parameters import Choice, Quantity, declarations
+from airflock.scenarios import schema, units
+
+LETTERS = {"model": "p", "body": "b"}  # sections of which numbers may differ, and what drivers call them
+KEYS = ("name", "agents", *LETTERS)
+
+
+@dataclass(frozen=True)
+class Group:
+    """One entry of [[groups]].
+
+    agents  : their numbers, in order
+    numbers : (letter, name) → value that they have instead of the flock's
+    spread  : (letter, name) → standard deviation by which each agent differs from it
+    """
+
+    name: str
+    agents: tuple[int, ...]
+    numbers: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    spread: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+
+def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
+    """Numbers of agents from a list of them; and what is wrong with it, one line."""
+    whole = isinstance(given, Sequence) and not isinstance(given, str)
+    if not whole or not given or not all(isinstance(k, int) and not isinstance(k, bool) for k in given):
+        return None, [f"{where} = {given!r} is not a list of numbers of agents, 0 to {agents - 1}"]
+    wrong = [k for k in given if not 0 <= k < agents]
+    if wrong:
+        return None, [f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}"]
+    return tuple(sorted(set(given))), []
+
+
+def groups_of(given: Any, agents: int, records: Mapping[str, type]) -> tuple[tuple[Group, ...], list[str], list[str]]:
+    """Groups, notes of converted units, and everything that is wrong with them, one line each.
+
+    records : "model" and "body" → record of their parameters
+    """
+    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(g, Mapping) for g in given):
+        return (), [], ["groups is not a list of tables; write [[groups]]"]
+    who, faults = _agents(given, agents)
+    found: list[Group] = []
+    notes: list[str] = []
+    for number, table in enumerate(given):
+        where = f"groups[{number}]"
+        faults += [f"{where}.{key}: unknown key; known: {', '.join(KEYS)}" for key in table if key not in KEYS]
+        name = table.get("name", f"group_{number}")
+        if not isinstance(name, str) or not name or name in {group.name for group in found}:
+            faults.append(f"{where}.name = {name!r} is not a name of its own")
+            name = where
+        numbers: dict[tuple[str, str], float] = {}
+        spread: dict[tuple[str, str], float] = {}
+        for section, letter in LETTERS.items():
+            if section in records:
+                values, spreads, told, wrong = _section(f"{where}.{section}", table.get(section, {}), records[section])
+                numbers |= {(letter, key): value for key, value in values.items()}
+                spread |= {(letter, key): value for key, value in spreads.items()}
+                notes += told
+                faults += wrong
+        found.append(Group(name, who[number], numbers, spread))
+    return tuple(found), notes, faults
+
+
+def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple[int, ...]], list[str]]:
+    """Members of each group: those that are listed, so many of the next ones, or all that are left."""
+    faults: list[str] = []
+    found: list[tuple[int, ...]] = [()] * len(given)
+    taken: set[int] = set()
+    for number, table in enumerate(given):
+        if isinstance(table.get("agents"), (list, tuple)):
+            listed, wrong = members(f"groups[{number}].agents", table["agents"], agents)
+            faults += wrong
+            twice = sorted(taken & set(listed or ()))
+            if twice:
+                faults.append(f"groups[{number}].agents: agent {twice[0]} is in another group already")
+            found[number] = listed or ()
+            taken |= set(listed or ())
+    left = [agent for agent in range(agents) if agent not in taken]
+    rest = []
+    for number, table in enumerate(given):
+        count = table.get("agents")
+        if count is None:
+            rest.append(number)
+        elif not isinstance(count, (list, tuple)):
+            whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count == int(count)
+            if not whole or not 1 <= count <= len(left):
+                faults.append(
+                    f"groups[{number}].agents = {count!r} is neither a list of agents nor a number of them up to "
+                    f"{len(left)}, as many as are left of {agents}"
+                )
+                continue
+            found[number], left = tuple(left[: int(count)]), left[int(count) :]
+    for number in rest[:1]:
+        found[number] = tuple(left)
+        if not left:
+            faults.append(f"groups[{number}] has no agents, and no agent is left for it")
+    faults += [f"groups[{number}].agents is missing; one group may take those who are left" for number in rest[1:]]
+    return found, faults
+
+
+def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], dict[str, float], list[str], list[str]]:
+    """Numbers and spreads of one section of a group."""
+    if not isinstance(table, Mapping):
+        return {}, {}, [], [f"{where} = {table!r} is not a table of numbers"]
+    known = {name: declared for name, declared, _ in declarations(record)}
+    values: dict[str, Any] = {}
+    spreads: dict[str, Any] = {}
+    faults: list[str] = []
+    for key, value in table.items():
+        if key == "kind" or isinstance(known.get(key), Choice):
+            faults.append(f"{where}.{key}: only numbers differ from group to group; laws, bodies and choices do not")
+        elif isinstance(value, Mapping) and "spread" in value:
+            unit = {"unit": value["unit"]} if "unit" in value else {}
+            spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]
+            rest = {name: entry for name, entry in value.items() if name != "spread"}
+            values |= {key: rest} if "value" in rest else {}
+        else:
+            values[key] = value
+    converted, notes, wrong = units.converted({where: values, "spread": spreads}, {where: record, "spread": record})
+    made, more = schema.check(where, converted[where], record)
+    faults += wrong + more
+    off, more = _spreads(where, converted["spread"], known)
+    numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
+    return numbers, off, notes, faults + more
+
+
+def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+    """Standard deviations in declared units."""
+    found, faults = {}, []
+    for key, entry in given.items():
+        value = entry["value"] if isinstance(entry, Mapping) else entry
+        declared = known.get(key)
+        if not isinstance(declared, Quantity):
+            faults.append(f"{where}.{key} is not a number of it")
+        elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
+            faults.append(f"{where}.{key}.spread = {value!r} is not a standard deviation of 0 {declared.unit} or more")
+        else:
+            found[key] = float(value)
+    return found, faults
+
+
+def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock."""
+    found = []
+    for letter, record in base.items() if groups else ():
+        for name, declared, _ in declarations(record):
+            if isinstance(declared, Quantity):
+                usual = float(getattr(record, name) or 0.0)
+                others = any(group.numbers.get((letter, name), usual) != usual for group in groups)
+                if others or any(group.spread.get((letter, name), 0.0) > 0.0 for group in groups):
+                    found.append((letter, name))
+    return tuple(found)
+
+
+def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
+    """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range."""
+    known = {key: declared for key, declared, _ in declarations(record)}
+    place, declared = list(known).index(name), known[name]
+    assert isinstance(declared, Quantity)
+    values = [float(getattr(record, name) or 0.0)] * agents
+    for group in groups:
+        own, spread = group.numbers.get((letter, name)), group.spread.get((letter, name), 0.0)
+        for agent in group.agents:
+            value = values[agent] if own is None else own
+            if spread > 0.0:
+                draw = list(LETTERS.values()).index(letter)
+                w0, w1, _, _ = random.words(seed, random.SPREAD, 0, place, agent, draw)
+                value += spread * random.normal_pair(w0, w1)[0]
+            values[agent] = min(max(value, declared.low), declared.high)
+    return values
+
+
+def group_faults(groups: Sequence[Group], found: Model | None) -> list[str]:
+    """Why numbers of groups cannot be flown by a law, one line."""
+    if found is None or found.flock is None or found.workspace is None:
+        return []
+    if "p" not in {*signature(found.flock).parameters, *signature(found.workspace).parameters}:
+        return []
+    number = next((k for k, group in enumerate(groups) for of, _ in (*group.numbers, *group.spread) if of == "p"), None)
+    if number is None:
+        return []
+    return [f"groups[{number}].model: model {found.name} solves for the whole flock, with one set of numbers"]

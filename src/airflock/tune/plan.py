@@ -1,0 +1,52 @@
+"""Plan: how a budget of time is shared between searching, hardening and certifying; written once, then kept."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from airflock import __version__
+from airflock.errors import StudyError
+
+SEARCH, HARDEN, CERTIFY = 0.45, 0.15, 0.4  # shares of the budget
+TRIED = 15  # rounds of flights that hardening takes at most: whole and half steps, the optimum, fresh seeds
+POPULATION = 24  # reaches a good set in less time than 100 do: small flocks' flights are few
+LEAST = 6  # generations
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Numbers of flights of each stage.
+
+    search : keys of the table [search]; seeds: flights of each step of hardening; seconds: of certifying
+    rate   : flights per second that the plan was made with
+    """
+
+    search: dict[str, int]
+    seeds: int
+    seconds: float
+    rate: float
+
+    def document(self) -> dict[str, Any]:
+        """The plan as plain values."""
+        return {"airflock": __version__, **asdict(self)}
+
+
+def plan_of(budget: float, rate: float) -> Plan:
+    """A plan for a budget (s) at a rate (flights per second). StudyError where nothing sensible fits into it."""
+    flights = budget * SEARCH * rate
+    finals = flights / 4.0
+    top = 4
+    final_seeds = int(min(max(finals / (2.0 * (top + 2)), 8), 100))
+    pool = int(min(max(finals / 16.0, 2 * top), 100))
+    spent = 8 * pool + (top + 2) * final_seeds
+    generations = int((flights - spent) / POPULATION)
+    seeds = int(min(budget * HARDEN * rate / TRIED, 200))
+    if generations < LEAST or seeds < 10:
+        flown = max((LEAST * POPULATION + spent) / SEARCH, 10 * TRIED / HARDEN)
+        raise StudyError(
+            f"the budget of {budget:g} s is too small: a flight takes {1.0 / rate:.2g} s here; give at least "
+            f"{1.1 * flown / rate:.2g} s, or shorten the flights with --duration"
+        )
+    search = {
+        "population": POPULATION, "generations": generations, "pool": pool, "top": top, "final_seeds": final_seeds,
+    }  # fmt: skip
+    return Plan(search, seeds, budget * CERTIFY, rate)

@@ -1,0 +1,188 @@
+"""The report of a tuning: one HTML file that prints on A4, and its figures as a PDF."""
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+
+from airflock import __version__, atomic
+from airflock.core.parameters import with_unit
+from airflock.evolve import tables
+from airflock.evolve.space import declared
+from airflock.evolve.store import Store
+from airflock.plots.certificate import certificate
+from airflock.plots.convergence import convergence
+from airflock.scenarios.portrait import sentence
+from airflock.scenarios.scenario import Scenario
+
+if TYPE_CHECKING:
+    from airflock.tune.run import Tuned
+
+PAGE, FIGURES = "report.html", "figures.pdf"
+STYLE = """
+@page { size: A4; margin: 18mm }
+body { font: 10pt/1.45 "Liberation Sans", Arial, sans-serif; color: #222; max-width: 174mm; margin: 0 auto }
+h1 { font-size: 16pt; margin: 0 0 2mm } h2 { font-size: 12pt; margin: 7mm 0 2mm; break-after: avoid }
+table { border-collapse: collapse; width: 100%; break-inside: avoid; font-size: 9pt }
+th, td { text-align: left; padding: .6mm 2mm .6mm 0; border-bottom: .2mm solid #ccc; vertical-align: top }
+td.n, th.n { text-align: right } img { max-width: 100%; break-inside: avoid }
+.verdict { font-size: 12pt; font-weight: bold; padding: 2mm 3mm; border-left: 1.5mm solid #009E73 }
+.no { border-color: #D55E00 } code { font-size: 8pt; overflow-wrap: anywhere } .sign td { height: 12mm; width: 50% }
+"""
+NOT_THERE = (
+    "flight logs of these drones (airflock identify finds their numbers)",
+    "a flight card (airflock fly)",
+    "faults and failing drones",
+)
+
+
+def save(found: "Tuned") -> None:
+    """Write report.html and figures.pdf into the folder of a tuning, each complete or not at all."""
+    figures = _figures(found)
+    atomic.write(found.folder / PAGE, page(found, [_png(figure) for figure in figures.values()], list(figures)))
+    with (
+        atomic.atomic(found.folder / FIGURES) as temporary,
+        PdfPages(temporary, metadata={"CreationDate": None}) as pdf,
+    ):
+        for figure in figures.values():
+            pdf.savefig(figure, bbox_inches="tight")
+
+
+def _figures(found: "Tuned") -> dict[str, Figure]:
+    with Store(found.folder / "study", write=False) as store:
+        table = tables.candidates(store, ["fitness"])
+    return {
+        "What the search found, generation by generation.": convergence(table, "fitness", what=found.start.name),
+        "Bounds by flights, distances, and how far numbers may move.": certificate(found.certificate),
+    }
+
+
+def _png(figure: Figure) -> str:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=150, bbox_inches="tight")
+    return base64.b64encode(stream.getvalue()).decode()
+
+
+def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> str:
+    """The report as one HTML text; pictures are PNGs in base64."""
+    made, known = found.certificate, declared(found.scenario)
+    before, r = declared(found.start), found.result
+    numbers = [
+        (
+            key,
+            with_unit(f"{before[key][1]:.4g}", how.unit),
+            with_unit(f"{value:.4g}", how.unit),
+            _range(r.ranges.get(key)),
+        )
+        for key, (how, value) in known.items()
+        if key in r.parameters and value is not None
+    ]
+    steps = [
+        (s.name, f"{s.fitness:.3f}", f"{s.cost[0]:.3f}", f"{s.r_min:.2f} m", f"{s.gain[0]:.2f} m", s.verdict)
+        for s in found.steps
+    ]
+    tolerances = [
+        (a["key"], with_unit(f"{a['nominal']:.4g}", a["unit"]), with_unit(f"{a['safe']:.4g}", a["unit"]),
+         f"{a['factor']:.3g}", a.get("note", ""))
+        for a in made.tolerance.get("axis", ())
+    ]  # fmt: skip
+    verdict = "All limits are shown." if made.shown else "Not all limits are shown."
+    scenario = found.scenario
+    body = [
+        f"<h1>{escape(str(found.start.document.get('title') or found.start.name))}</h1>",
+        f"<p>{escape(sentence(found.start))}. Airflock {__version__}.</p>",
+        f'<p class="verdict{"" if made.shown else " no"}">{verdict}</p>',
+        _list(made.statements),
+        "<h2>What was assumed</h2>",
+        _table(("key", "value", "source"), [*_assumed(found.start.document), *_defaults(found.start)]),
+        _list([*found.notes, *found.start.notes]),
+        "<h2>What was found</h2>",
+        f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
+        f"{r.candidates:,} candidates.</p>",
+        _table(("number", "start", "tuned", "working range of the search"), numbers),
+        "<h2>What hardening cost and gained</h2>",
+        _table(("step", "fitness", "cost", "r_min", "gain", "verdict"), steps)
+        if steps
+        else f"<p>Not hardened: {escape(found.why)}</p>",
+        "<h2>Certificate</h2>",
+        made._repr_html_(),
+        _list(
+            [
+                f"{made.campaign.limits[i].event} over the time of a flight: {h.verdict}"
+                for i, h in made.hazards.items()
+                if h.events
+            ]
+        ),
+        "<h2>How far numbers may move</h2>",
+        _table(("number", "nominal", "safe to", "factor", ""), tolerances)
+        if tolerances
+        else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
+        "<h2>Worst flights</h2>",
+        _table(("limit", "value", "fly it again"), [_worst(entry) for entry in made.worst]),
+        "<h2>Not there</h2>",
+        _list(NOT_THERE),
+        *(
+            f'<h2>Figure {i}</h2><img alt="{escape(text)}" src="data:image/png;base64,{picture}"><p>{escape(text)}</p>'
+            for i, (picture, text) in enumerate(zip(pictures, captions, strict=True), 1)
+        ),
+        '<h2>Signed</h2><table class="sign"><tr><td>Name, date</td><td>Signature</td></tr></table>',
+    ]
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(scenario.name)}</title>'
+    return f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n"
+
+
+def _range(span: tuple[float, float] | None) -> str:
+    return "" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
+
+
+def _worst(entry: dict[str, Any]) -> tuple[str, str, str]:
+    return entry["limit"], f"{entry['value']:.4g}", entry["replay"]
+
+
+def _assumed(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Key, value and source of everything that the scenario's file says but the numbers of its law."""
+    rows = []
+    for section, table in document.items():
+        if section in ("model", "published", "title", "format"):
+            continue
+        single = not isinstance(table, dict) or "value" in table
+        for name, entry in (("", table),) if single else table.items():
+            key = f"{section}.{name}".rstrip(".")
+            if isinstance(entry, dict):
+                value = with_unit(str(entry.get("value")), str(entry.get("unit", "")))
+                rows.append((key, value, str(entry.get("source", ""))))
+            else:
+                text = str(entry)
+                rows.append((key, text if len(text) < 80 else f"{text[:77]}...", ""))
+    return rows
+
+
+def _defaults(scenario: Scenario) -> list[tuple[str, str, str]]:
+    """Numbers of drones, radio and wind that the file leaves as they are, and that are not zero."""
+    rows = []
+    for key, (how, value) in declared(scenario).items():
+        section, _, name = key.partition(".")
+        given = scenario.document.get(section, {})
+        if section in ("body", "sensors", "radio", "wind") and value and name not in given:
+            rows.append(
+                (key, with_unit(f"{value:.4g}", how.unit), f"default: {how.source}" if how.source else "default")
+            )
+    return rows
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    cells = ("".join(f"<td>{_cell(text)}</td>" for text in row) for row in rows)
+    return f"<table><tr>{head}</tr>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+def _cell(text: str) -> str:
+    return f"<code>{escape(text)}</code>" if text.startswith("airflock ") else escape(text)
+
+
+def _list(texts: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>" if texts else ""

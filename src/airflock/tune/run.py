@@ -1,0 +1,269 @@
+"""The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from airflock import atomic
+from airflock.certify.campaign import FOLDER
+from airflock.certify.certificate import Certificate
+from airflock.certify.run import campaign_of, executor_for
+from airflock.certify.run import run as certified
+from airflock.certify.seeds import identity
+from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.after import Result
+from airflock.evolve.bounds import usual_space
+from airflock.evolve.folder import open_folder, read, write
+from airflock.evolve.harden import document as hardened_document
+from airflock.evolve.harden import harden
+from airflock.evolve.run import executor_for as searching
+from airflock.evolve.run import run as evolved
+from airflock.evolve.search import Watch
+from airflock.evolve.steps import Measured
+from airflock.evolve.study import make_study
+from airflock.scenarios import formats
+from airflock.scenarios.change import variant
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+from airflock.tune.plan import Plan, plan_of
+from airflock.tune.start import start_of
+
+PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
+    "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
+)  # fmt: skip
+PILOT = 4  # flights per core that tell how long one takes
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What tuning found: the scenario to fly, and what each stage said.
+
+    steps : of hardening; empty where the law has no recipe, and `why` says so
+    """
+
+    folder: Path
+    scenario: Scenario
+    start: Scenario
+    notes: tuple[str, ...]
+    result: Result
+    steps: tuple[Measured, ...]
+    why: str
+    certificate: Certificate
+    seconds: float
+
+    @property
+    def shown(self) -> bool:
+        """Whether the certificate shows all limits."""
+        return self.certificate.shown
+
+    def __repr__(self) -> str:
+        return f"<Tuned {self.folder / TUNED}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
+
+    def document(self) -> dict[str, Any]:
+        """What was found as plain values, for --json."""
+        return {
+            "folder": str(self.folder),
+            "tuned": str(self.folder / TUNED),
+            "notes": list(self.notes),
+            "evolved": self.result.document(),
+            "hardening": [step.as_dict() for step in self.steps],
+            "why_not_hardened": self.why,
+            "certificate": self.certificate.document(),
+            "seconds": self.seconds,
+        }
+
+
+def tune(
+    scenario: Scenario | str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    budget: float = 1200.0,
+    limit: Sequence[str] = (),
+    confidence: float = 0.95,
+    resume: bool = False,
+    settings: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    watch: Watch | None = None,
+    note: Note | None = None,
+    trust: bool = False,
+) -> Tuned:
+    """From a scenario of your own to a set that is evolved, hardened and certified, with a report.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or path
+        Your drones, field and speed; numbers of the law that it does not give are scaled to its speed.
+    out : str or path
+        Folder of everything: start, study, hardening, certificate, report, and tuned.toml to fly.
+    budget : float
+        Time to spend, s.
+    limit : sequence of str
+        What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
+        than 0.01 per flock hour.
+    confidence : float
+        Of the certificate.
+    resume : bool
+        Continue what is in the folder.
+    settings : mapping, optional
+        Keys of the scenario to change.
+    threads : int, optional
+        Flights side by side; by default one per core.
+    watch, note : callable, optional
+        Told of flights of the search; told in a few words what begins.
+    trust : bool
+        Whether code that files name may run.
+
+    Returns
+    -------
+    Tuned
+        The scenario to fly, what each stage found, and whether the limit is shown.
+
+    Raises
+    ------
+    ScenarioError, StudyError
+        If the scenario or the folder cannot be used, the budget is too small, or nothing flies; Interrupted at Ctrl-C.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> small = airflock.load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 10.0, "dt": 0.1, "world.side": 60.0})
+    >>> found = airflock.tune(small, "tuned", budget=5.0, limit=["r_min<0.1 at 20%"])
+    >>> found.steps[0].name
+    'optimum'
+    """
+    began = time.monotonic()
+    mine = variant(scenario, settings, trust=trust)
+    start, notes = start_of(mine)
+    limits = list(limit) or [usual_limit(start)]
+    campaign_of(start, limits, confidence)  # refused before anything flies
+    folder = Path(out)
+    plan = _planned(folder, start, budget, resume, threads)
+    _say(note, "search")
+    result = _evolved(folder, start, plan, threads, watch)
+    notes = [*notes, *usual_space(start)[1]]
+    if result.dead:
+        raise StudyError(f"{mine.name}: {result.dead}")
+    _say(note, "hardening")
+    tuned, steps, why = _hardened(folder, result, plan, threads, trust)
+    _say(note, "certificate")
+    certificate = _certified(folder, tuned, limits, confidence, plan, threads, note)
+    found = Tuned(folder, tuned, start, tuple(notes), result, tuple(steps), why, certificate, time.monotonic() - began)
+    _say(note, "report")
+    from airflock.tune.report import save
+
+    save(found)
+    return found
+
+
+def usual_limit(scenario: Scenario) -> str:
+    """Collisions rarer than once in a hundred flock hours."""
+    return f"r_min<{scenario.metrics.r_coll:g} at 0.01/h"
+
+
+def _say(note: Note | None, text: str) -> None:
+    if note:
+        note(text)
+
+
+def _planned(folder: Path, start: Scenario, budget: float, resume: bool, threads: int | None) -> Plan:
+    """The plan of the folder, made where there is none. Raises StudyError for a folder of something else."""
+    if (folder / PLAN).is_file():
+        if not resume:
+            raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
+        found = read(folder / PLAN)
+        if found.get("identity") != identity(start):
+            raise StudyError(f"{folder}: holds the tuning of another scenario; give another --out")
+        return Plan(dict(found["search"]), int(found["seeds"]), float(found["seconds"]), float(found["rate"]))
+    if resume:
+        raise StudyError(f"{folder}: holds no tuning to resume ({PLAN} is missing)")
+    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
+        raise StudyError(f"{folder}: is not empty and holds no {PLAN}; give a new folder")
+    plan = plan_of(budget, _rate(start, threads))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write(folder / START, _document(start), "Where tuning starts.")
+        write(
+            folder / PLAN,
+            {**plan.document(), "identity": identity(start)},
+            "A tuning of Airflock. Written once, when it began.",
+        )
+    except OSError as fault:
+        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
+    return plan
+
+
+def _document(scenario: Scenario) -> dict[str, Any]:
+    return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
+
+
+def _rate(scenario: Scenario, threads: int | None) -> float:
+    """Flights per second, from a few of them."""
+    from airflock.engine.simulate import compile_for, score_flights
+    from airflock.engine.threads import cores
+
+    compile_for(scenario)
+    count = PILOT * (threads or cores())
+    began = time.perf_counter()
+    score_flights([scenario] * count, range(count), threads=threads)
+    return count / max(time.perf_counter() - began, 1e-6)
+
+
+def _evolved(folder: Path, start: Scenario, plan: Plan, threads: int | None, watch: Watch | None) -> Result:
+    study = make_study({}, start.name, search=plan.search, scenario=start)
+    open_folder(folder / STUDY, study, resume=(folder / STUDY / "study.toml").is_file())
+    return evolved(study, folder / STUDY, searching(study, threads=threads), watch)
+
+
+def _hardened(
+    folder: Path, result: Result, plan: Plan, threads: int | None, trust: bool
+) -> tuple[Scenario, list[Measured], str]:
+    """The scenario after hardening, its steps, and why there are none."""
+    if (folder / STEPS).is_file():
+        told = json.loads((folder / STEPS).read_text(encoding="utf-8"))
+        steps = [_measured(step) for step in told["steps"]]
+        return load(folder / TUNED, trust=trust), steps, str(told["why"])
+    best = load(folder / STUDY / "best.toml", trust=trust)
+    steps, why = [], ""
+    try:
+        steps = harden(best, range(plan.seeds), threads=threads)
+        write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
+    except ScenarioError as fault:
+        why = fault.faults[0]
+        law = folder / STUDY / str(best.document.get("model", {}).get("kind", ""))
+        if law.suffix == ".py" and law.is_file():
+            atomic.write(folder / law.name, law.read_bytes())
+        write(folder / TUNED, _document(best), "Evolved by airflock tune; not hardened.")
+    atomic.write(folder / STEPS, json.dumps({"why": why, "steps": [step.as_dict() for step in steps]}))
+    return load(folder / TUNED, trust=trust), steps, why
+
+
+def _measured(told: Mapping[str, Any]) -> Measured:
+    return Measured(**{**told, "cost": tuple(told["cost"]), "gain": tuple(told["gain"])})
+
+
+def _certified(
+    folder: Path,
+    tuned: Scenario,
+    limits: Sequence[str],
+    confidence: float,
+    plan: Plan,
+    threads: int | None,
+    note: Note | None,
+) -> Certificate:
+    from airflock.certify.tolerance import usual_keys
+
+    campaign = campaign_of(tuned, limits, confidence)
+    path = folder / "certificate_flights"
+    open_folder(path, campaign, resume=(path / f"{FOLDER}.toml").is_file(), kind=FOLDER)
+    executor = executor_for(campaign, threads=threads)
+    try:
+        made = certified(campaign, path, executor, plan.seconds, keys=usual_keys(tuned), threads=threads, note=note)
+    finally:
+        executor.close()
+    made.save(folder / CERTIFICATE)
+    return made

@@ -1,0 +1,479 @@
+"""Agents that differ, fail, leave and join: what a flight does about them, by truths that need no engine."""
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.engine import cpu
+from airflock.engine.simulate import driver_text, finish, fly, plan_of
+from airflock.errors import FlightError, RuleError, ScenarioError
+from airflock.faults.registry import KINDS
+from airflock.recordings.flights import recording_of
+from airflock.recordings.scores import measure
+from airflock.scenarios.files import load, presets
+
+SMALL = {"agents": 8, "duration": 6.0, "start.kind": "ball", "start.radius": 40.0}
+OPEN = {"world.arena": "none", "world.walls": "every_edge"}
+PAPER = "vasarhelyi_2018/4ms"
+
+
+def flown(faults=(), name=PAPER, seed=3, **more):
+    """A closed flight, interpreted, with its frames."""
+    scenario = load(name, {**SMALL, **more, **({"faults": list(faults)} if faults else {})})
+    return fly(scenario, seed, record=True, device="python")
+
+
+def whole(flight):
+    """Everything that a flight carries and has told, as bytes."""
+    return flight._state.buffer.tobytes(), repr(flight.scores()), flight.step
+
+
+# --------------------------------------------------------------------------------------------------------- presence
+
+
+def test_who_leaves_is_met_by_nobody():
+    """The others fly as if he had never been there, from the moment at which his last packet has been heard."""
+    still = {"sensors.noise": 0.0, "radio.delay": 0.0, "metrics.period": 0.2}
+    start = np.random.default_rng(2).normal(0.0, 15.0, (4, 8))
+    start[2:] = 2.0
+    alone = load(PAPER, {**SMALL, **still, "agents": 7, "body.noise": 0.0})
+    crowd = load(PAPER, {**SMALL, **still, "agents": 8, "body.noise": 0.0})
+    for gone in (0, 3, 7):
+        flight = airflock.open(crowd, 1, start=start, device="python", record=True).remove(gone)
+        flight.finish()
+        others = [k for k in range(8) if k != gone]
+        known = fly(alone, 1, record=True, start=start[:, others], device="python", precision=64)
+        assert np.array_equal(flight.frames[:, :, others], known.frames)
+        assert np.isnan(flight.frames[:, :, gone]).all() and np.isnan(flight.state[:, gone]).all()
+
+
+def test_an_instant_in_flight_is_scored_as_in_its_recording():
+    scenario = load(PAPER, {**SMALL, "duration": 12.0, "metrics.r_coll": 12.0, "metrics.collision_period": 0.2})
+    flight = airflock.open(scenario, 5, device="python", record=True)
+    flight.advance(3.0).remove(2).advance(2.01).remove(6).advance(4.0).add(2, [0.0, 0.0], [1.0, 0.0])
+    scores = flight.finish()
+    values, _ = measure(recording_of(flight))
+    for name in ("phi_vel", "phi_corr", "n_min", "r_min", "phi_coll", "n_coll", "phi_wall"):
+        assert scores[name] == pytest.approx(values[name], rel=1e-9), name
+    assert values["present"] == pytest.approx(scores["present"], abs=0.01)
+    assert scores["present"] < 1.0
+
+
+@pytest.mark.parametrize("name", [*sorted(presets()), "lossy"])
+def test_every_preset_flies_with_agents_that_come_and_go(name):
+    keys = {"radio.loss": 0.5} if name == "lossy" else {}
+    scenario = load(PAPER if name == "lossy" else name, keys)
+    few = {"agents": min(scenario.agents, 4), "duration": 40.0 * scenario.flight.dt}
+    scenario = load(
+        PAPER if name == "lossy" else name, {**keys, **(few if scenario.goals.kind != "own" else {"duration": 0.1})}
+    )
+    told = []
+    for steps in (40, 7):
+        flight = airflock.open(scenario, 3, device="python")
+        flight.advance(steps=2).remove(1)
+        while flight.step < 9:
+            flight.advance(steps=min(steps, 9 - flight.step))
+        place = [1000.0] * scenario.dimensions
+        flight.add(1, place).advance(steps=1).remove(0)
+        while not flight.over:
+            flight.advance(steps=steps)
+        told.append((flight.state.tobytes(), repr(flight.finish())))
+        assert np.isfinite(flight.state[:, 1]).all() and np.isnan(flight.state[:, 0]).all()
+    assert told[0] == told[1]
+
+
+def test_a_lonely_agent_flies_on_and_its_instants_do_not_count():
+    scenario = load(PAPER, {**SMALL, "agents": 3})
+    flight = airflock.open(scenario, 1, device="python").advance(2.0)
+    before = flight.scores()
+    flight.remove(0).remove(1).advance(1.0)
+    after = flight.scores()
+    assert {k: v for k, v in after.items() if k != "present"} == {k: v for k, v in before.items() if k != "present"}
+    assert np.isfinite(flight.state[:, 2]).all()
+    flight.remove(2).advance(1.0)
+    assert np.isnan(flight.state).all() and flight.scores()["phi_vel"] == before["phi_vel"]
+
+
+def test_random_numbers_of_the_others_do_not_depend_on_who_left():
+    """Noise and lost packets are drawn by the numbers of agents, not by their places in memory."""
+    far = {"agents": 5, "duration": 3.0, "radio.range": 0.0, "radio.loss": 0.5, **OPEN}
+    scenario = load(PAPER, {**far, "start.kind": "ball", "start.radius": 500.0})
+    known = airflock.open(scenario, 4, device="python").advance(2.0)
+    flight = airflock.open(scenario, 4, device="python").advance(0.5).remove(1).advance(1.5)
+    others = [0, 2, 3, 4]
+    assert np.array_equal(flight.state[:, others], known.state[:, others])
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda f: f.remove(8), "agent = 8: this flight has the agents 0 to 7"),
+        (lambda f: f.remove(2).remove(2), r"agent = 2: it is absent at t = 1 s"),
+        (lambda f: f.add(2, [0, 0]), "add: agent 2 is there already"),
+        (lambda f: f.remove(2).add(2, [0]), r"position = \[0\] is not \[east, north\] in m"),
+        (lambda f: f.remove(2).push(2, [1, 1]), "agent = 2: it is absent"),
+        (lambda f: f.remove(2).look(2), "agent = 2: it is absent"),
+        (lambda f: f.event("remove"), "are not what it needs"),
+        (lambda f: f.fault("moter", [1]), r"faults\[0\].kind = 'moter' is no kind of fault; did you mean motor"),
+        (lambda f: f.fault("motor", [9]), r"faults\[0\].agents: there is no agent 9; this flock has the agents 0 to 7"),
+        (lambda f: f.event("fault", kind="motor", agents=[1], share=2.0), r"share = 2 lies outside \[0, 1\]"),
+    ],
+)
+def test_what_makes_no_sense_is_one_line(call, said):
+    flight = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.0)
+    with pytest.raises((FlightError, ScenarioError), match=said) as fault:
+        call(flight)
+    assert "\n" not in str(fault.value)
+
+
+# ----------------------------------------------------------------------------------------------------------- faults
+
+ONCE = {"at": 1.0, "agents": [2]}
+
+
+def path(found, agent=2):
+    """Positions of one agent, (time, axis)."""
+    return found.frames[:, :2, agent]
+
+
+@pytest.mark.parametrize("name", [PAPER, "vasarhelyi_2018/real_gnss", "zapotecatl_2016/best", "vicsek_1995/ordered"])
+def test_faults_that_never_come_leave_the_text_of_the_driver(name):
+    never = [
+        {"kind": "motor", "at": 1e6},
+        {"kind": "battery", "per_hour": 0.0},
+        {"kind": "stuck", "at": 2.0, "lasts": 0.0},
+    ]
+    one = {"groups": [{"name": "all", "body": {}, "model": {}}]}
+    scenario = load(name)
+    assert driver_text(load(name, {"faults": never})) == driver_text(scenario) == driver_text(load(name, one))
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_nothing_is_felt_before_a_fault_begins_and_something_after(kind):
+    sound = flown(**{"radio.kind": "links"})
+    ill = flown(
+        [{"kind": kind, **ONCE, **({"endurance": 0.5} if kind == "battery" else {})}], **{"radio.kind": "links"}
+    )
+    assert np.array_equal(ill.frames[:5], sound.frames[:5])  # samples before 1 s
+    assert not np.array_equal(ill.frames[5:, :4], sound.frames[5:, :4])
+
+
+def test_without_motors_an_agent_keeps_its_velocity():
+    v = flown([{"kind": "motor", "share": 0.0, **ONCE}]).frames[:, 2:4, 2]
+    assert np.array_equal(v[5:], np.repeat(v[5:6], len(v) - 5, axis=0)) and not np.array_equal(v[4], v[5])
+
+
+def test_half_a_motor_reaches_half_the_acceleration():
+    quiet = {"agents": 1, "sensors.noise": 0.0, "body.noise": 0.0, "start.speed": 0.0, **OPEN}
+    sound = flown(**quiet).frames[:, 2:4, 0]
+    weak = flown([{"kind": "motor", "share": 0.5, "at": 0.0}], **quiet).frames[:, 2:4, 0]
+    speed = [np.linalg.norm(v, axis=1)[2] for v in (sound, weak)]
+    assert speed[1] == pytest.approx(0.5 * speed[0], rel=0.2)  # a lag of 1 s, after 0.4 s
+
+
+def test_a_constant_error_of_all_receivers_shifts_the_flock_and_nothing_else():
+    open_air = {**OPEN, "sensors.noise": 0.0, "radio.delay": 0.0}
+    sound = flown(**open_air)
+    off = flown([{"kind": "gnss_offset", "at": 0.0, "east": 7.0, "north": -3.0}], **open_air)
+    assert np.allclose(off.frames[:, :4], sound.frames[:, :4], atol=1e-9)  # only differences are perceived
+
+
+def test_an_agent_that_is_off_shies_from_a_wall_that_is_not_there():
+    alone = {"agents": 1, "sensors.noise": 0.0, "body.noise": 0.0, "duration": 60.0}
+    east, farthest = np.array([[0.0], [0.0], [4.0], [0.1]]), []
+    for faults in ([], [{"kind": "gnss_offset", "at": 0.0, "east": 60.0}]):
+        scenario = load(PAPER, {**alone, **({"faults": faults} if faults else {})})
+        farthest.append(fly(scenario, 1, record=True, start=east, device="python").frames[:, 0].max())
+    assert farthest[0] - farthest[1] == pytest.approx(60.0, abs=2.0)
+
+
+def test_a_drift_is_the_offset_it_has_grown_to():
+    drift = {"kind": "gnss_drift", "at": 0.0, "east": 2.0, "grows": 1.0}
+    open_air = {**OPEN, "sensors.noise": 0.0, "agents": 3}
+    flight = airflock.open(load(PAPER, {**SMALL, **open_air, "faults": [drift | {"agents": [1]}]}), 1, device="python")
+    for time, error in ((0.4, 0.8), (1.0, 2.0), (2.0, 2.0)):
+        flight.advance(time - flight.time).sense()
+        view = flight.look(1)
+        assert view.own.x - view.true.x == pytest.approx(error, abs=1e-9)
+        assert view.own.vx == view.true.vx
+
+
+@pytest.mark.parametrize(("kind", "heard", "hears"), [("radio_silent", False, True), ("radio_deaf", True, False)])
+@pytest.mark.parametrize("radio", ["constant", "links"])
+def test_a_radio_that_is_silent_or_deaf(kind, heard, hears, radio):
+    keys = {**SMALL, "radio.kind": radio, "radio.near": 500.0, "radio.received_near": 1.0, "radio.range": 1e4}
+    flight = airflock.open(
+        load(PAPER, {**keys, "faults": [{"kind": kind, "at": 0.0, "agents": [2]}]}), 1, device="python"
+    )
+    flight.advance(2.0).sense()
+    others = {other.who for other in flight.look(0).heard}
+    assert (2 in others) == heard and {1, 3, 4, 5, 6, 7} <= others
+    assert bool(flight.look(2).heard) == hears
+
+
+def test_a_frozen_radio_tells_the_moment_at_which_it_froze():
+    quiet = {"sensors.noise": 0.0, "radio.delay": 0.4, "radio.range": 1e4}
+    faults = [{"kind": "radio_frozen", "at": 1.0, "agents": [2], "lasts": 2.0}]
+    flight = airflock.open(load(PAPER, {**SMALL, **quiet, "faults": faults}), 1, device="python").advance(1.0)
+    then = flight.state[:, 2]
+    for _ in range(24):
+        flight.advance(0.2).sense()
+        (told,) = (other.state for other in flight.look(0).heard if other.who == 2)
+        frozen = 1.4 <= flight.time + 1e-9 < 3.4 - 1e-9  # what was sent then arrives 0.4 s later
+        assert (told[:2] == pytest.approx(then[:2])) == frozen
+
+
+def test_a_clock_that_is_ahead_extrapolates_too_far():
+    keys = {"radio.kind": "links", "radio.near": 500.0, "radio.received_near": 1.0, "radio.range": 1e4}
+    keys |= {"sensors.noise": 0.0, "body.noise": 0.0}
+    found = []
+    for faults in ([], [{"kind": "clock", "at": 0.0, "agents": [2], "ahead": 1.5}]):
+        flight = airflock.open(
+            load(PAPER, {**SMALL, **keys, **({"faults": faults} if faults else {})}), 1, device="python"
+        )
+        flight.sense()
+        found.append((flight.look(0).heard, flight.look(2).heard))
+    ages = [[other.age for other in heard if other.who in (0, 2)] for pair in found for heard in pair]
+    assert ages == [[pytest.approx(a)] for a in (1.0, 1.0, -0.5, 2.5)]
+
+
+def test_who_pretends_knows_where_it_is():
+    flight = airflock.open(
+        load(PAPER, {**SMALL, "sensors.noise": 0.0, "radio.delay": 0.0, "radio.range": 1e4,
+                     "faults": [{"kind": "pretender", "at": 0.0, "agents": [2], "east": 20.0}]}), 1, device="python",
+    )  # fmt: skip
+    flight.advance(1.0).sense()
+    true = flight.look(2).own
+    (told,) = (other.state for other in flight.look(0).heard if other.who == 2)
+    assert true == flight.look(2).true and told[:2] == pytest.approx((true.x + 20.0, true.y))
+
+
+def test_a_stuck_command_stays():
+    c = flown([{"kind": "stuck", **ONCE}]).frames[:, 4:6, 2]
+    assert np.array_equal(c[5:], np.repeat(c[4:5], len(c) - 5, axis=0))
+
+
+def test_a_battery_lands_the_agent_when_it_is_empty():
+    found = flown([{"kind": "battery", **ONCE, "endurance": 2.0}])
+    gone = np.isnan(found.frames[:, 0, 2])
+    assert gone.tolist() == [k * 0.2 >= 3.0 - 1e-9 for k in range(len(gone))]
+    assert found.values["present"] == pytest.approx(1.0 - 3.01 / 6.01 / 8.0)
+
+
+def test_faults_that_come_at_random_come_as_often_as_they_should():
+    scenario = load(PAPER, {"agents": 20, "duration": 3600.0, "faults": [{"kind": "motor", "per_hour": 30.0}]})
+    from airflock.engine.onsets import onsets
+
+    counts = [onsets(scenario, seed) for seed in range(60)]
+    assert np.mean([len(found) for found in counts]) == pytest.approx(30.0, abs=4.0 * np.sqrt(30.0 / 60.0))
+    agents = np.bincount([onset.agent for found in counts for onset in found], minlength=20)
+    assert ((agents - agents.mean()) ** 2 / agents.mean()).sum() < 45.0  # chi squared, 19 degrees of freedom
+    other = onsets(scenario, 0, world=1)
+    assert other != counts[0]
+
+
+def test_any_cuts_and_any_way_to_say_it_give_the_same_bits():
+    faults = [
+        {"kind": "gnss_frozen", "at": 1.01, "agents": [1], "lasts": 1.5}, {"kind": "motor", "per_hour": 4000.0},
+        {"kind": "battery", "at": 0.5, "agents": [3], "endurance": 1.23}, {"kind": "stuck", "at": 2.0, "number": 2},
+    ]  # fmt: skip
+    scenario = load(PAPER, {**SMALL, "faults": faults})
+    closed = fly(scenario, 3, record=True, device="python")
+    for steps in (1, 7, 100):
+        flight = airflock.open(scenario, 3, record=True, device="python")
+        while not flight.over:
+            flight.advance(steps=steps)
+        scores = flight.finish()
+        assert flight.frames.tobytes() == closed.frames.tobytes()
+        assert repr(scores) == repr(finish(scenario, closed.values))
+    sensed = airflock.open(scenario, 3, record=True, device="python")
+    while not sensed.over:
+        sensed.sense().advance(steps=20)
+    assert repr(sensed.finish()) == repr(scores)
+
+
+def test_scenario_seed_and_events_are_the_same_bits():
+    flight = airflock.open(load(PAPER, SMALL), 6, record=True, device="python")
+    flight.advance(1.0).fault("motor", 3, share=0.1).advance(0.5).remove(5, "landed").advance(0.31)
+    flight.event("fault", kind="gnss_drift", agents=[0, 1], lasts=1.0)
+    flight.advance(0.2).add(5, [10.0, 0.0]).change({"model.p_rep": 0.2}).advance(1.0)
+    again = airflock.open(flight.origin[0], 6, record=True, device="python", events=[e.plain() for e in flight.events])
+    while again.step < flight.step:
+        again.advance(steps=min(13, flight.step - again.step))
+    assert whole(again) == whole(flight) and again.events == flight.events and again.faults == flight.faults
+    assert again.frames.tobytes() == flight.frames.tobytes()
+    assert [fault["kind"] for fault in flight.faults] == ["motor", "gnss_drift", "gnss_drift"]
+
+
+def test_going_back_and_branching_with_faults():
+    scenario = load(
+        PAPER, {**SMALL, "faults": [{"kind": "motor", "per_hour": 5000.0}, {"kind": "fails", "at": 2.0, "number": 1}]}
+    )
+    flight = airflock.open(scenario, 4, device="python").advance(1.0)
+    moment = flight.snapshot()
+    first = whole(flight.advance(3.0))
+    assert whole(flight.branch().restore(moment).advance(3.0)) == first
+    other = flight.restore(moment).branch(7).advance(3.0)
+    assert whole(flight.restore(moment).advance(3.0)) == first
+    begun = [fault for fault in flight.faults if fault["begin"] < 1.0]
+    assert [fault for fault in other.faults if fault["begin"] < 1.0] == begun and other.faults != flight.faults
+
+
+def test_a_recording_tells_what_befell_whom():
+    import json
+
+    recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
+    told = json.loads(recording.attrs["airflock_faults"])["faults"]
+    assert told == [{"kind": "fails", "agent": 2, "begin": 1.0, "end": None}]
+    assert recording.confidence.values[:, 0, 2].tolist() == [1.0] * 5 + [0.0] * 26
+    assert measure(recording)[0]["present"] == pytest.approx(1.0 - 26.0 / 31.0 / 8.0)
+
+
+class Magnet:
+    """A kind of a user's own, as a namespace."""
+
+    NAME = "magnet"
+
+    def sense(x, y, z, vx, vy, vz):
+        return x, y, z, vy, -vx, vz
+
+
+def test_a_kind_of_ones_own_flies(tmp_path):
+    found = load(PAPER, {**SMALL, "faults": [{"kind": "magnet", **ONCE}]}, faults=Magnet)
+    one = fly(found, 3, record=True, device="python").frames
+    (tmp_path / "magnet.py").write_text(
+        "def sense(x, y, z, vx, vy, vz):\n    return x, y, z, vy, -vx, vz\n", encoding="utf-8"
+    )
+    text = 'extends = "vasarhelyi_2018/4ms"\nagents = 8\nduration = 6.0\n[start]\nkind = "ball"\nradius = 40.0\n'
+    text += '[[faults]]\nkind = "magnet.py"\nat = "1000 ms"\nagents = [2]\n'
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError, match="if you trust it, add --trust"):
+        load(tmp_path / "mine.toml")
+    two = fly(load(tmp_path / "mine.toml", trust=True), 3, record=True, device="python").frames
+    assert np.array_equal(one, two)
+    assert not np.array_equal(one, flown().frames)
+
+
+def two_of_three(vx):
+    return vx, vx
+
+
+@pytest.mark.parametrize(
+    ("rules", "said"),
+    [
+        ({}, "has no rule"),
+        ({"sense": lambda x, speed: x}, "asks for 'speed'"),
+        ({"motion": two_of_three}, "returns 2 of 3 numbers"),
+    ],
+)
+def test_a_kind_that_is_none_is_one_line(rules, said):
+    with pytest.raises(RuleError, match=said):
+        plan_of(load(PAPER, {"faults": [{"kind": "odd", "at": 1.0}]}, faults=airflock.fault(rules, "odd")))
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ({"kind": "motor"}, "give at, when it begins, or per_hour, how often it comes"),
+        ({"kind": "motor", "at": 1.0, "per_hour": 2.0}, "give at, when it begins, or per_hour"),
+        ({"kind": "motor", "at": 1.0, "until": 0.5}, r"until = 0.5 s is not after at = 1 s"),
+        ({"kind": "motor", "at": 1.0, "group": "heavy"}, "is no group; the scenario has none"),
+        ({"kind": "motor", "at": 1.0, "number": 101}, "is not a whole number up to 100"),
+        ({"kind": "motor", "at": 1.0, "agents": [100]}, "there is no agent 100; this flock has the agents 0 to 99"),
+        ({"kind": "motor", "at": 1.0, "agents": 3}, "is not a list of numbers of agents"),
+        ({"kind": "motor", "at": "1 furlong"}, "the unit is s"),
+        ({"kind": "motor", "at": 1.0, "shar": 0.5}, "did you mean"),
+        ({"kind": "fails", "at": 1.0, "until": 3.0}, "fails does not end"),
+        ({"at": 1.0}, "is no kind of fault"),
+        (3, "faults is not a list of tables"),
+    ],
+)
+def test_bad_entries_are_one_line_each(entry, said):
+    with pytest.raises(ScenarioError, match=said):
+        load(PAPER, {"faults": [entry]})
+
+
+def test_all_that_is_wrong_is_said_at_once():
+    with pytest.raises(ScenarioError) as found:
+        load(PAPER, {"faults": [{"kind": "moter", "at": 1.0}, {"kind": "motor", "at": -1.0}], "radio.delay": 99.0})
+    assert len(str(found.value).splitlines()) == 3
+
+
+def test_agents_that_see_each_other_as_they_are_have_no_faults_of_perception():
+    assert load("zapotecatl_2016/best", {"faults": [{"kind": "motor", "at": 1.0}]}).faults
+    with pytest.raises(ScenarioError, match="update = 'sequential' is for agents that see each other as they are"):
+        load("zapotecatl_2016/best", {"faults": [{"kind": "gnss_drift", "at": 1.0}]})
+
+
+# ----------------------------------------------------------------------------------------------------------- groups
+
+
+def test_a_group_flies_as_it_is_told():
+    groups = [{"name": "slow", "agents": 4, "model": {"v_flock": 2.0}}, {"name": "fast", "model": {"v_flock": 6.0}}]
+    apart = {"radio.range": 0.0, **OPEN, "duration": 15.0, "body.noise": 0.0, "sensors.noise": 0.0, "start.speed": 4.0}
+    speed = np.linalg.norm(flown(**apart, groups=groups).frames[-1, 2:4], axis=0)
+    assert speed == pytest.approx([2.0] * 4 + [6.0] * 4, rel=0.01)
+
+
+def test_tolerances_are_drawn_as_they_are_told():
+    spread = {"name": "all", "body": {"tau": {"value": 1.0, "spread": 0.1}}, "model": {"p_rep": {"spread": 0.02}}}
+    scenario = load(PAPER, {"agents": 2000, "world.side": 3000.0, "groups": [spread]})
+    tau, p_rep = (np.array(scenario.own_numbers(*key, 5)) for key in (("b", "tau"), ("p", "p_rep")))
+    assert tau.mean() == pytest.approx(1.0, abs=0.01) and tau.std() == pytest.approx(0.1, rel=0.07)
+    assert p_rep.mean() == pytest.approx(scenario.parameters.p_rep, abs=0.003)
+    assert abs(np.corrcoef(tau, p_rep)[0, 1]) < 0.1
+    assert np.array_equal(tau, scenario.own_numbers("b", "tau", 5)) and tau[0] != scenario.own_numbers("b", "tau", 6)[0]
+
+
+def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
+    """Each agent its row, all with the same numbers: the bits of the flight with one record for all."""
+    plain, base = flown(), load(PAPER)
+    groups = [{"name": "one", "agents": [0], "body": {"tau": 1.5}}, {"name": "rest"}]
+    scenario = load(PAPER, {**SMALL, "groups": groups})
+    plan = plan_of(scenario, precision=64, record=True, grid=False)
+    from dataclasses import replace
+
+    from airflock.engine.tables import tables
+
+    numbers = tables(scenario, plan, 3)
+    same = replace(numbers, own=np.full_like(numbers.own, base.body.tau))
+    assert np.array_equal(cpu.fly(plan, same, device="python").frames, plain.frames)
+    assert not np.array_equal(cpu.fly(plan, numbers, device="python").frames, plain.frames)
+
+
+@pytest.mark.parametrize(
+    ("groups", "said"),
+    [
+        ([{"agents": 101}], "is neither a list of agents nor a number of them up to 100"),
+        ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
+        ([{"agents": [100]}], "there is no agent 100"),
+        ([{"agents": 60}, {"agents": 60}], "up to 40, as many as are left of 100"),
+        ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
+        ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
+        ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
+        ([{"model": {"kind": "couzin_2002"}}], "only numbers differ from group to group"),
+        ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
+        ({"a": 1}, "groups is not a list of tables"),
+    ],
+)
+def test_bad_groups_are_one_line_each(groups, said):
+    with pytest.raises(ScenarioError, match=said) as found:
+        load(PAPER, {"groups": groups})
+    assert len(str(found.value).splitlines()) == 1
+
+
+def test_a_law_that_solves_for_the_whole_flock_has_one_set_of_numbers():
+    with pytest.raises(ScenarioError, match="solves for the whole flock, with one set of numbers"):
+        load("dimock_2003/published", {"groups": [{"model": {"r_c": 3.0}}]})
+
+
+def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
+    from airflock.errors import RecordingError
+    from airflock.recordings.attributes import faults, told_faults
+
+    recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
+    assert told_faults(faults(recording)) == "1 fault: fails of agent 2 at 1 s"
+    figure = airflock.plots.series(recording)
+    assert "fails (2)" in "".join(text.get_text() for axes in figure.axes for text in axes.texts)
+    with pytest.raises(RecordingError, match="airflock_faults is damaged"):
+        faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))

@@ -1,0 +1,97 @@
+"""What must turn a claim red is made and seen to do so; verdicts of the small form are compared and kept."""
+
+import json
+
+import pytest
+
+import airflock
+from airflock.errors import AirflockError
+from airflock.papers import breaks, quick, statistics
+from airflock.papers.claims import Measured
+from airflock.papers.flights import Flights, with_changes
+from airflock.papers.paper import Paper
+from airflock.papers.statements import Statement
+
+
+def statement(name: str, bound: str, changes: dict) -> Statement:
+    return Statement(
+        id=f"part.{name}", kind="ours", where="here", statement="a saying", quantity="n_coll", at="here",
+        bound=bound, breaks=changes,
+    )  # fmt: skip
+
+
+def fly(parts, flights):
+    """Collisions fall with p_rep; what is called flat does not know of it."""
+    scenario = flights.as_changed(airflock.load("vasarhelyi_2018/4ms"))
+    n = 0.0 if scenario.parameters.p_rep > 0.01 else 9.0
+    values = {"falls": [n, n], "flat": [0.0, 0.0], "gap": [2.0 + n, 2.5 + n], "never": [1.0, 1.0]}
+    return [Measured(f"part.{k}", "n_coll", "here", statistics.mean(v)) for k, v in values.items()], {}
+
+
+PAPER = Paper("A paper", "none", ("part",), fly)
+STATEMENTS = [
+    statement("falls", "ours == 0", {"model.p_rep": 0.0}),
+    statement("flat", "ours == 0", {"model.p_rep": 0.0}),
+    statement("gap", "ours > 0", {"sides": "exchanged"}),
+    statement("never", "ours == 0", {"model.p_rep": 0.0}),
+]
+
+
+def test_a_claim_turns_red_under_its_change_or_is_told_to_say_nothing() -> None:
+    found = {row.id: row for row in breaks.of(PAPER, STATEMENTS, None, Flights(quick=True))}
+    assert {name: row.result for name, row in found.items()} == {
+        "part.falls": breaks.RED, "part.flat": breaks.GREEN, "part.gap": breaks.RED, "part.never": breaks.UNSHOWN,
+    }  # fmt: skip
+    assert found["part.falls"].ours == 0.0 and found["part.falls"].changed == 9.0
+    assert found["part.gap"].changed == -found["part.gap"].ours
+
+
+def test_a_part_without_changes_is_refused() -> None:
+    with pytest.raises(AirflockError, match="no claim of other names a change; parts that do: part"):
+        breaks.of(PAPER, STATEMENTS, "other", Flights())
+
+
+def test_a_change_sets_or_multiplies_what_a_scenario_has() -> None:
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    halved = with_changes(scenario, {"model.r0_rep": "times 0.5", "agents": 7, "duration": "times 2"})
+    assert halved.parameters.r0_rep == pytest.approx(0.5 * scenario.parameters.r0_rep)
+    assert halved.agents == 7 and halved.flight.duration == 2.0 * scenario.flight.duration
+
+
+@pytest.mark.parametrize("name", airflock.papers.PAPERS)
+def test_every_change_is_of_keys_that_scenarios_have(name: str) -> None:
+    presets = {"kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms"}
+    for found in breaks.load(f"airflock.papers.{name}").values():
+        if found.breaks and found.breaks != breaks.EXCHANGED:
+            with_changes(airflock.load(presets[name]), found.breaks)
+
+
+def test_only_verdicts_that_differ_are_told() -> None:
+    old = [quick.Verdict("p", "a", "x", "holds", 1.0), quick.Verdict("p", "a", "y", "holds", 1.0)]
+    new = [old[0]._replace(ours=2.0), quick.Verdict("p", "a", "z", "finding", 3.0)]
+    assert quick.changed(old, new) == [("p", "y", "holds", ""), ("p", "z", "", "finding")]
+
+
+def test_a_part_that_was_flown_is_not_flown_again_unless_the_texts_changed(tmp_path, monkeypatch) -> None:
+    flown = []
+
+    def fly_part(name, part, threads, tell):
+        flown.append((name, part))
+        tell("flights", 1, 2)
+        if part == "last" and len(flown) == 2:
+            raise KeyboardInterrupt
+        return [(f"{part}.claim", "holds", 0.5)]
+
+    monkeypatch.setattr(quick, "parts", lambda: [("one", "first"), ("one", "last")])
+    monkeypatch.setattr(quick, "_flown", fly_part)
+    said: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        quick.fly(tmp_path, said.append)
+    rows = quick.fly(tmp_path, said.append)
+    assert flown == [("one", "first"), ("one", "last"), ("one", "last")]
+    assert [row.id for row in rows] == ["first.claim", "last.claim"]
+    assert said[0] == "1/2 one first: flights, 1 of 2" and said[0] in (tmp_path / "log.txt").read_text()
+    kept = tmp_path / "one.first.json"
+    kept.write_text(json.dumps(json.loads(kept.read_text()) | {"texts": "others"}))
+    quick.fly(tmp_path, said.append)
+    assert flown[3:] == [("one", "first")]

@@ -1,0 +1,123 @@
+"""What befalls single agents, in plain loops: numbers of their own, faults with when they begin and end, absence."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from airflock.core import random
+from airflock.core.agent import State, answer
+from airflock.core.parameters import Quantity, declarations
+from airflock.scenarios.scenario import Scenario
+
+
+@dataclass
+class Suffering:
+    """A fault of one agent: its kind and numbers, when it began and for how long it lasts, s, and what was so then."""
+
+    kind: Any
+    numbers: Any
+    begin: float
+    lasts: float
+    known: dict[str, float]
+    near: float  # s; half a step: times are whole steps, and a fault lasts for whole steps
+
+    def asked(self, rule: str, time: float, **given: Any) -> Any:
+        """What a rule of it answers, or None where it has none or does not last at that time (s)."""
+        now = self.begin - self.near <= time < self.begin + self.lasts - self.near
+        found = getattr(self.kind, rule)
+        if found is None or not now:
+            return None
+        known = {**self.known, "since": max(time - self.begin, 0.0), "f": self.numbers, **given}
+        return answer(found, rule, known, self.kind.name)
+
+
+def begins(scenario: Scenario, seed: int) -> dict[int, list[tuple[int, Any, float, bool]]]:
+    """By step: agents that are hit, by which entry, for how long (s), and whether they leave by then."""
+    duration, dt, found = scenario.flight.duration, scenario.flight.dt, {}
+    for number, entry in enumerate(scenario.faults):
+        for occurrence, at in enumerate(times(entry, number, seed, duration)):
+            ends = min(entry.lasts, entry.until - at)
+            lasts = dt * round(ends / dt) if ends < 1e9 else 1e9
+            if lasts <= 0.0:
+                continue
+            step = round(at / dt)
+            for agent in hit(entry, number, occurrence, seed):
+                found.setdefault(step, []).append((number, occurrence, agent, entry, lasts, False))
+                if entry.fault.leaves is not None:
+                    gone = answer(entry.fault.leaves, "leaves", {"f": entry.numbers}, entry.fault.name)
+                    if gone < lasts:
+                        found.setdefault(step + round(gone / dt), []).append(
+                            (number, occurrence, agent, entry, lasts, True)
+                        )
+    return {step: [(a, e, s, x) for _, _, a, e, s, x in sorted(hits, key=by_entry)] for step, hits in found.items()}
+
+
+def by_entry(hit: Any) -> tuple[int, int, int, bool]:
+    """Place of a hit among those of its step."""
+    number, occurrence, agent, _, _, leaves = hit
+    return number, occurrence, agent, leaves
+
+
+def times(entry: Any, number: int, seed: int, duration: float) -> Iterator[float]:
+    """When it begins, s."""
+    if entry.at is not None:
+        if entry.at < duration:
+            yield entry.at
+        return
+    time = 0.0
+    for occurrence in range(10_000):
+        u = random.uniform(random.words(seed, random.FAULT, 0, occurrence, number)[0])
+        time += 3600.0 / entry.per_hour * -math.log(u)
+        if time >= min(duration, entry.until):
+            return
+        yield time
+
+
+def hit(entry: Any, number: int, occurrence: int, seed: int) -> list[int]:
+    """Whom it hits: those with the least random words."""
+    if entry.number is None:
+        return list(entry.agents)
+    lots = [(random.words(seed, random.FAULT, 0, occurrence, a, 1 + number)[0], a) for a in entry.agents]
+    return sorted(agent for _, agent in sorted(lots)[: entry.number])
+
+
+def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, seed: int) -> Any:
+    """Numbers of model or body of one agent: its group's, off them by its tolerance."""
+    letter, changed = {"model": "p", "body": "b"}[section], {}
+    for place, (name, declared, _) in enumerate(declarations(record)):
+        for group in scenario.groups:
+            if agent in group.agents and isinstance(declared, Quantity):
+                value = group.numbers.get((letter, name), getattr(record, name))
+                spread = group.spread.get((letter, name), 0.0)
+                if spread > 0.0:
+                    words = random.words(seed, random.SPREAD, 0, place, agent, "pb".index(letter))
+                    value += spread * random.normal_pair(*words[:2])[0]
+                if value is not None:
+                    changed[name] = min(max(value, declared.low), declared.high)
+    return replace(record, **changed)
+
+
+def misled(agent: Any, rules: Sequence[str], time: float, state: State, dims: int) -> State:
+    """A state as the faults of an agent leave it."""
+    flat = {} if dims == 3 else {"z": 0.0, "vz": 0.0}
+    for rule in rules:
+        for suffering in agent.faults.values():
+            found = suffering.asked(rule, time, **state._asdict())
+            state = state if found is None else State(*found)._replace(**flat)
+    return state
+
+
+def radio_of(agent: Any, time: float, reach: float) -> tuple[float, float]:
+    """How far an agent is heard and hears, m; negative where not at all."""
+    out = into = reach
+    for suffering in agent.faults.values():
+        found = suffering.asked("radio", time, reach=reach)
+        if found is not None:
+            out, into = min(out, found[0]), min(into, found[1])
+    return out, into
+
+
+def ahead(agent: Any, time: float) -> float:
+    """How far its clock is ahead, s."""
+    return sum(suffering.asked("clock", time) or 0.0 for suffering in agent.faults.values())

@@ -1,0 +1,196 @@
+"""Infer: the law that made the tracks is found, walks at random are nobody's law, and bad input is one line."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import airflock
+from airflock.errors import AirflockError, RecordingError
+from airflock.infer import bootstrap, candidates, fit, run, select
+from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
+from airflock.infer.walk import Gains, Walk
+
+PERIOD, SIDE, RADIUS, SPEED = 0.1, 5.0, 1.2, 1.0
+BOX = {"world.arena": "square", "world.side": SIDE, "world.edges": "periodic"}
+
+
+def dataset(place):
+    """Positions (frame, individual, axis) in m as a recording."""
+    frames, agents, axes = place.shape
+    names = {"space": list("xyz")[:axes], "keypoint": ["centroid"], "individual": [f"i{k}" for k in range(agents)]}
+    coordinates = {"time": PERIOD * np.arange(frames), **names}
+    return xr.Dataset({"position": (tuple(coordinates), place.transpose(0, 2, 1)[:, :, None, :])}, coordinates)
+
+
+def vicsek(agents=10, frames=300, eta=0.8, seed=3, noise=0.01, missing=0.02):
+    """Tracks by Eqs 1-2 of Vicsek et al. 1995 in NumPy, without the engine: turn to the mean heading, then move."""
+    g = np.random.default_rng(seed)
+    x, angle = g.uniform(-0.5 * SIDE, 0.5 * SIDE, (agents, 2)), g.uniform(-np.pi, np.pi, agents)
+    rows = []
+    for _ in range(frames):
+        rows.append(x.copy())
+        d = x[None] - x[:, None]
+        d -= SIDE * np.round(d / SIDE)
+        near = (d**2).sum(axis=2) <= RADIUS**2
+        mean = (near[:, :, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[None]).sum(axis=1)
+        angle = np.arctan2(mean[:, 1], mean[:, 0]) + eta * (g.random(agents) - 0.5)
+        x = x + SPEED * PERIOD * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        x -= SIDE * np.floor((x + 0.5 * SIDE) / SIDE)
+    place = np.array(rows)
+    seen = dataset(place + g.normal(0.0, noise, place.shape))
+    lost = g.random((frames, agents)) < missing
+    return seen.where(xr.DataArray(~lost, dims=("time", "individual")))
+
+
+def walkers(agents=10, frames=300, seed=5):
+    """Individuals that turn at random, each by itself."""
+    g = np.random.default_rng(seed)
+    angle = np.cumsum(g.normal(0.0, 0.2, (frames, agents)), axis=0) + g.uniform(-np.pi, np.pi, agents)
+    step = SPEED * PERIOD * np.stack([np.cos(angle), np.sin(angle)], axis=2)
+    place = np.cumsum(step, axis=0) + g.uniform(-2.0, 2.0, (agents, 2))
+    return dataset(place + g.normal(0.0, 0.01, place.shape))
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Little searching: enough for two laws of a few numbers."""
+    for module, name, value in (
+        (fit, "DRAWN", 40), (fit, "STARTS", 3), (fit, "SEARCHES", 0), (fit, "SMALL", 120), (select, "HOPS", 0),
+        (select, "FEW_HOPS", 0), (bootstrap, "ROUNDS", (2, 5)), (bootstrap, "LADDER", (-1.0, 0.0, 1.0)),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, value)
+
+
+@pytest.mark.usefixtures("brief")
+def test_the_law_that_made_the_tracks_is_found_with_its_numbers():
+    found = airflock.infer(vicsek(), ["couzin_2002", "vicsek_1995"], settings=BOX, check=4)
+    assert found.best is not None and found.best.name == "vicsek_1995", found.verdict
+    radius, speed, eta = (found.best.numbers[key] for key in ("model.r", "body.speed", "model.eta"))
+    assert radius.low < RADIUS < radius.high and radius.high / radius.low < 1.5
+    assert speed.value == pytest.approx(SPEED, rel=0.02)
+    assert eta.value == pytest.approx(0.8, rel=0.25)
+    assert found.noise.seen == pytest.approx(0.01, rel=0.4)
+    assert 0.9 < found.best.inside < 0.98  # of held-out steps within what is predicted for 95 %
+    flown = found.scenario()
+    assert flown.parameters.r == pytest.approx(radius.value, rel=1e-3) and flown.agents == 10
+    assert set(found.check.found) == {"polarisation", "milling", "speed", "nearest", "radius"}
+
+
+@pytest.mark.usefixtures("brief")
+def test_walks_at_random_are_explained_by_none():
+    found = airflock.infer(walkers(), ["couzin_2002", "vicsek_1995"], check=0)
+    assert found.best is None, [(law.name, law.gain, law.error) for law in found.laws]
+    assert found.verdict == "none of these explains the tracks better than going straight on"
+    with pytest.raises(AirflockError, match="no scenario to write"):
+        found.document()
+
+
+def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
+    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    law = candidates.candidate("vicsek_1995", scale_of([tracks]), 2, BOX)
+    numbers = {n.column: v for n in law.numbers for k, v in NUMBERS.items() if n.key == k}
+    # with gains of 1 a velocity is what was seen last: of a flock that no longer turns it is exact
+    e = Walk(law, tracks).errors(numbers, Gains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
+    settled = tracks.state[90:] == COUNTED
+    assert settled.any() and np.abs(e[90:].transpose(0, 2, 1)[settled]).max() < 1e-6
+
+
+NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}
+
+
+def test_a_law_has_its_noise_at_zero_and_its_ranges_cut_to_what_was_seen():
+    scale = scale_of([tracks_of(vicsek())])
+    for name, noise in (("couzin_2002", "model.sigma"), ("vicsek_1995", "model.eta")):
+        law = candidates.candidate(name, scale, 2, {})
+        assert [n.key for n in law.noises] == [noise] and noise not in [n.key for n in law.numbers]
+        lengths = [n for n in law.numbers if n.unit == "m"]
+        assert lengths and all(n.high <= 1.2 * scale.far for n in lengths)
+
+
+def test_gains_after_gaps_are_those_of_a_kalman_filter():
+    period, q, r = 0.1, 0.7, 0.05  # variance that a velocity gains per period, m²/s²; SD of a position, m
+    step = np.array([[1.0, period], [0.0, 1.0]])
+    noise, h = np.diag([0.0, q]), np.array([1.0, 0.0])
+    p = np.eye(2)
+    for _ in range(500):
+        p = step @ p @ step.T + noise
+        k = p @ h / (p[0, 0] + r * r)
+        p = p - np.outer(k, h) @ p
+    steady = k
+    grown = Gains((steady[0], steady[1] * period), (steady[0], steady[1] * period)).table(period)
+    for unseen in range(4):  # from the steady state on without a look
+        p = step @ p @ step.T + noise
+        assert grown[0, :, unseen] == pytest.approx(p @ h / (p[0, 0] + r * r), rel=1e-6)
+
+
+def test_who_is_unseen_for_long_has_left_and_enters_again():
+    place = np.zeros((120, 2, 2))
+    place[:, :, 0] = 0.1 * np.arange(120)[:, None]
+    place[:, 1, 1] = 1.0
+    place[30:33, 0] = place[60:80, 0] = np.nan
+    state = tracks_of(dataset(place), span=12.0).state[:, 0]
+    begin = 15  # of the span in which the gaps are: spans are cut evenly
+    assert state[0] == ENTERS and state[begin + 13] == COUNTED
+    assert set(state[30:33]) <= {UNSEEN, ABSENT} and state[33] in (SEEN, ENTERS)
+    assert (state[60:80] == ABSENT).all() and state[80] == ENTERS
+
+
+def test_bad_tracks_and_laws_are_one_line_each():
+    with pytest.raises(AirflockError) as fault:
+        airflock.infer(vicsek(), ["vicsek_1996", "couzin_2002/torsu"])
+    assert "did you mean vicsek_1995" in str(fault.value) and "couzin_2002/torus" in str(fault.value)
+    with pytest.raises(AirflockError, match="did you mean world.side"):
+        airflock.infer(vicsek(), ["vicsek_1995"], settings={"world.sied": 3.0})
+    with pytest.raises(RecordingError, match="too few"):
+        airflock.infer(vicsek(frames=20), ["vicsek_1995"])
+    with pytest.raises(AirflockError, match="nobody to flock with"):
+        airflock.infer(vicsek(agents=1), ["vicsek_1995"])
+    tracks = vicsek(frames=130)
+    uneven = tracks.assign_coords(time=np.concatenate([tracks["time"].values[:30], tracks["time"].values[30:] + 5.0]))
+    with pytest.raises(RecordingError, match="not evenly spaced"):
+        airflock.infer(uneven, ["vicsek_1995"])
+    with pytest.raises(AirflockError, match="whole flock"):
+        airflock.infer(tracks, ["dimock_2003/published"])
+
+
+def test_the_best_is_named_with_its_doubts():
+    def law(name, gain, missed, surprise):
+        return run.Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))
+
+    ahead = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0])
+    assert run._verdict([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
+    doubtful = run._verdict([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
+    assert "b cannot be told from it" in doubtful
+    assert "would explain 30%" in run._verdict([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
+    assert run._verdict([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
+    assert run._verdict([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
+
+
+def test_the_command_says_all_that_is_wrong_in_lines(tmp_path):
+    command = [sys.executable, "-c", "from airflock.cli import main; main()", "infer"]
+    bad = [*command, str(tmp_path / "none.nc"), "--models", "", "--out", "best.txt", "--plot", "nowhere/forces.png"]
+    told = subprocess.run(bad, capture_output=True, text=True, cwd=tmp_path)
+    assert told.returncode == 2 and "Traceback" not in told.stderr
+    for part in ("no such file", "--models names no law", "best.txt", "nowhere"):
+        assert part in told.stderr
+
+
+def test_json_holds_what_the_table_says():
+    from airflock.cli.infer import _plain
+
+    scale = scale_of([tracks_of(vicsek(frames=130))])
+    laws = [run.Law("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
+    found = run.Inferred(laws, None, "none", 10, (5, 9), scale, 10)
+    plain = json.loads(json.dumps(_plain(found)))
+    assert plain["best"] is None and plain["laws"][0]["gain"] == 1.0 and plain["frames"] == {"fitted": 5, "all": 9}
+
+
+def test_positions_of_a_recording_stay_untouched():
+    recording = vicsek(frames=130)
+    kept = recording.copy(deep=True)
+    tracks_of(recording)
+    xr.testing.assert_identical(recording, kept)

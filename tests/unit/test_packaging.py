@@ -1,0 +1,35 @@
+"""Files about the package agree with pyproject.toml: the conda recipe, the citation, the table of extras."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import airflock
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CONDA_NAMES = {"matplotlib": "matplotlib-base"}  # the part without a window system
+
+
+def test_the_conda_recipe_needs_what_pip_installs():
+    recipe = (ROOT / "conda" / "meta.yaml").read_text(encoding="utf-8")
+    needs = re.findall(r"^    - (.+)$", recipe.partition("  run:\n")[2].partition("\ntest:")[0], re.M)
+    wanted = [f"python {PROJECT['requires-python']}"]
+    for need in PROJECT["dependencies"]:
+        name, bounds = re.fullmatch(r"([\w-]+)(.*)", need).groups()
+        wanted.append(f"{CONDA_NAMES.get(name, name)} {bounds}")
+    assert sorted(needs) == sorted(wanted)
+    assert f'version = "{airflock.__version__}"' in recipe
+
+
+def test_the_citation_names_this_version_and_every_publication_of_a_shipped_paper():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {airflock.__version__}\n" in citation
+    for word in ("Optimized flocking of autonomous drones", "coordinated motion in flocks", "bird flocks", "Kidger"):
+        assert word in citation
+
+
+def test_every_extra_stands_in_the_table_of_the_documentation():
+    page = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"^\| `\[(\w+)\]` \|", page, re.M))
+    assert told == set(PROJECT["optional-dependencies"]) - {"browser", "lint", "dev"}  # for who works on Airflock
