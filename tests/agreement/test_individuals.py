@@ -114,7 +114,7 @@ def test_random_numbers_of_the_others_do_not_depend_on_who_left():
         (lambda f: f.remove(2).push(2, [1, 1]), "agent = 2: it is absent"),
         (lambda f: f.remove(2).look(2), "agent = 2: it is absent"),
         (lambda f: f.event("remove"), "are not what it needs"),
-        (lambda f: f.fault("moter", [1]), r"faults\[0\].kind = 'moter' is no kind of fault; did you mean motor"),
+        (lambda f: f.fault("moter", [1]), r"faults\[0\].kind = 'moter' is not a kind of fault; did you mean motor"),
         (lambda f: f.fault("motor", [9]), r"faults\[0\].agents: there is no agent 9; this flock has the agents 0 to 7"),
         (lambda f: f.event("fault", kind="motor", agents=[1], share=2.0), r"share = 2 lies outside \[0, 1\]"),
     ],
@@ -377,14 +377,14 @@ def test_a_kind_that_is_none_is_one_line(rules, said):
         ({"kind": "motor"}, "give at, when it begins, or per_hour, how often it comes"),
         ({"kind": "motor", "at": 1.0, "per_hour": 2.0}, "give at, when it begins, or per_hour"),
         ({"kind": "motor", "at": 1.0, "until": 0.5}, r"until = 0.5 s is not after at = 1 s"),
-        ({"kind": "motor", "at": 1.0, "group": "heavy"}, "is no group; the scenario has none"),
+        ({"kind": "motor", "at": 1.0, "group": "heavy"}, "is not a group; the scenario has none"),
         ({"kind": "motor", "at": 1.0, "number": 101}, "is not a whole number up to 100"),
         ({"kind": "motor", "at": 1.0, "agents": [100]}, "there is no agent 100; this flock has the agents 0 to 99"),
         ({"kind": "motor", "at": 1.0, "agents": 3}, "is not a list of numbers of agents"),
         ({"kind": "motor", "at": "1 furlong"}, "the unit is s"),
         ({"kind": "motor", "at": 1.0, "shar": 0.5}, "did you mean"),
         ({"kind": "fails", "at": 1.0, "until": 3.0}, "fails does not end"),
-        ({"at": 1.0}, "is no kind of fault"),
+        ({"at": 1.0}, "is not a kind of fault"),
         (3, "faults is not a list of tables"),
     ],
 )
@@ -477,3 +477,28 @@ def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
     assert "fails (2)" in "".join(text.get_text() for axes in figure.axes for text in axes.texts)
     with pytest.raises(RecordingError, match="airflock_faults is damaged"):
         faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))
+
+
+def test_groups_are_scored_alone_and_against_each_other():
+    from airflock.errors import RecordingError
+
+    groups = [{"name": "left", "agents": 4}, {"name": "right"}]
+    start = np.zeros((4, 8))
+    start[0, :4], start[0, 4:], start[1] = -30.0, 30.0, np.tile(np.arange(4) * 10.0, 2)
+    start[2, :4], start[3, 4:] = 3.0, 3.0  # left flies east, right flies north
+    apart = {**OPEN, "radio.range": 0.0, "sensors.noise": 0.0, "body.noise": 0.0, "duration": 1.0, "groups": groups}
+    scenario = load(PAPER, {**SMALL, **apart, "model.v_flock": 3.0})
+    recording = airflock.simulate(scenario, 1, start=start, device="python")
+    table = airflock.score(recording, groups=True)
+    assert table.index.tolist() == ["all", "left", "right", "left to right"]
+    assert table.loc["left", "phi_corr"] == pytest.approx(1.0) and table.loc["all", "phi_corr"] < 0.6
+    between = table.loc["left to right"]
+    assert between["phi_between"] == pytest.approx(0.0, abs=1e-6)
+    x = recording.position.values[:, :, 0]
+    gap = x[:, :, None, 4:] - x[:, :, :4, None]
+    assert between["r_between"] == pytest.approx(np.linalg.norm(gap, axis=1).min(), rel=1e-5)
+    assert 50.0 < between["r_centres"] < 61.0 and table.attrs["units"]["r_centres"] == "m"
+    whole = airflock.score(recording).iloc[0]
+    assert table.loc["all", "phi_vel"] == whole["phi_vel"]
+    with pytest.raises(RecordingError, match=r"its scenario has no \[\[groups\]\]"):
+        airflock.score(airflock.simulate(load(PAPER, SMALL), 1, device="python"), groups=True)

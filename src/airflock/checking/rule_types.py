@@ -39,7 +39,7 @@ VECTOR = "tuple[float, float, float]"
 RESULTS = {
     **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
-    "pair": "Pair", "linked": "bool", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
+    "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
 }  # fmt: skip
 

@@ -143,7 +143,7 @@ def _kind(
             return None, str(wrong).splitlines()
     near = get_close_matches(str(name), kinds, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(kinds)}, or a file that ends in .py"
-    return None, [f"{where}.kind = {name!r} is no kind of fault; {hint}"]
+    return None, [f"{where}.kind = {name!r} is not a kind of fault; {hint}"]
 
 
 def _who(
@@ -160,7 +160,7 @@ def _who(
     if table["group"] in named:
         return named[table["group"]], []
     known = f"known: {', '.join(named)}" if named else "the scenario has none; write [[groups]]"
-    return None, [f"{where}.group = {table['group']!r} is no group; {known}"]
+    return None, [f"{where}.group = {table['group']!r} is not a group; {known}"]
 
 
 def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) -> list[str]:
