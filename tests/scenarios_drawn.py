@@ -29,7 +29,8 @@ SCALES = {
     "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
 }  # fmt: skip
 BODIES = {
-    "velocity": ("multirotor", "quadrotor", "direct", "jostled"), "acceleration": ("steered",), "heading": ("heading",),
+    "velocity": ("multirotor", "quadrotor", "fixed_wing", "direct", "jostled"),
+    "acceleration": ("steered",), "heading": ("heading",),
 }  # fmt: skip
 CUBE = str(Path(__file__).parent / "cube.obj")
 SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python
@@ -147,6 +148,8 @@ def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
     law = find_model(kind)
     sometimes(keys, rng, law.Parameters, "model", 0.3, ("rays", "most"))
     if kind == "kidger":
+        if keys.get("model.r_sep") == 0.0:
+            keys["model.r_sep"] = 1e-3  # by 0, lines that a flight skips would divide
         keys |= {"model.rays": rng.choice((8, 40)), "model.most": rng.randint(1, 3)}
     body = rng.choice(BODIES[law.command])
     keys["body.kind"] = body
@@ -154,6 +157,8 @@ def model(keys: dict[str, Any], rng: Random, kind: str) -> None:
         keys["body.noise"] = 0.0
     elif rng.random() < 0.5:
         sometimes(keys, rng, KNOWN_BODIES[body].Parameters, "body", 0.4)
+    if body == "fixed_wing":
+        keys["wing.weight"] = 0.02 * SCALES[kind][2] ** 2  # N; it stalls at a quarter of the law's speed
     if kind != "dimock_2003" and law.command == "velocity" and rng.random() < 0.12:
         keys |= {"aero.k_d": rng.choice((0.05, 0.3)), "aero.gradient": rng.choice(OPTIONS["aero"]["gradient"])}
     keys["wing.segments"] = rng.choice(SEGMENTS)
@@ -256,7 +261,7 @@ def perception(keys: dict[str, Any], rng: Random, length: float, dt: float) -> N
     keys["radio.range"] = length * rng.choice((0.5, 1.0, 4.0, 1e6))
     if rng.random() < 0.3:
         keys |= {"wind.east": rng.choice((0.0, 1.5)), "wind.north": -0.5, "wind.gust": rng.choice((0.0, 2.0))}
-        keys["wind.up"] = rng.choice((0.0, 0.3))
+        keys |= {"wind.up": rng.choice((0.0, 0.3)), "wind.kind": rng.choice(("simple", "dryden"))}
     if rng.random() < 0.25 and keys["model.kind"] != "dimock_2003" and "aero.k_d" not in keys:
         keys |= {
             "update": "sequential",
@@ -347,7 +352,8 @@ def notions(draw: Draw) -> set[str]:
     kinds = {f"faults.kind = {kind.name}" for kind in found.fault_kinds}
     names = kinds | {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
     records = {
-        "model": found.parameters, "body": found.body, "radio": found.radio, "world": found.world, "scene": found.scene,
+        "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio,
+        "world": found.world, "scene": found.scene,
         "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
         "flight": found.flight,
     } | ({"aero": found.aero} if found.descends else {})  # fmt: skip

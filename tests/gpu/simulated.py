@@ -53,6 +53,7 @@ CASES = {
     "silo": ("viragh_2014", {key: value for key, value in IDEAL.items() if key != "body.noise"} | {
         "world.dimensions": "3", "world.arena": "circle", "world.floor": 5.0, "world.obstacles": ISLANDS[:1],
         "world.heights": [[0.0, 18.0]], "body.kind": "quadrotor", "dt": 0.04, "duration": 0.6, "wind.east": 3.0,
+        "wind.kind": "dryden",
     }, 1, True),
     "table": ("vasarhelyi_2018", {
         "metrics.r_cluster": 12.0, "start.speed": 3.0, "radio.loss": 0.4, "body.kind": "quadrotor", "dt": 0.04,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import radio, sensors, wind
+from airflock.body import dryden, radio, sensors, wind
 from airflock.checking.flock import of_model
 from airflock.core import random
 from airflock.core.agent import Heard, State, answer, decide
@@ -275,10 +275,33 @@ def extrapolated(j: int, state: State, stamp: float, time: float) -> Heard:
 def blow(scenario: Scenario, seed: int, step: int, gust: Vector) -> Vector:
     """Gust after one motion step, m/s."""
     a, dt = scenario.wind, scenario.flight.dt
+    if a.kind == "dryden":
+        return turbulence(scenario, seed, step, gust)
     if a.gust == 0.0:
         return ZERO
     x, y, z = (wind.gusting(w, g, dt, a) for w, g in zip(gust, normals(seed, random.GUST, step, 0), strict=False))
     return x, y, z
+
+
+def turbulence(scenario: Scenario, seed: int, step: int, gust: Any) -> Any:
+    """Gust of the Dryden spectrum after one motion step, m/s; it carries its five states along."""
+    air, dt = dryden.numbers_of(scenario.wind), scenario.flight.dt
+    u, p, q, r, s = gust.states if isinstance(gust, Turbulent) else (0.0,) * 5
+    ga, gb, gc, gd = normals(seed, random.GUST, step, 0)
+    ge = normals(seed, random.GUST, step, 0, draw=1)[0]
+    u = dryden.along(u, ga, dt, air.length, air.sigma, air.airspeed)
+    p, q = dryden.across(p, q, gb, gc, dt, air.length, air.airspeed)
+    r, s = dryden.across(r, s, gd, ge, dt, air.length_up, air.airspeed)
+    side, up = dryden.gust_of(p, q, air.sigma), dryden.gust_of(r, s, air.sigma_up)
+    made = Turbulent((air.east * u - air.north * side, air.north * u + air.east * side, up))
+    made.states = (u, p, q, r, s)
+    return made
+
+
+class Turbulent(tuple):
+    """A gust, m/s, with the states of its three axes."""
+
+    states: tuple[float, ...]
 
 
 def advance(scenario: Scenario, seed: int, step: int, i: int, agent: Agent, gust: Vector, place: Place) -> None:

@@ -20,7 +20,7 @@ from airflock.engine.stages import move as motion
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages.state import Flock
 from airflock.engine.tables import tables
-from flocks import ISLANDS, scenario
+from flocks import ISLANDS, NOTCHED, scenario
 
 FILES = sorted(Path(stages.__file__).parent.glob("*.py"))
 
@@ -47,6 +47,18 @@ def test_no_text_in_a_stage_is_code(path):
 SILENT = {"sensors__noise": 0.0, "body__noise": 0.0}
 CASES = {
     "paper": ("vasarhelyi_2018", {}),
+    "dryden, quadrotor, polygon, 3-D": (
+        "vasarhelyi_2018",
+        {
+            "wind__kind": "dryden",
+            "wind__north": 3.0,
+            "body__kind": "quadrotor",
+            "world__arena": "polygon",
+            "world__corners": NOTCHED,
+            "world__dimensions": "3",
+            "world__floor": 3.0,
+        },
+    ),
     "loss, gusts, obstacles": ("viragh_2014", {"radio__loss": 0.5, "wind__gust": 2.0, "world__obstacles": ISLANDS}),
     "links, 3-D": ("vasarhelyi_2018", {"world__dimensions": "3", "radio__kind": "links", "radio__near": 5.0}),
     "periodic, late": ("vasarhelyi_2018", SILENT | {"world__edges": "periodic"}),
@@ -73,7 +85,7 @@ class World:
             "ring": rng.uniform(-12.0, 12.0, (2, 2 * dims, n)),
             "words": np.zeros((4, n), np.uint32).astype(object),
             "store": np.concatenate([rng.uniform(-9.0, 9.0, (n, 2 * dims, n)), np.full((n, 1, n), -1e9)], 1),
-            "gust": np.array([0.3, -0.2, 0.1]),
+            "gust": np.array([0.3, -0.2, 0.1, 0.5, -0.4])[: 5 if self.plan.dryden else 3],
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
         self.whole, self.row = types.SimpleNamespace(**whole), self.tables.row.tolist()
@@ -136,7 +148,7 @@ class World:
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
-            lambda: gusts.gusts(numbers, whole, step, state["gust"]), plan=plan,
+            lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), plan=plan,
         )  # fmt: skip
         return state
 

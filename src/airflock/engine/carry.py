@@ -20,7 +20,8 @@ def carry(old: State, new: State, step: int) -> None:
     lanes = _lanes(old, new)
     _rows(old, new, lanes)
     new.arrays["past"][...] = _under_way(old, new, step, lanes)
-    new.arrays["gust"][:] = old.arrays["gust"]
+    if new.plan.dryden == old.plan.dryden:
+        new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.links and new.plan.links:
         new.arrays["store"][...] = old.arrays["store"][lanes[: old.agents]][..., lanes]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:

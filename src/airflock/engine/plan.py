@@ -44,6 +44,7 @@ class Plan:
     build     : how it is built; bits, record, given_start and grid read it
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
     surfaces  : surface function of each family of walls, in the order of the faces table
+    dryden    : gusts are those of the Dryden spectrum
     polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is not 0
     obstacle  : surface function of an obstacle
     excursion : how far outside a position is
@@ -88,6 +89,7 @@ class Plan:
     lossy: bool = False
     links: bool = False
     windy: bool = False
+    dryden: bool = False
     obstacles: bool = False
     obstacle: Callable[..., Any] = arena.convex_obstacle
     polygon: bool = False

@@ -77,7 +77,8 @@ def plan_of(
         links=scenario.radio.kind == "links",
         faults=kinds,
         varied=scenario.varied,
-        windy=any((wind.east, wind.north, wind.up, wind.gust)),
+        windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
+        dryden=wind.kind == "dryden",
     )
 
 

@@ -320,8 +320,9 @@ def _layout(
     }  # fmt: skip
     beginnings["store"][:, 2 * dims] = NEVER
     columns = sum(map(len, plan.records.values()))
+    gusts = (5 if plan.dryden else 3,)
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {
-        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": ((3,), real),
+        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
         "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
         "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
         "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),

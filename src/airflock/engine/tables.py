@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.body import dryden, wind
 from airflock.engine.onsets import Onset, onsets, row_values
 from airflock.engine.plan import WHOLE, Plan
 from airflock.scenarios.scenario import Scenario
@@ -111,9 +112,12 @@ def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
     """Record behind each letter of a driver's row; period: time between two decisions, s."""
-    derived = {"world": geometry(scenario), "": Clock(scenario.flight.dt, period)}
-    records = scenario.records | derived | {"metrics": scenario.measured_by()}
-    return {section.letter: records[section.key] for section in ORDER if section.letter}
+    a, records = scenario.wind, scenario.records | {"metrics": scenario.measured_by()}
+    derived = {
+        "w": geometry(scenario), "c": Clock(scenario.flight.dt, period), "air": dryden.numbers_of(a),
+        "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time),
+    }  # fmt: skip
+    return {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
 
 
 def geometry(scenario: Scenario) -> Geometry:

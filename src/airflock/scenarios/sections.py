@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from airflock.aero import descent, wing
-from airflock.body import motion, radio, sensors, wind
+from airflock.body import dryden, motion, radio, sensors, wind
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.metrics import parameters as metrics
@@ -93,7 +93,7 @@ ORDER = (
     Section("body", motion.Parameters, "b"),
     Section("sensors", sensors.Parameters, "s"),
     Section("radio", radio.Parameters, "k"),
-    Section("wind", wind.Parameters, "a"),
+    Section("wind", wind.Parameters, "a", wind.Steady),
     Section("world", arena.Parameters, "w", Geometry),
     Section("scene", scenery.Parameters),
     Section("goals", goals.Parameters),
@@ -102,5 +102,6 @@ ORDER = (
     Section("", Flight, "c", Clock),
     Section("wing", wing.Parameters, "wing"),
     Section("aero", descent.Parameters, "aero"),
+    Section("wind", wind.Parameters, "air", dryden.Numbers),
 )
 SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

@@ -41,6 +41,8 @@ def refused(plan: Plan, agents: int) -> str | None:
         return f"{plan.model.name} or its order parameters solve for the whole flock"
     if plan.start in FORMATIONS and not plan.given_start:
         return f"one big flock starts at random or given places, not in start.kind = {plan.start}"
+    if plan.dryden:
+        return "one big flock in Dryden turbulence flies on cpu"
     if plan.body.Memory is not None:
         return f"a body that remembers ({plan.body.name}) flies on cpu in one big flock"
     if plan.goals or plan.own or plan.scene or plan.stop:

@@ -33,7 +33,8 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += [f"reduced = cuda.shared.array((2, WARPS, {REDUCED}), {kind})"]
     count = len(columns(plan.metrics))
     lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
-    lines += [f"gust = cuda.local.array(3, {kind})", "gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    parts = 5 if plan.dryden else 3
+    lines += [f"gust = cuda.local.array({parts}, {kind})", "; ".join(f"gust[{c}] = ZERO" for c in range(parts))]
     lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
     lines += [f"near = cuda.local.array({scene.NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
     lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
