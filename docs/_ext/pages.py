@@ -226,6 +226,13 @@ def vocabulary() -> None:
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
         "limits": "of a body: what of a scenario it cannot fly, as lines",
+        "sense": "of a fault: the position and velocity that an agent believes, after its sensors",
+        "tell": "of a fault: the position and velocity that it sends to the others",
+        "radio": "of a fault: how far its radio hears and is heard",
+        "clock": "of a fault: how far its clock is ahead, s",
+        "overrule": "of a fault: the command that reaches the body",
+        "motion": "of a fault: the velocity after a step of motion",
+        "leaves": "of a fault: time from its beginning until the agent is absent, s",
         "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
     }
     wrong = sorted(set(told) ^ set(VOCABULARY))
