@@ -477,3 +477,28 @@ def test_faults_of_a_recording_are_told_where_people_look(tmp_path):
     assert "fails (2)" in "".join(text.get_text() for axes in figure.axes for text in axes.texts)
     with pytest.raises(RecordingError, match="airflock_faults is damaged"):
         faults(recording.assign_attrs(airflock_faults='{"faults": [3]}'))
+
+
+def test_groups_are_scored_alone_and_against_each_other():
+    from airflock.errors import RecordingError
+
+    groups = [{"name": "left", "agents": 4}, {"name": "right"}]
+    start = np.zeros((4, 8))
+    start[0, :4], start[0, 4:], start[1] = -30.0, 30.0, np.tile(np.arange(4) * 10.0, 2)
+    start[2, :4], start[3, 4:] = 3.0, 3.0  # left flies east, right flies north
+    apart = {**OPEN, "radio.range": 0.0, "sensors.noise": 0.0, "body.noise": 0.0, "duration": 1.0, "groups": groups}
+    scenario = load(PAPER, {**SMALL, **apart, "model.v_flock": 3.0})
+    recording = airflock.simulate(scenario, 1, start=start, device="python")
+    table = airflock.score(recording, groups=True)
+    assert table.index.tolist() == ["all", "left", "right", "left to right"]
+    assert table.loc["left", "phi_corr"] == pytest.approx(1.0) and table.loc["all", "phi_corr"] < 0.6
+    between = table.loc["left to right"]
+    assert between["phi_between"] == pytest.approx(0.0, abs=1e-6)
+    x = recording.position.values[:, :, 0]
+    gap = x[:, :, None, 4:] - x[:, :, :4, None]
+    assert between["r_between"] == pytest.approx(np.linalg.norm(gap, axis=1).min(), rel=1e-5)
+    assert 50.0 < between["r_centres"] < 61.0 and table.attrs["units"]["r_centres"] == "m"
+    whole = airflock.score(recording).iloc[0]
+    assert table.loc["all", "phi_vel"] == whole["phi_vel"]
+    with pytest.raises(RecordingError, match=r"its scenario has no \[\[groups\]\]"):
+        airflock.score(airflock.simulate(load(PAPER, SMALL), 1, device="python"), groups=True)

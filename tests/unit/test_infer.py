@@ -91,7 +91,9 @@ def test_walks_at_random_are_explained_by_none():
 
 def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
     tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
-    law = candidates.candidate("vicsek_1995", scale_of([tracks]), 2, BOX)
+    (own,), box = candidates.scenarios_of(["vicsek_1995"], BOX)
+    assert box[:2] == (0.5 * SIDE, 0.5 * SIDE)
+    law = candidates.candidate(own, scale_of([tracks]), 2)
     numbers = {n.column: v for n in law.numbers for k, v in NUMBERS.items() if n.key == k}
     # with gains of 1 a velocity is what was seen last: of a flock that no longer turns it is exact
     e = Walk(law, tracks).errors(numbers, Gains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
@@ -105,7 +107,7 @@ NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}
 def test_a_law_has_its_noise_at_zero_and_its_ranges_cut_to_what_was_seen():
     scale = scale_of([tracks_of(vicsek())])
     for name, noise in (("couzin_2002", "model.sigma"), ("vicsek_1995", "model.eta")):
-        law = candidates.candidate(name, scale, 2, {})
+        law = candidates.candidate(candidates.scenarios_of([name], {})[0][0], scale, 2)
         assert [n.key for n in law.noises] == [noise] and noise not in [n.key for n in law.numbers]
         lengths = [n for n in law.numbers if n.unit == "m"]
         assert lengths and all(n.high <= 1.2 * scale.far for n in lengths)
@@ -142,7 +144,7 @@ def test_who_is_unseen_for_long_has_left_and_enters_again():
 def test_bad_tracks_and_laws_are_one_line_each():
     with pytest.raises(AirflockError) as fault:
         airflock.infer(vicsek(), ["vicsek_1996", "couzin_2002/torsu"])
-    assert "did you mean vicsek_1995" in str(fault.value) and "couzin_2002/torus" in str(fault.value)
+    assert "did you mean vicsek_1995?" in str(fault.value) and "couzin_2002/torus" in str(fault.value)
     with pytest.raises(AirflockError, match="did you mean world.side"):
         airflock.infer(vicsek(), ["vicsek_1995"], settings={"world.sied": 3.0})
     with pytest.raises(RecordingError, match="too few"):
@@ -153,6 +155,8 @@ def test_bad_tracks_and_laws_are_one_line_each():
     uneven = tracks.assign_coords(time=np.concatenate([tracks["time"].values[:30], tracks["time"].values[30:] + 5.0]))
     with pytest.raises(RecordingError, match="not evenly spaced"):
         airflock.infer(uneven, ["vicsek_1995"])
+    with pytest.raises(AirflockError, match="its box is not that of couzin_2002"):
+        airflock.infer(tracks, ["couzin_2002", "vicsek_1995/ordered"])
     with pytest.raises(AirflockError, match="whole flock"):
         airflock.infer(tracks, ["dimock_2003/published"])
 

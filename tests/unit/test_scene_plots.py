@@ -59,7 +59,7 @@ def test_paths_through_a_scene_show_what_stands_there(name):
 
 
 def test_rays_of_an_agent_are_those_that_its_model_casts():
-    made = recording()
+    made = recording(model__separation="normalised")  # so that they go on side by side
     found, command = cast_at(made, 3, 20)
     free = [ray for ray in found if ray.free >= ray.length]
     assert len(found) > 1 and found[0].free < found[0].length  # the building ahead

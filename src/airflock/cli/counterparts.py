@@ -33,7 +33,10 @@ COUNTERPARTS: dict[str, Counterpart] = {
     ),
     "score": Counterpart(
         "airflock.score(recording)", "score",
-        {"files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero"},
+        {
+            "files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero",
+            "groups": "groups",
+        },
     ),
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",

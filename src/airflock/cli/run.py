@@ -99,6 +99,7 @@ def score(
     aero: Annotated[
         bool, typer.Option("--aero", help="Measure the power that the geometry saves; --set wing.span=... and so on.")
     ] = False,
+    groups: Annotated[bool, typer.Option("--groups", help="Each group of the scenario, and each two of them.")] = False,
 ) -> None:
     """Measure recordings, simulated or flown, with the same order parameters.
 
@@ -109,7 +110,31 @@ def score(
     options.writable((series, TABLES))
     changed = options.settings(changes)
     with Opening(files[0]) as first:  # another process opens it while this one imports
-        _score([first, *files[1:]], files, changed, series, aero, as_json)
+        if groups:
+            _groups([first, *files[1:]], files, changed, as_json)
+        else:
+            _score([first, *files[1:]], files, changed, series, aero, as_json)
+
+
+def _groups(what, files, changed, as_json) -> None:  # type: ignore[no-untyped-def]
+    """Measure the groups of recordings, and print what was found."""
+    from airflock.metrics.registry import reports
+    from airflock.recordings.files import load_recording
+    from airflock.recordings.groups import BETWEEN, group_scores
+    from airflock.recordings.scores import scenario_of
+
+    runs = []
+    for source, path in zip(what, files, strict=True):
+        recording = load_recording(source)
+        about = reports(scenario_of(recording, changed).measures) | BETWEEN
+        table = group_scores(recording, changed)
+        rows = {str(name): row.dropna().to_dict() for name, row in table.iterrows()}
+        runs.append({"file": str(path), "groups": rows})
+        if not as_json:
+            for name, row in rows.items():
+                tables.score_table(f"{path}: {name}", [row], {}, about)
+    if as_json:
+        tables.emit_json({"runs": runs})
 
 
 def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]

@@ -1,8 +1,10 @@
 """Candidates: laws as quiet scenarios, and the numbers of each that tracks may tell."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,11 @@ from airflock.engine.plan import Plan
 from airflock.engine.simulate import plan_of
 from airflock.engine.state import State
 from airflock.engine.tables import tables
-from airflock.errors import ScenarioError
+from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
-from airflock.scenarios.files import MODELS, load, make
+from airflock.scenarios.files import MODELS, load, make, presets
 from airflock.scenarios.scenario import Scenario
+from airflock.world.place import half_sizes
 
 STEP = 0.025  # s; longest motion step
 LONG = 1e5  # s; a flight that outlasts any span
@@ -89,12 +92,10 @@ class Candidate:
         return State(self.plan, tables(flown, self.plan, 0), cpu.driver_of(self.plan), start)
 
 
-def candidate(
-    what: str | Scenario, scale: Scale, axes: int, settings: Mapping[str, Any], *, trust: bool = False
-) -> Candidate:
-    """A candidate from the name of a law, a preset, a scenario file, a file with a law, or a Scenario."""
-    name = what.name if isinstance(what, Scenario) else str(what)
-    scenario = quiet(_base(what, settings, trust), scale, axes)
+def candidate(base: Scenario, scale: Scale, axes: int) -> Candidate:
+    """A candidate from a scenario of its law."""
+    name = base.name
+    scenario = quiet(base, scale, axes)
     if scenario.model.flock is not None:
         raise ScenarioError([f"{name}: has a rule of the whole flock, which no individual follows by itself"])
     if scenario.flight.update != "synchronous":
@@ -113,13 +114,44 @@ def candidate(
     return Candidate(name, scenario, plan, kept, noises, column)
 
 
+def scenarios_of(
+    models: Iterable[str | Scenario], settings: Mapping[str, Any], *, trust: bool = False
+) -> tuple[list[Scenario], tuple[float, ...]]:
+    """Scenarios of the laws, and half sides (m) of the periodic box in which all of them live; 0 along an open axis.
+
+    models : names of laws, presets, scenario files, files with a law, or Scenarios
+    Raises ScenarioError with every fault.
+    """
+    faults: list[str] = []
+    found = []
+    for what in models:
+        try:
+            found.append(_base(what, settings, trust))
+        except AirflockError as fault:
+            faults += str(fault).splitlines()
+    if faults:
+        raise ScenarioError(list(dict.fromkeys(faults)))
+    boxes = [half_sizes(each.world) if each.world.edges == "periodic" else (0.0, 0.0, 0.0) for each in found]
+    for each, box in zip(found, boxes, strict=True):
+        if box != boxes[0]:
+            raise ScenarioError(
+                [f"{each.name}: its box is not that of {found[0].name}; say what is so, such as --set world.edges=open"]
+            )
+    return found, boxes[0]
+
+
 def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Scenario:
+    """Scenario of a law; one that is given already knows its place."""
     if isinstance(what, Scenario):
         return what
     if what in MODELS or str(what).endswith(".py"):
         open_air = {"model": {"kind": str(what)}, "world": {"arena": "none"}, "radio": {"delay": 0.0}}
         open_air["start"] = {"kind": "ball", "separation": 0.0}
         return make(open_air, str(what), settings, trust=trust or str(what).endswith(".py"))
+    if what not in presets() and not Path(what).is_file():
+        near = get_close_matches(str(what), [*MODELS, *presets()], n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else f"; laws: {', '.join(MODELS)}"
+        raise ScenarioError([f"{what}: no such law, preset or file{hint}"])
     return load(what, settings, trust=trust)
 
 

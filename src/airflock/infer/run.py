@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airflock.errors import AirflockError, RecordingError
 from airflock.infer import select
 from airflock.infer.bootstrap import Again, Noise, again
-from airflock.infer.candidates import Candidate, candidate
+from airflock.infer.candidates import Candidate, candidate, scenarios_of
 from airflock.infer.fit import Fit, Model
 from airflock.infer.leftover import left_over
 from airflock.infer.maps import Maps, maps
@@ -177,20 +177,12 @@ def infer(
         raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
     say = done or (lambda _: None)
     settings = dict(settings or {})
+    scenarios, box = scenarios_of(models, settings, trust=trust)
     recordings = recordings_of(tracks)
-    box = _box(settings)
     followed = [tracks_of(recording, name, box=box) for name, recording in recordings]
     _alike(followed)
     scale = scale_of(followed)
-    faults: list[str] = []
-    candidates = []
-    for what in models:
-        try:
-            candidates.append(candidate(what, scale, followed[0].axes, settings, trust=trust))
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
-    if faults:
-        raise AirflockError("\n".join(faults))
+    candidates = [candidate(each, scale, followed[0].axes) for each in scenarios]
     reference, straight = select.straight(followed, scale)
     plain = select.hold_out(reference, straight, lambda: say("going straight on"))
     gains = straight.place[reference.named :]
@@ -237,14 +229,6 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
     if not found:
         raise RecordingError("no tracks to infer a law from")
     return found
-
-
-def _box(settings: Mapping[str, Any]) -> tuple[float, ...]:
-    """Half sides of a periodic box that the settings speak of."""
-    if settings.get("world.edges") != "periodic":
-        return (0.0, 0.0, 0.0)
-    side = 0.5 * float(settings.get("world.side", 0.0))
-    return side, side, 0.5 * float(settings.get("world.height", 0.0))
 
 
 def _alike(followed: Sequence[Tracks]) -> None:

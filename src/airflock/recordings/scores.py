@@ -43,6 +43,7 @@ def score(
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
     aero: bool = False,
+    groups: bool = False,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
@@ -66,6 +67,8 @@ def score(
         Told what auto picked.
     aero : bool
         For a recording, measure the power that its geometry saves.
+    groups : bool
+        For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
 
     Returns
     -------
@@ -91,6 +94,13 @@ def score(
     """
     if isinstance(what, xr.Dataset):
         settings = aero_settings(what, settings) if aero else settings
+        if groups:
+            from airflock.recordings.groups import BETWEEN, group_scores
+
+            table = _about(group_scores(what, settings), scenario_of(what, settings))
+            for place, about in (("units", 0), ("meanings", 1)):
+                table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
+            return table
         values, _ = measure(what, settings)
         return _about(pd.DataFrame([values]), scenario_of(what, settings))
     scenario, found = loaded(what), sound_seeds(seeds)

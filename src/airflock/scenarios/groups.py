@@ -141,7 +141,7 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
         value = entry["value"] if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
-            faults.append(f"{where}.{key} is not a number of it")
+            faults.append(f"{where}.{key}: unknown number")
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value < math.inf:
             faults.append(f"{where}.{key}.spread = {value!r} is not a standard deviation of 0 {declared.unit} or more")
         else:

@@ -131,10 +131,9 @@ def tune(
     Examples
     --------
     >>> import airflock
-    >>> small = airflock.load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 10.0, "dt": 0.1, "world.side": 60.0})
-    >>> found = airflock.tune(small, "tuned", budget=5.0, limit=["r_min<0.1 at 20%"])
-    >>> found.steps[0].name
-    'optimum'
+    >>> airflock.tune("vasarhelyi_2018/4ms", "tuned", limit=["r_mim<3 at 1%"])  # refused before anything flies
+    Traceback (most recent call last):
+    airflock.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
     mine = variant(scenario, settings, trust=trust)

@@ -1,0 +1,77 @@
+"""Order parameters of each group of a recording, and between every two of them."""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from airflock.errors import RecordingError
+from airflock.recordings.layout import frames_of
+from airflock.recordings.scores import measure, scenario_of
+from airflock.world.place import half_sizes
+
+BETWEEN = {
+    "r_centres": ("m", "mean distance of the centres of two groups; nan in a periodic world"),
+    "r_between": ("m", "smallest distance of an agent of one group from one of the other"),
+    "phi_between": ("", "velocity correlation of agents of one group with those of the other"),
+}
+PART = 200  # instants at once
+
+
+def group_scores(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> pd.DataFrame:
+    """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
+
+    A group is measured as if the others were not there. What is between two groups, `BETWEEN`, stands in rows named
+    "one to other"; an instant counts where both have somebody there.
+    Raises RecordingError where the recording's scenario has no groups.
+    """
+    scenario = scenario_of(recording, settings)
+    groups = [group for group in scenario.groups if group.agents]
+    if not groups:
+        raise RecordingError("recording: its scenario has no [[groups]]")
+    rows: dict[str, dict[str, Any]] = {"all": measure(recording, settings)[0]}
+    for group in groups:
+        rows[group.name] = measure(recording.isel(individual=list(group.agents)), settings)[0]
+    frames, _, present = frames_of(recording)
+    dims, world = frames.shape[1] // 2, scenario.world
+    box = 2.0 * np.array(half_sizes(world)[:dims]) if world.edges == "periodic" else None
+    for one, other in combinations(groups, 2):
+        pair = (list(one.agents), list(other.agents))
+        rows[f"{one.name} to {other.name}"] = _between(frames, present, pair, dims, box)
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("group")
+
+
+def _between(
+    frames: NDArray[Any],
+    present: NDArray[np.bool_],
+    pair: tuple[list[int], list[int]],
+    dims: int,
+    box: NDArray[Any] | None,
+) -> dict[str, float]:
+    """What is between two groups of agents; box : sides of a periodic world, m."""
+    x, v = frames[:, :dims].astype(float), frames[:, dims : 2 * dims].astype(float)
+    heading = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-12)
+    both = np.logical_and(np.any(present[:, pair[0]], axis=1), np.any(present[:, pair[1]], axis=1))
+    apart, nearest, cosines = [], np.inf, []
+    for first in range(0, len(x), PART):
+        part = np.flatnonzero(both[first : first + PART]) + first
+        if not len(part):
+            continue
+        (xa, xb), (ha, hb) = ([array[part][:, :, who] for who in pair] for array in (x, heading))
+        gap = xb[:, :, None, :] - xa[:, :, :, None]
+        if box is not None:
+            gap -= box[None, :, None, None] * np.round(gap / box[None, :, None, None])
+        nearest = min(nearest, float(np.nanmin(np.linalg.norm(gap, axis=1))))
+        apart += np.linalg.norm(np.nanmean(xb, axis=2) - np.nanmean(xa, axis=2), axis=1).tolist()
+        cosines += np.nanmean((hb[:, :, None, :] * ha[:, :, :, None]).sum(axis=1), axis=(1, 2)).tolist()
+    if not apart:
+        return dict.fromkeys(BETWEEN, np.nan)
+    return {
+        "r_centres": float(np.mean(apart)) if box is None else np.nan,
+        "r_between": nearest,
+        "phi_between": float(np.mean(cosines)),
+    }
