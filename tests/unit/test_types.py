@@ -9,7 +9,7 @@ import pytest
 
 import airflock
 from airflock.checking.annotations import typed_copy
-from airflock.checking.rule_types import RECORDS, SPECIAL
+from airflock.checking.rule_types import FAULT, RECORDS, SPECIAL
 from airflock.checking.types import PACKAGE, check_types, scalar, shipped
 from airflock.core.vocabulary import VOCABULARY
 from airflock.errors import RuleError
@@ -99,13 +99,8 @@ def test_every_word_of_the_vocabulary_has_a_type():
         text = f"def {kind}({', '.join(words)}): pass\n"
         text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
-        text += (
-            ""
-            if kind in ("decide", "move", "sample")
-            else "def move(): pass\n"
-            if kind == "limits"
-            else "def decide(): pass\ndef sample(): pass\n"
-        )
+        beside = {"limits": ["move"]} | dict.fromkeys(("decide", "move", "sample", *FAULT), [])
+        text += "".join(f"def {name}(): pass\n" for name in beside.get(kind, ["decide", "sample"]))
         (rule,) = [
             node
             for node in ast.parse(typed_copy(text).text).body
@@ -133,14 +128,16 @@ def test_a_misspelled_parameter_is_told_in_every_rule_of_ours(tmp_path):
             node.name
             for node in typed.body
             if isinstance(node, ast.FunctionDef)
-            and any(argument.annotation is not None and argument.arg in "pqb" for argument in node.args.args)
+            and any(argument.annotation is not None and argument.arg in "pqbf" for argument in node.args.args)
         }
         rules = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name in names]
         found = [
             (node.end_lineno, node.end_col_offset)
             for rule in rules
             for node in ast.walk(rule)
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in ("p", "q", "b")
+            if isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and node.value.id in ("p", "q", "b", "f")
         ]
         lines = text.splitlines()
         for line, column in sorted(found, reverse=True):

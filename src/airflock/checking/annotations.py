@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from airflock.checking.rule_types import KNOWN, MEASURES, RECORDS, RESULTS, SPECIAL, kinds_of
+from airflock.checking.rule_types import KNOWN, LETTERS, MEASURES, RECORDS, RESULTS, SPECIAL, kinds_of
 from airflock.core.vocabulary import VOCABULARY
 
 
@@ -63,6 +63,8 @@ def typed_copy(text: str, scalar: bool = False) -> TypedCopy:
                 continue
             if argument.annotation is not None or not (kind or scalar or (item.name, argument.arg) in handed):
                 continue
+            if not kind and not any(owner in kinds for owner in LETTERS.get(argument.arg, kinds)):
+                continue  # a letter that stands for parameters in other files
             found = "float" if scalar else _type_of(argument.arg, kind, names)
             if found:
                 insertions.append((argument.end_lineno or 0, argument.end_col_offset or 0, 0, f": {found}"))

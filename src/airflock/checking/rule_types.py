@@ -3,6 +3,7 @@
 LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
 MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
+FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
 COLUMNS = "MutableSequence[float]"
 
 # (module, name) behind the words that a rule file need not define itself
@@ -22,7 +23,7 @@ KNOWN = {
 RECORDS = {
     "own": "Own", "percept": "Percept", "sums": "Sums", "walls": "Walls", "memory": "Memory", "shared": "Shared",
     "pair": "Pair", "agents": "Agent", "members": "Member", "clusters": "Cluster", "mean": "Mean", "wing": "Wing",
-    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters",
+    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters", "f": "Parameters",
 }  # fmt: skip
 OF_FLOCK = {
     **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
@@ -35,12 +36,16 @@ SPECIAL = {
     "fitness": {"values": "Mapping[str, float]", "agents": "int"},
     "faults": {"edges": "str"},
 }
+LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "f": FAULT}  # of the record of parameters, by owner
+STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
     **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
     "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
+    "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
+    "radio": "tuple[float, float]",
 }  # fmt: skip
 
 
@@ -53,4 +58,6 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
         kinds |= {"move": "move", "limits": "limits"}
     if "sample" in functions or "fitness" in functions:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
+    if not kinds:  # elsewhere these are names of helpers
+        kinds = {name: name for name in FAULT}
     return {name: kind for name, kind in kinds.items() if name in functions}

@@ -65,7 +65,7 @@ class TypeReport(NamedTuple):
 
 
 def check_types(files: str | Path | Sequence[str | Path], *, out: str | Path | None = None) -> TypeReport:
-    r"""Let a type checker read rule files: laws, bodies, order parameters, metric sets.
+    r"""Let a type checker read rule files: laws, bodies, order parameters, metric sets, faults.
 
     The argument names of a rule say what it is given, so the file needs no annotations: a copy is made in which every
     argument has the type of the vocabulary, and mypy reads the copy. It tells a parameter that does not exist
@@ -198,7 +198,7 @@ def _ours() -> Iterator[tuple[Path, str]]:
 
 def shipped() -> list[Path]:
     """Our own rule files."""
-    folders = ("models", "body", "metrics")
+    folders = ("models", "body", "metrics", "faults")
     return [*(PACKAGE / name for name in SCALAR), *(p for f in folders for p in sorted((PACKAGE / f).glob("*.py")))]
 
 
