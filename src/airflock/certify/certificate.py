@@ -36,8 +36,8 @@ class Certificate:
 
     verdicts  : one for each limit; hazards: whether events came evenly, by limit, where that can be asked
     rows      : scores of all flights that were counted, in the order of their seeds
-    tolerance : by `airflock.certify.tolerance`; splitting: by `airflock.certify.branches`; over: by
-                `airflock.certify.maps`; plain values, empty if not asked for
+    tolerance : plain values of `airflock.certify.tolerance`, empty if not asked for
+    splitting : the same of `airflock.certify.branches`; over: of `airflock.certify.maps`
     versions  : of what flew, and on which processor
     seconds, rate : of this process, s; flights per second
     where     : file or name of the scenario, by which flights are flown again
