@@ -85,7 +85,7 @@ def test_a_link_is_followed_and_a_named_pipe_refused(tmp_path):
     atomic.write(tmp_path / "link.csv", "new")
     assert (tmp_path / "link.csv").is_symlink() and (tmp_path / "far" / "real.csv").read_text() == "new"
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="not a regular file"):
         atomic.write(tmp_path / "pipe.csv", "new")
 
 

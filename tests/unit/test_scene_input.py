@@ -228,7 +228,7 @@ def test_a_file_of_another_kind_is_not_flown_as_text(tmp_path, monkeypatch, shap
     monkeypatch.chdir(tmp_path)
     if shape in ("drawing.svg", "there.1"):
         (tmp_path / shape).write_text("<svg/>")
-    with pytest.raises(AirflockError, match=r"no such file|no picture or mesh") as caught:
+    with pytest.raises(AirflockError, match=r"no such file|neither a picture nor a mesh") as caught:
         points_of(shape, 10)
     assert str(caught.value).startswith(f"{shape}: ") and ".png" in str(caught.value) and ".stl" in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
