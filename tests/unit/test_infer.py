@@ -86,7 +86,7 @@ def test_walks_at_random_are_explained_by_none():
     found = airflock.infer(walkers(), ["couzin_2002", "vicsek_1995"], check=0)
     assert found.best is None, [(law.name, law.gain, law.error) for law in found.laws]
     assert found.verdict == "none of these explains the tracks better than going straight on"
-    with pytest.raises(AirflockError, match="no scenario to write"):
+    with pytest.raises(AirflockError, match="nothing can be written"):
         found.document()
 
 
