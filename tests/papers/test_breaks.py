@@ -95,3 +95,12 @@ def test_a_part_that_was_flown_is_not_flown_again_unless_the_texts_changed(tmp_p
     kept.write_text(json.dumps(json.loads(kept.read_text()) | {"texts": "others"}))
     quick.fly(tmp_path, said.append)
     assert flown[3:] == [("one", "first")]
+
+
+def test_the_committed_verdicts_are_of_known_claims_and_parts() -> None:
+    rows = quick.committed()
+    silent = {("kidger", "readings")}  # a table without a claim
+    assert {(row.paper, row.part) for row in rows} | silent == set(quick.parts())
+    for name in airflock.papers.PAPERS:
+        known = breaks.load(f"airflock.papers.{name}")
+        assert {row.id for row in rows if row.paper == name} <= set(known), name

@@ -37,20 +37,18 @@ def measured(table: pd.DataFrame) -> list[Measured]:
     for scene, densities in DENSITIES.items():
         for density in densities:
             place, at = table.loc[(scene, density)], f"{scene}, density {density:g}"
-            for name in ("fitness", *MEASURES):
-                gap, words = _gap(place, name)
-                found.append(
-                    Measured(f"learnt.{scene}.{density:g}.{name}", name, f"{at}, learnt less final", gap, words)
-                )
-            gap, words = _gap(place, "fitness", "other")
-            at += ", learnt in the other scene less final"
-            found.append(Measured(f"learnt.{scene}.{density:g}.other", "fitness", at, gap, words))
+            cases = [(name, name, "learnt", f"{at}, learnt less final") for name in ("fitness", *MEASURES)]
+            cases.append(("other", "fitness", "other", f"{at}, learnt in the other scene less final"))
+            for label, name, kind, told in cases:
+                both = place[name].unstack(level=0)[[kind, "final"]].dropna()
+                if len(both) > 1:  # in a few short flights no flock may ever be complete
+                    gap, words = _gap(place, both, kind)
+                    found.append(Measured(f"learnt.{scene}.{density:g}.{label}", name, told, gap, words))
     return found
 
 
-def _gap(place: pd.DataFrame, name: str, kind: str = "learnt") -> tuple[statistics.Estimate, str]:
+def _gap(place: pd.DataFrame, both: pd.DataFrame, kind: str) -> tuple[statistics.Estimate, str]:
     """Paired difference to the final set over the scenes in which both have a value; both means, as words."""
-    both = place[name].unstack(level=0)[[kind, "final"]].dropna()
     means = both.mean()
     count = "" if len(both) == len(place.loc["final"]) else f", of the {len(both)} scenes in which both have one"
     words = f"{kind} {means[kind]:.3g}, final {means['final']:.3g}{count}"
