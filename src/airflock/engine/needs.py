@@ -15,6 +15,7 @@ from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.scenarios.scenario import Scenario
 
+SMALL = 2**28  # bytes that are not worth a look at what is free
 SHARE = 0.9  # of the free memory that one flight may take
 ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the laws here keep 20 to 60
 LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container
@@ -22,10 +23,11 @@ LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_by
 
 def check(scenario: Scenario, plan: Plan) -> None:
     """Refuse a flight that this machine's memory cannot hold; raises FlightError with the number that fits."""
-    free = free_memory()
+    needed = bytes_of(scenario, plan, scenario.agents)
+    free = free_memory() if needed > SMALL else None
     if free is None:
         return
-    room, needed = int(SHARE * free), bytes_of(scenario, plan, scenario.agents)
+    room = int(SHARE * free)
     if needed <= room:
         return
     fit = most_below(scenario.agents, lambda agents: bytes_of(scenario, plan, agents) <= room)
