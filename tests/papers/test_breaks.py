@@ -63,7 +63,14 @@ def test_every_change_is_of_keys_that_scenarios_have(name: str) -> None:
     presets = {"kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms"}
     for found in breaks.load(f"airflock.papers.{name}").values():
         if found.breaks and found.breaks != breaks.EXCHANGED:
-            with_changes(airflock.load(presets[name]), found.breaks)
+            before = airflock.load(presets[name])
+            after = with_changes(before, found.breaks)
+            for key, value in found.breaks.items():
+                section, _, field = key.rpartition(".")
+                old, new = (
+                    getattr(each.records[section] if section else each.flight, field) for each in (before, after)
+                )
+                assert new == (old * float(value[6:]) if str(value).startswith("times ") else value), found.id
 
 
 def test_only_verdicts_that_differ_are_told() -> None:
