@@ -102,6 +102,9 @@ def test_a_part_that_was_flown_is_not_flown_again_unless_the_texts_changed(tmp_p
     kept.write_text(json.dumps(json.loads(kept.read_text()) | {"texts": "others"}))
     quick.fly(tmp_path, said.append)
     assert flown[3:] == [("one", "first")]
+    for damaged in ("[]", "{", '{"texts": "x"}', '{"verdicts": [[1]]}'):
+        kept.write_text(damaged)
+        assert quick._kept(kept, "x") is None
 
 
 def test_the_committed_verdicts_are_of_known_claims_and_parts() -> None:

@@ -83,5 +83,10 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     assert again.result.parameters == found.result.parameters
     assert json.loads((folder / "hardening.json").read_text()) == steps
     assert again.certificate.verdicts[0].events == found.certificate.verdicts[0].events
+    kept = (folder / "hardening.json").read_text()
+    (folder / "hardening.json").write_text("[1]")
+    with pytest.raises(StudyError, match=r"hardening.json: holds list"):
+        tune(make(MINE, "mine"), folder, limit=["r_min<0.1 at 10%"], resume=True)
+    (folder / "hardening.json").write_text(kept)
     with pytest.raises(StudyError, match="holds no tuning to resume"):
         tune(make(MINE, "mine"), tmp_path / "new", resume=True)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
+from airflock.doors import TextError, json_object, read_text
 from airflock.errors import AirflockError
 from airflock.papers import PAPERS
 from airflock.papers.paper import Paper
@@ -69,11 +70,16 @@ def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) ->
 
 
 def _kept(path: Path, now: str) -> list[tuple[str, str, float]] | None:
+    """Rows of a part that was flown with these texts; of a file that is not there, or is damaged, none."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        document = json_object(read_text(path))
+        return (
+            [(str(name), str(verdict), float(ours)) for name, verdict, ours in document["verdicts"]]
+            if (document.get("texts") == now)
+            else None
+        )
+    except (OSError, TextError, LookupError, TypeError, ValueError):
         return None
-    return [tuple(row) for row in document["verdicts"]] if document.get("texts") == now else None
 
 
 def _flown(

@@ -14,6 +14,7 @@ from airflock.certify.certificate import Certificate
 from airflock.certify.run import campaign_of, executor_for
 from airflock.certify.run import run as certified
 from airflock.certify.seeds import identity
+from airflock.doors import from_outside, json_object, read_text
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.after import Result
 from airflock.evolve.bounds import usual_space
@@ -223,9 +224,10 @@ def _hardened(
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
-        told = json.loads((folder / STEPS).read_text(encoding="utf-8"))
-        steps = [_measured(step) for step in told["steps"]]
-        return load(folder / TUNED, trust=trust), steps, str(told["why"])
+        with from_outside(folder / STEPS, StudyError):
+            told = json_object(read_text(folder / STEPS))
+            steps, why = [_measured(step) for step in told["steps"]], str(told["why"])
+        return load(folder / TUNED, trust=trust), steps, why
     best = load(folder / STUDY / "best.toml", trust=trust)
     steps, why = [], ""
     try:
