@@ -105,11 +105,18 @@ def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = N
 
 @contextmanager
 def compiling(model: str) -> Iterator[None]:
-    """Turn what the compiler says of a rule into one line. Raises RuleError."""
+    """Turn what the compiler says of a rule into one line; an interruption is heard after each of its passes.
+
+    Raises RuleError, GivenUp.
+    """
     from numba.core.errors import NumbaError
+    from numba.core.event import install_listener
+
+    from airflock.engine.heeding import Heeding
 
     try:
-        yield
+        with install_listener("numba:run_pass", Heeding()):
+            yield
     except NumbaError as fault:
         lines = [line.strip() for line in str(fault).splitlines()]
         said = next((line for line in lines if line and not line.startswith(("Failed in", "During", "File"))), "")

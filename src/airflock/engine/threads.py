@@ -2,7 +2,9 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future
+from dataclasses import dataclass
+from queue import SimpleQueue
 from threading import Event, Thread, local
 from typing import Any
 
@@ -20,10 +22,6 @@ def heed() -> None:
         raise GivenUp
 
 
-def _begin(interrupted: Event) -> None:
-    _thread.interrupted = interrupted
-
-
 def cores() -> int:
     """Processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -34,7 +32,8 @@ def in_threads(
 ) -> Iterator[Any]:
     """Results of jobs in their order, computed by several threads (compiled flights release the interpreter).
 
-    `done` is called after each. Ctrl-C gives up the flights in the air.
+    `done` is called after each. Ctrl-C gives up the flights in the air, at any moment: this thread shares no lock of
+    Python's with the others, which an interruption between taking and giving back would leave taken (futures have one).
     """
     workers = max(1, min(threads or cores(), len(jobs)))
     if workers == 1:
@@ -43,25 +42,48 @@ def in_threads(
             if done:
                 done()
         return
-    interrupted = Event()
-    with ThreadPoolExecutor(workers, initializer=_begin, initargs=(interrupted,)) as pool:
-        futures: list[Future[Any]] = [pool.submit(job) for job in jobs]
-        waiting = set(futures)
-        try:
-            for future in futures:
-                while not future.done():
-                    ready, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
-                    for _ in ready:
-                        if done:
-                            done()
-                yield future.result()
-            if done:
-                for _ in waiting:
+    ended: SimpleQueue[_Ended] = SimpleQueue()
+    interrupted, turns = Event(), iter(range(len(jobs)))
+    team = [Thread(target=_work, args=(jobs, turns, ended, interrupted), daemon=True) for _ in range(workers)]
+    for thread in team:
+        thread.start()
+    kept: dict[int, _Ended] = {}
+    try:
+        for number in range(len(jobs)):
+            while number not in kept:
+                latest = ended.get()
+                kept[latest.number] = latest
+                if done and latest.fault is None:
                     done()
-        finally:
-            interrupted.set()
-            for future in futures:
-                future.cancel()
+            mine = kept.pop(number)
+            if mine.fault is not None:
+                raise mine.fault
+            yield mine.result
+    finally:
+        interrupted.set()
+        for thread in team:
+            thread.join()
+
+
+@dataclass(frozen=True)
+class _Ended:
+    number: int
+    result: Any = None
+    fault: BaseException | None = None
+
+
+def _work(
+    jobs: Sequence[Callable[[], Any]], turns: Iterator[int], ended: "SimpleQueue[_Ended]", interrupted: Event
+) -> None:
+    """Take one job after the other until none is left; the interpreter hands each turn to one thread only."""
+    _thread.interrupted = interrupted
+    for number in turns:
+        if interrupted.is_set():
+            return
+        try:
+            ended.put(_Ended(number, jobs[number]()))
+        except BaseException as fault:  # told to whoever asks for the result
+            ended.put(_Ended(number, fault=fault))
 
 
 def in_background(work: Callable[[], Any]) -> Future[Any]:
