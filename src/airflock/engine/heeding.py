@@ -1,4 +1,4 @@
-"""Ctrl-C while Numba compiles: it is heard as each of the compiler's passes begins. Imported once something compiles."""
+"""Ctrl-C while Numba compiles: heard as each of its passes begins. Imported once something compiles."""
 
 from numba.core.event import Event, Listener
 
