@@ -20,7 +20,7 @@ PAPER = {
 FRESH = """
 import hashlib
 from airflock.engine.simulate import fly
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 settings = {settings!r}
 found = make({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)
 print(hashlib.sha256(fly(found, {seed}, record=True).frames.tobytes()).hexdigest())

@@ -16,7 +16,7 @@ from airflock.certify.seeds import COUNT, seed
 from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.folder import versions
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 
