@@ -57,7 +57,7 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
     hull = MultiPoint(points).convex_hull
     if hull.is_empty or isinstance(hull, Point):
         return 0.0
-    ends = [*hull.exterior.coords][:-1] if isinstance(hull, Polygon) else [*hull.coords]
+    ends: list[tuple[float, ...]] = [*hull.exterior.coords][:-1] if isinstance(hull, Polygon) else [*hull.coords]
     count, far, largest = len(ends), 1, 0.0
     for k, (x, y) in enumerate(ends):
         nx, ny = ends[(k + 1) % count]

@@ -78,7 +78,7 @@ def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
 
 
 def clearance(found: Scene, position: Any, within: float = 1e6) -> float:
-    """Distance (m) from a position to what stands in a scene; negative inside a solid, 1e30 if nothing is within (m)."""
+    """Distance (m) to what stands in a scene; negative inside a solid, 1e30 if nothing is within (m)."""
     x, y, z = (float(c) for c in position)
     return float(bvh.nearest(x, y, z, within, *_tables(found)).distance)
 
