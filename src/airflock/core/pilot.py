@@ -80,6 +80,12 @@ class Packet:
         return State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz)
 
 
+def level(state: State) -> State:
+    """A state in the plane."""
+    x, y, _, vx, vy, _ = state
+    return State(x, y, 0.0, vx, vy, 0.0)
+
+
 class Senses(Percept):
     """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
 
@@ -192,7 +198,7 @@ class Pilot:
             age = now - packet.sent_at
             if age <= rule.forget and not (rule.once and packet.came < self.decisions):
                 state = packet.carried(now) if rule.extrapolate else packet.state
-                found.append(Heard(who, state._replace(z=0.0, vz=0.0) if self.flat else state, age))
+                found.append(Heard(who, level(state) if self.flat else state, age))
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
@@ -220,11 +226,11 @@ class Pilot:
         shared  : what a law for the whole flock found for this agent
         """
         if self.flat:
-            own, goal = own._replace(z=0.0, vz=0.0), None if goal is None else (*goal[:2], 0.0)
+            own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
         time = now if time is None else time
         self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
         near = [
-            heard._replace(state=self.place.beside(own, heard.state))
+            Heard(heard.who, self.place.beside(own, heard.state), heard.age)
             for heard in self.heard(now)
             if only is None or heard.who in only
         ]
@@ -248,7 +254,7 @@ class Pilot:
         """Velocity (m/s) to ask an autopilot for: what the law decides now, through its body; zero where it stops."""
         made = self.decide(own, now, goal=goal)
         if self.flat:
-            own = own._replace(z=0.0, vz=0.0)
+            own = level(own)
         if self.model.command != "velocity" and self.lost_near(own, now):
             return STILL
         x, y, z = self.setpoint(own, made.command)

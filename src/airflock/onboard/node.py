@@ -174,7 +174,7 @@ class Node:
 
     def _goal_outside(self) -> bool:
         goal = self.operator.goal
-        return goal is None or self.card.outside(State(*goal, 0.0, 0.0, 0.0)) > 0.0 or goal[2] < self.card.low
+        return goal is None or self.card.outside(*goal) > 0.0 or goal[2] < self.card.low
 
     def _enter(self, to: Phase, event: str, now: float, out: Out) -> None:
         """Change the phase, and do what belongs to it once."""
