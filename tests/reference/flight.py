@@ -22,8 +22,8 @@ from airflock.core.parameters import choices
 from airflock.core.pilot import Hearing, Pilot
 from airflock.engine.cpu import Flown
 from airflock.engine.place import Course, Place, reach_of_walls
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
 from reference.scores import Scores
