@@ -17,6 +17,7 @@ from airflock.core.agent import Heard, State, answer, decide
 from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
+from airflock.core.topology import met_of
 from airflock.engine.cpu import Flown
 from airflock.engine.place import Course, Place, Senses
 from airflock.engine.tables import clock
@@ -187,9 +188,10 @@ def decisions(
         agent = flock[i]
         own = misled(agent, ("sense",), time, plus(agent.state, agent.own), scenario.dimensions)
         heard = [
-            Heard(h.who, place.beside(own, h.state), h.age)
+            h._replace(state=place.beside(own, h.state))
             for h in hear(scenario, seed, number, i, flock, said, time, place)
         ]
+        heard = met_of(scenario.meets, scenario.topology, own, heard, place)
         rule = scenario.model.wall_reach
         place.look = place.look if rule is None else answer(rule, "wall_reach", {"p": agent.p})
         senses = Senses.of(place, course, own, time, seed, number, i)
@@ -239,17 +241,20 @@ def hear(
         carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
         pair = i * len(flock) + j
+        fade = random.normal_pair(*random.words(seed, random.FADE, 0, number, min(i, j) * len(flock) + max(i, j))[:2])[
+            0
+        ]
         arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
             distance, k
         )
         if k.kind == "constant":
             if arrives and in_range and carries:
-                found.append(Heard(j, said[j], late + mine - theirs))
+                found.append(Heard(j, said[j], late + mine - theirs, fade))
             continue
         if arrives and in_range and carries and linked(scenario, seed, number, pair, distance):
             flock[i].packets[j] = (said[j], time - late + theirs)
         if in_range and j in flock[i].packets:
-            found.append(extrapolated(j, *flock[i].packets[j], time + mine))
+            found.append(extrapolated(j, *flock[i].packets[j], time + mine)._replace(fade=fade))
     return found
 
 

@@ -14,6 +14,7 @@ from airflock.core.contract import Body, Model
 from airflock.core.maths import norm
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import could_be_near
+from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
 
@@ -33,6 +34,9 @@ class World(Protocol):
         self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float, /
     ) -> float:  # fmt: skip
         """Free distance of a sphere, m."""
+
+    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+        """Whether an obstacle or the scene stands between two places, m."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,7 @@ class Pilot:
     silence  : the rule for neighbours that are lost; None: they are forgotten, as in a simulation without it
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
+    topology, t : whom of those whom it hears it meets, and the numbers of that; None: all
 
     Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
     """
@@ -115,11 +120,11 @@ class Pilot:
     def __init__(
         self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
         body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
-        wing: Any = None,
+        wing: Any = None, topology: Topology | None = None, t: Any = None,
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
         self.hearing, self.silence, self.flat, self.seed, self.wing = hearing or Hearing(), silence, flat, seed, wing
-        self.body, self.b = body, b
+        self.body, self.b, self.topology, self.t = body, b, topology, t
         self.memory = first_memory(model)
         self.packets: dict[int, Packet] = {}
         self.decisions = 0
@@ -194,8 +199,9 @@ class Pilot:
             own = own._replace(z=0.0, vz=0.0)
         offset = (0.0, 0.0, 0.0) if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
         percept = percept or Senses.of(self.place, own, now, offset, (self.seed, self.decisions, self.index))
+        near = met_of(self.topology, self.t, own, self.heard(now), self.place)
         made = decide(
-            self.model, self.p, own, self.heard(now), self.place.surfaces(own.x, own.y, own.z), self.memory, time=now,
+            self.model, self.p, own, near, self.place.surfaces(own.x, own.y, own.z), self.memory, time=now,
             period=self.period, index=self.index, percept=percept, wing=self.wing,
         )  # fmt: skip
         self.decisions += 1

@@ -13,7 +13,7 @@ from airflock.engine.tables import faces, unbuilt
 from airflock.scenarios.scenario import Scenario
 from airflock.world import arena, bvh, edges, goals, polygon, rays
 from airflock.world.inside import inside
-from airflock.world.place import edge_rows, half_sizes, middle, obstacle_rule, raised
+from airflock.world.place import blocked, edge_rows, half_sizes, middle, obstacle_rule, raised
 
 
 class Place:
@@ -123,6 +123,10 @@ class Place:
             solid = [rays.to_edges(x, y, ux, uy, self.edges, a, b) for a, b in self.obstacles]
         nearest: float = min([free, *solid])
         return float(bvh.cast(x, y, z, ux, uy, uz, nearest, 0.0, *self.scene))
+
+    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
+        """Whether an obstacle or the scene stands between two places, m."""
+        return blocked((x, y, z), (to_x, to_y, to_z), self.obstacle, self.obstacles, self.edges, self.scene)
 
     def cast(self, at: State, u: tuple[float, float, float], length: float, radius: float) -> float:
         """Free distance (m), at most length, of a sphere along a unit vector to walls and the scene."""

@@ -77,6 +77,8 @@ def plan_of(
         links=scenario.radio.kind == "links",
         faults=kinds,
         varied=scenario.varied,
+        topology=scenario.meets if scenario.model.neighbour is not None else None,
+        fading=scenario.topology.fading > 0.0,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )
@@ -325,6 +327,7 @@ def _pays(scenario: Scenario) -> bool:
         and scenario.model.reach is not None
         and scenario.model.neighbour is not None
         and perfect
+        and scenario.meets is None
         and scenario.radio.kind == "constant"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)

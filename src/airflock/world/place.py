@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.core.maths import FAR
+from airflock.core.maths import FAR, norm
 from airflock.world import arena, bvh, excursion, polygon, rays
 from airflock.world.arena import Surface
 
@@ -165,6 +165,23 @@ BEYOND = {
 CLEAR = {"square": rays.to_box, "circle": rays.to_cylinder, "polygon": rays.to_polygon, "none": rays.to_nothing}
 
 
+def blocked(
+    here: tuple[float, float, float], there: tuple[float, float, float], obstacle: Callable[..., Any],
+    obstacles: Sequence[Sequence[int]], edges: Any, scene: tuple[Any, Any, Any],
+) -> bool:  # fmt: skip
+    """Whether an obstacle or the scene stands between two places, m; the walls of an arena hide nothing."""
+    dx, dy, dz = (b - a for a, b in zip(here, there, strict=True))
+    length = norm(dx, dy, dz)
+    along = dx / length, dy / length, dz / length
+    free = float(bvh.cast(*here, *along, length, 0.0, *scene))
+    for first, last in obstacles:
+        if obstacle is polygon.prism:
+            free = min(free, polygon.ray_to_prism(*here, *along, edges, first, last))
+        else:
+            free = min(free, rays.to_edges(*here[:2], *along[:2], edges, first, last))
+    return bool(free < length)
+
+
 @dataclass(frozen=True)
 class Shapes:
     """What stands in the world: rows of `world.shapes` and the tree over them, as `world.bvh` reads it."""
@@ -253,6 +270,10 @@ class Place:
             else:
                 free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
+
+    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
+        """Whether an obstacle or the scene stands between two places, m."""
+        return blocked((x, y, z), (to_x, to_y, to_z), self._obstacle, self._obstacles, self._edges, self._scene)
 
     def cast(
         self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float

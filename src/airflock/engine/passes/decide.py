@@ -5,7 +5,7 @@ import ast
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
-from airflock.engine.passes import flock, grid, percept, scene
+from airflock.engine.passes import flock, grid, perceive, percept, scene
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
@@ -31,12 +31,14 @@ def neighbours(build: Builder) -> None:
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
     hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    more = perceive.around(plan)
+    meet = Call(f"meet({', '.join(['i, k_, n, m, row, whole, work', *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image
-    made = specialise(build, meeting.neighbours, receive=hear, sums=sums, images=images)
+    made = specialise(build, meeting.neighbours, receive=hear, meet=meet, sums=sums, images=images)
     if plan.grid:
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
-    arguments = "k_, n, m, time, late, row, whole, work, store"
+    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store", *more])
     build.stage("neighbours", arguments, made.once, made.body, made.answer)
 
 
