@@ -20,8 +20,8 @@ from airflock.core.parameters import choices
 from airflock.core.topology import met_of
 from airflock.engine.cpu import Flown
 from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
 from reference.scores import Scores

@@ -13,7 +13,8 @@ from airflock.doors import TextError, xml
 from airflock.errors import ScenarioError
 from airflock.mavlink.coordinates import Site
 from airflock.recordings.scores import scenario_of
-from airflock.scenarios.files import load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 from airflock.scenes.outlines import ground_of
 
 FIELDS = Path(__file__).parents[1] / "fields"

@@ -14,8 +14,8 @@ from airflock.core.topology import met_of
 from airflock.engine.beginnings import NEVER
 from airflock.engine.place import Place
 from airflock.engine.state import State
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from airflock.world import edges
 
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 from airflock.core.agent import Heard, State, decide
 from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 
 
 class Ray(NamedTuple):
