@@ -94,25 +94,32 @@ def meet(
     exact = plan.bits == 64
     range_ = least(k.range, LIMIT)
     range2 = range_ * range_ + TINY if exact and not plan.perturbed else range_ * range_
+    ii = integer(i)
+    own, true = vector(), vector()
+    for a in axes:
+        own[a] = flock.measured_position[a][i]
+    if plan.perturbed:
+        for a in axes:
+            true[a] = flock.position[a][i]
     for j in others:
         d, o = vector(), vector()
         for a in axes:
-            d[a] = heard_position[a][j] - flock.measured_position[a][i]
+            d[a] = heard_position[a][j] - own[a]
         if images:
             for a in axes:
                 d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
         r2 = sum(d[a] * d[a] for a in axes) + TINY
         if plan.perturbed:
             for a in axes:
-                o[a] = flock.position[a][j] - flock.position[a][i]
+                o[a] = flock.position[a][j] - true[a]
             if plan.periodic:
                 for a in axes:
                     o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
             hears = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (
-                integer(j) != integer(i)
+                integer(j) != ii
             )
         else:
-            hears = (r2 <= range2) & (integer(j) != integer(i))
+            hears = (r2 <= range2) & (integer(j) != ii)
         if plan.lossy or plan.links:
             hears = hears & (flock.heard[j] > HALF)
         if plan.meeting("dx") or plan.hides:
