@@ -111,7 +111,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         "airflock.replay(recording)", "replay",
         {
             "what": "recording", "page": "airflock.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
-            **LOADED,
+            "colour": "colour", **LOADED,
         },
     ),
     "display": Counterpart(

@@ -80,7 +80,7 @@ def _met(scenario: Scenario, state: State, own: Motion, heard: tuple[Heard, ...]
         return (True,) * len(heard)
     place = Place(scenario)
     if len(state.arrays["later"]):
-        place.scene[0][:] = state.arrays["shapes"].astype(float).tolist()
+        place.shapes[:] = state.arrays["shapes"].astype(float).tolist()
     beside = [other._replace(state=_beside(scenario, own, other.state)) for other in heard]
     found = {other.who for other in met_of(state.plan.topology, scenario.topology, own, beside, place)}
     return tuple(other.who in found for other in heard)

@@ -84,7 +84,7 @@ def fade(i: int, others: Iterable[int], n: int, decision: int, flock: Flock, who
         flock.fade[j] = one
 
 
-def meet(
+def meet(  # noqa: C901 - tests of the plan leave one way through
     flock: Flock, numbers: Any, whole: Any, i: int, others: Iterable[int], n: int, m: int, decision: int, edges: Any,
     spans: Any, scene: Any, *, plan: Plan, images: bool,
 ) -> None:  # fmt: skip
@@ -115,9 +115,7 @@ def meet(
             if plan.periodic:
                 for a in axes:
                     o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-            hears = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (
-                integer(j) != ii
-            )
+            hears = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
         else:
             hears = (r2 <= range2) & (integer(j) != ii)
         if plan.lossy or plan.links:
