@@ -52,6 +52,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
             "quiet": "watch", "trust": "trust",
             **dict.fromkeys(("algorithm", "population", "generations", "seeds", "seed", "restarts"), "search_keys"),
+            **dict.fromkeys(("flights", "start", "averages"), "search_keys"),
         },
     ),
     "harden": Counterpart(
