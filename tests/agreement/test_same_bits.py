@@ -11,7 +11,7 @@ import pytest
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
-from airflock.engine.threads import in_threads
+from airflock.threads import in_threads
 from flocks import flown, interpreted, scenario
 
 PAPER = {

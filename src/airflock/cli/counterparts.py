@@ -112,7 +112,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         "airflock.replay(recording)", "replay",
         {
             "what": "recording", "page": "airflock.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
-            **LOADED,
+            "colour": "colour", **LOADED,
         },
     ),
     "display": Counterpart(
@@ -184,7 +184,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
     ),
     "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
-    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.engine.store.clear_cache"}),
+    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.cache.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (

@@ -1,9 +1,24 @@
-"""Timing: periods and delays that a flight cannot keep, or keeps only rounded to its steps."""
+"""Timing: the times of a scenario in motion steps, and those that a flight cannot keep, or keeps only rounded."""
 
 from typing import Any
 
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import Flight
+
+
+def clock(scenario: Scenario) -> dict[str, int]:
+    """All times of a scenario in motion steps."""
+    dt, q = scenario.flight.dt, scenario.measured_by()
+    decide_every = max(1, round(scenario.sensors.period / dt))
+    delay = round(scenario.radio.delay / dt)
+    return {
+        "steps": round(scenario.flight.duration / dt),
+        "decide_every": decide_every,
+        "sample_every": max(1, round(q.period / dt)),
+        "collide_every": round((q.collision_period or dt) / dt),
+        "delay": delay,
+        "ring": delay // decide_every + 2,
+    }
 
 
 def faults(flight: Flight, period: float, metrics: Any) -> list[str]:
