@@ -121,9 +121,8 @@ def main() -> int:
         margin = f"{row['short']} | {row['before']:.3g}{unit} | {row['after']:.3g}{unit} | {100.0 * row['gain']:+.0f} %"
         print(f"| {row['seed']} | {row['agents']} | {margin} | {row['cost']:+.3f} | {held} | {row['verdict']} |")
     held, grown = sum(row["held"] for row in rows), sum(row["grown"] for row in rows)
-    print(
-        f"{held} of {len(rows)} keep what held; in {grown} the short margin grew by 20 % for at most {COST:g} of fitness"
-    )
+    told = f"the short margin grew by 20 % for at most {COST:g} of fitness"
+    print(f"{held} of {len(rows)} keep what held; in {grown} {told}")
     return 0 if held == len(rows) and grown >= 0.6 * len(rows) else 1
 
 
