@@ -133,9 +133,8 @@ def main() -> int:
         unit = "" if row["short"] == "walls" else " m"
         held = "yes" if row["held"] else "; ".join(row["broken"])
         margin = f"{row['short']} | {row['before']:.3g}{unit} | {row['after']:.3g}{unit} | {100.0 * row['gain']:+.0f} %"
-        print(
-            f"| {row['seed']} | {row['agents']} | {row['fitness']:.3f} | {margin} | {row['cost']:+.3f} | {held} | {row['verdict']} |"
-        )
+        drones = f"{row['seed']} | {row['agents']} | {row['fitness']:.3f}"
+        print(f"| {drones} | {margin} | {row['cost']:+.3f} | {held} | {row['verdict']} |")
     held, grown = sum(row["held"] for row in rows), sum(row["grown"] for row in rows)
     told = f"the short margin grew by 20 % for at most {COST:g} of fitness"
     print(f"{held} of {len(rows)} keep what held; in {grown} {told}")
