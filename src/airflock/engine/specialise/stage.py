@@ -184,7 +184,8 @@ class _Statements(Expressions):
             return []  # a docstring
         if isinstance(node, ast.Call):
             called = self.value(node.func, scope)
-            if isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES):
+            helper = isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES)
+            if helper and called.__module__ != words.__name__:
                 done, answer = self.inlined(called, node, scope)
                 if answer is not None:
                     raise scope.fault(node, f"nothing takes what {called.__name__} returns")
