@@ -21,6 +21,7 @@ from airflock.engine.stages.decide import NEAR as GATHERED
 from airflock.engine.stages.state import SCENE
 
 NEAR = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
+GUSTS = 3  # deviations from the mean wind, one per axis
 COMMON = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links", "box", "count")
 AROUND = (
     "for qz in range(low_z, high_z):",
@@ -66,8 +67,12 @@ def crowd(plan: Plan, simulated: bool = False) -> str:
 
 
 def rest_columns(plan: Plan) -> int:
-    """Columns that only the agent itself reads: command and the model's memory, in whole vectors."""
-    return -(-(3 + len(getattr(plan.model.Memory, "_fields", ()))) // 4) * 4
+    """Columns that only the agent itself reads, in whole vectors: command, the model's memory, and gusts.
+
+    Each agent keeps the gusts of the flock: they go on from step to step, and no launch can hand them to all others.
+    """
+    memory = len(getattr(plan.model.Memory, "_fields", ()))
+    return -(-(3 + memory + (GUSTS if plan.windy else 0)) // 4) * 4
 
 
 class CellBuilder(CudaBuilder):
@@ -118,7 +123,7 @@ def _common(build: CellBuilder) -> list[str]:
     lines += reciprocal_lines(build.reciprocals)
     local = f"np.float{build.plan.bits}"
     lines += ["n = agents; sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
-    lines += [f"gust = cuda.local.array(3, {local})", f"aim = cuda.local.array(4, {local})"]
+    lines += [f"gust = cuda.local.array({GUSTS}, {local})", f"aim = cuda.local.array(4, {local})"]
     lines += [f"near_ = cuda.local.array({GATHERED}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
     names = {"near": "near_", "goals": "edges", "reached": "aim", "later": "edges"}
     return [*lines, f"scene = ({', '.join(names.get(part, part) for part in SCENE)})"]
@@ -151,8 +156,9 @@ def _advance(build: CellBuilder) -> list[str]:
     state |= {f"c{a}_i": ("rest", c) for c, a in enumerate(axes)} | {
         f"mem{c}_i": ("rest", 3 + c) for c in range(memory)
     }
+    state |= {f"gust[{c}]": ("rest", 3 + memory + c) for c in range(GUSTS if plan.windy else 0)}
     sorted_ = {"near": "sorted_", "rest": "rest_sorted"}
-    body = ["time = real(step) * row_c.dt; answer = ZERO; gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    body = ["time = real(step) * row_c.dt; answer = ZERO"]
     body += ["counts[0] = 0; counts[1] = 0"]
     body += [f"{r} = {'u32(0)' if r[0] == 'u' and r[1].isdigit() else 'ZERO'}" for r in registers if r not in state]
     load = [f"{name} = {table}[slot, {c}]" for name, (table, c) in state.items()]
