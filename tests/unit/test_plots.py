@@ -28,7 +28,7 @@ from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
 from airflock.recordings.layout import dataset
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors
 
 RADIUS, PACE = 50.0, 4.0

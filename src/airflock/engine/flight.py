@@ -1,24 +1,21 @@
 """Flight: a flight that can be advanced, looked at, changed, kept and branched. Whatever the cuts, the same bits."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Future
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock import __version__
-from airflock.engine import cpu, failure
+from airflock.engine import failure
 from airflock.engine.beginnings import NEVER
-from airflock.engine.carry import carry
+from airflock.engine.course import Course
 from airflock.engine.events import Event, agent_number, events_of, vector
 from airflock.engine.look import View, view
 from airflock.engine.moments import Snapshot, Window
-from airflock.engine.onsets import onsets, told
+from airflock.engine.onsets import told
 from airflock.engine.presence import join, leave
-from airflock.engine.simulate import finish, opened
+from airflock.engine.simulate import finish
 from airflock.engine.state import State
-from airflock.engine.threads import in_background
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
 from airflock.scenarios.files import loaded
@@ -66,26 +63,60 @@ class Flight:
         device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
     ):
-        self.seed, self.world = sound_seed(seed), 0
-        self.scenario = loaded(scenario).in_flight(self.seed)
-        self.precision, self.records = precision, record
         if device not in DEVICES:
             raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(DEVICES)}")
-        self.device = device
-        self._state = opened(self.scenario, self.seed, precision, record, start, device=device)
-        self.origin = (self.scenario, self.seed, precision, None if start is None else np.array(start))
-        self._steps, self.step, self._since = self._state.whole("steps"), 0, 0
-        self._sensed = False
-        self.events: list[Event] = []
-        self.windows: list[Window] = []
-        self._frames: list[NDArray[Any]] = []
-        self._sampled: list[NDArray[Any]] = []
+        seed = sound_seed(seed)
+        self._course = Course(loaded(scenario).in_flight(seed), seed, precision, record, start, device)
         self._planned = events_of(events)
-        self._coming: tuple[Scenario, list[Event], Future[State]] | None = None
         if world:
-            self._to_world(world)
+            self._course.to_world(world)
         while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
-            self._to_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
+            self._course.to_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario in force, with what was changed so far."""
+        return self._course.scenario
+
+    @property
+    def seed(self) -> int:
+        """Seed of the flight."""
+        return self._course.seed
+
+    @property
+    def world(self) -> int:
+        """Which of the independent streams of random numbers of the seed it meets now."""
+        return self._course.world
+
+    @property
+    def precision(self) -> int:
+        """Bits per number."""
+        return self._course.precision
+
+    @property
+    def device(self) -> str:
+        """On what it flies."""
+        return self._course.device
+
+    @property
+    def origin(self) -> tuple[Scenario, int, int, Any]:
+        """What it was opened with: scenario, seed, precision and start."""
+        return self._course.origin
+
+    @property
+    def records(self) -> bool:
+        """Whether it keeps frames."""
+        return self._course.record
+
+    @property
+    def events(self) -> list[Event]:
+        """What was done to it so far, in order."""
+        return self._course.events
+
+    @property
+    def windows(self) -> list[Window]:
+        """Stretches that changes have ended, each with its scenario and scores."""
+        return self._course.windows
 
     # ------------------------------------------------------------------------------------------------- time
 
@@ -95,25 +126,30 @@ class Flight:
         return int(self.scenario.agents)
 
     @property
+    def step(self) -> int:
+        """Number of motion steps flown, which is that of the next one."""
+        return self._course.step
+
+    @property
     def time(self) -> float:
         """Time since the start, s."""
-        return min(self.step, self._steps) * self.scenario.flight.dt
+        return self._course.time
 
     @property
     def over(self) -> bool:
         """Whether the flight has reached its duration, or has ended at a collision."""
-        return self.step >= self._steps or self._state.ended
+        return self._course.step >= self._course.steps or self._state.ended
 
     @property
     def state(self) -> NDArray[Any]:
         """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
-        self._begin()
+        self._course.begin()
         return self._state.motion
 
     @property
     def measured(self) -> NDArray[Any]:
         """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
-        self._begin()
+        self._course.begin()
         names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
         return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
 
@@ -122,6 +158,16 @@ class Flight:
         """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
         stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
         return np.where(stamps > NEVER / 10.0, stamps, np.nan)
+
+    @property
+    def ready(self) -> bool:
+        """Whether it flies at once; otherwise its driver is compiled first."""
+        return self._course.ready
+
+    def compile(self) -> "Flight":
+        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it."""
+        self._course.compile()
+        return self
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
@@ -132,7 +178,7 @@ class Flight:
         count = self._count(seconds, steps)
         if self.over:
             raise FlightError(f"{self.scenario.name}: the flight is over at t = {self.time:g} s; finish() closes it")
-        self._fly_to(min(self.step + count, self._steps))
+        self._fly_to(min(self.step + count, self._course.steps))
         return self
 
     def _count(self, seconds: float | None, steps: int | None) -> int:
@@ -157,50 +203,27 @@ class Flight:
             self.event(event.kind, **event.data)
         self._advance(last)
 
+    @property
+    def _state(self) -> State:
+        """Of the driver in force."""
+        return self._course.state
+
     def _advance(self, last: int) -> None:
-        self._take_over()
-        state, every = self._state, self._state.whole("sample_every")
-        if last <= self.step:
-            return
-        frames = None
-        if self.records:
-            count = -(-last // every) - -(-self.step // every)
-            frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
         first = self.step
-        with cpu.compiling(state.plan.model.name):
-            done = cpu.advance(state, first, last, frames, 1 if self._sensed else 0)
-        if done < 0:
-            raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
-        self.step, self._sensed = done, False
-        if frames is not None:
-            frames = frames[: -(-done // every) - -(-first // every)] if state.ended else frames
-            self._frames.append(frames)
-            self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
-        if not state.finite:
+        self._course.advance(last)
+        if self.step > first and not self._state.finite:
             self._fail(first)
 
     def _fail(self, first: int) -> NoReturn:
         """Say which agent stopped being finite, and at which step from `first` on."""
-        lost = ~np.isfinite(self._state.motion).all(axis=0) & self._state.present
-        bad = int(np.flatnonzero(lost)[0])
+        state = self._state
+        bad = int(np.flatnonzero(~np.isfinite(state.motion).all(axis=0) & state.present)[0])
         twin = self.again()
         twin._fly_to(first)
         for event in twin._planned:
             twin.event(event.kind, **event.data)
-        step = failure.first_bad_step(twin._state, first, self.step, 1 if twin._sensed else 0)
+        step = failure.first_bad_step(twin._state, first, self.step, 1 if twin._course.sensed else 0)
         raise FlightError(failure.not_finite(self.scenario, self.seed, bad, step))
-
-    def _begin(self) -> None:
-        """Place the agents, where that has not been done: the driver draws the start."""
-        if not self._state.begun:
-            self._call(self.step, self.step)
-
-    def _call(self, first: int, last: int, half: int = 0) -> None:
-        """One call of the driver, for what is not a part of the flight itself."""
-        with cpu.compiling(self._state.plan.model.name):
-            done = self._state.advance(first, last, half)
-        if done < 0:
-            raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
 
     def finish(self) -> dict[str, Any]:
         """Fly to the end, take the last sample, and return the scores of the last window.
@@ -208,9 +231,9 @@ class Flight:
         Of a flight that was never changed these are the scores of the closed flight.
         """
         if not self.over:
-            self._fly_to(self._steps)
-        if self.step == self._steps and not self._state.ended:
-            self._advance(self._steps + 1)
+            self._fly_to(self._course.steps)
+        if self.step == self._course.steps and not self._state.ended:
+            self._advance(self._course.steps + 1)
         return self.scores()
 
     # ---------------------------------------------------------------------------------------------- looking
@@ -222,25 +245,24 @@ class Flight:
     @property
     def frame_times(self) -> NDArray[Any]:
         """Times of the samples in `frames`, s."""
-        return np.concatenate([np.zeros(0), *self._sampled])
+        return self._course.frame_times
 
     @property
     def frames(self) -> NDArray[Any]:
         """Samples flown so far, (time, component, agent): positions, velocities, commands. Needs record=True."""
         if not self.records:
             raise FlightError(f"{self.scenario.name}: the flight keeps no frames; open it with record=True")
-        empty = np.zeros((0, 3 * self._state.plan.dimensions, self.agents), self._state.tables.row.dtype)
-        return np.concatenate([empty, *self._frames])
+        return self._course.frames
 
     def look(self, agent: int) -> View:
         """What an agent perceives, and the parts of its command.
 
         Before a decision (`decides`), what it would decide on now; otherwise what its last decision was made from.
         """
-        self._take_over()
-        self._begin()
+        self._course.take_over()
+        self._course.begin()
         number = self._there(agent)
-        if not self.decides or self._sensed or self._state.plan.sequential:
+        if not self.decides or self._course.sensed or self._state.plan.sequential:
             return view(self.scenario, self._state, number, self.step, self.seed, self.world)
         kept = self._state.buffer.copy()
         self._state.advance(self.step, self.step + 1, 2)
@@ -270,10 +292,10 @@ class Flight:
             raise FlightError(
                 f"sense: agents decide every {every} steps; the next decision is at step {coming}, this is {self.step}"
             )
-        self._take_over()
-        if not self._sensed:
-            self._call(self.step, self.step + 1, 2)
-            self._sensed = True
+        self._course.take_over()
+        if not self._course.sensed:
+            self._course.call(self.step, self.step + 1, 2)
+            self._course.sensed = True
         return self
 
     @property
@@ -289,8 +311,8 @@ class Flight:
         number, unit = self._there(agent), COMMANDS.get(self.scenario.model.command, "")
         given = vector("command", value, self.scenario.dimensions, unit)
         self.sense()
-        self._put("c", number, given)
-        self._note("command", agent=number, value=given)
+        self._course.put("c", number, given)
+        self._course.note("command", agent=number, value=given)
         return self
 
     # ----------------------------------------------------------------------------------------------- changing
@@ -307,70 +329,33 @@ class Flight:
 
     def _change(self, settings: Mapping[str, Any], event: Event, wait: bool) -> "Flight":
         """Set keys of the scenario anew, as an event says."""
-        if self._state.ended or self.step > self._steps:
+        if self._course.ended:
             raise FlightError(f"{self.scenario.name}: the flight has ended at t = {self.time:g} s; nothing can change")
-        base = self._coming[0] if self._coming else self.scenario
-        known = self._coming[1] if self._coming else []
-        new = changed(base, settings)
-        state = self._opened(new, self._state.plan.absence)
-        if state.whole("steps") < self.step:
-            raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
-        said = [*known, event]
-        if state.driver is self._state.driver or wait:
-            self._coming = None
-            self._take(new, said, state)
-            return self
-        self._coming = (new, said, in_background(lambda: _compiled(state)))
+        self._course.change(changed(self._course.latest, settings), event, wait)
         return self
 
     @property
     def waiting(self) -> bool:
         """Whether a change waits for its compiler."""
-        return self._coming is not None
-
-    def _take_over(self) -> None:
-        """Take the change over that has been compiled meanwhile."""
-        if self._coming and self._coming[2].done():
-            (new, said, compiled), self._coming = self._coming, None
-            self._take(new, said, compiled.result())
-
-    def _take(self, scenario: Scenario, events: Sequence[Event], state: State) -> None:
-        """Go on as another scenario."""
-        self._begin()
-        if self._state.plan.absence and not state.plan.absence:  # somebody left while the change waited
-            state = self._opened(scenario, absence=True)
-        if self.step > self._since:
-            begin = self._since * self.scenario.flight.dt
-            self.windows.append(Window(self.scenario, begin, self.time, self.scores()))
-        carry(self._state, state, self.step)
-        for event in events:
-            self._note(event.kind, **event.data)
-        self.scenario, self._state, self._steps, self._since = scenario, state, state.whole("steps"), self.step
-
-    def _opened(self, scenario: Scenario, absence: bool) -> State:
-        """State of this flight under a scenario; nothing is in it yet."""
-        return opened(
-            scenario, self.seed, self.precision, self.records, world=self.world, device=self.device,
-            given_start=self._state.plan.given_start, absence=absence,
-        )  # fmt: skip
+        return self._course.waiting
 
     def push(self, agent: int, velocity: Any) -> "Flight":
         """Add to an agent's velocity, m/s, one number per axis: a gust, a collision, a hand."""
         number = self._there(agent)
         given = vector("velocity", velocity, self.scenario.dimensions, "m/s")
-        self._begin()
-        self._put("v", number, given, add=True)
-        self._note("push", agent=number, velocity=given)
+        self._course.begin()
+        self._course.put("v", number, given, add=True)
+        self._course.note("push", agent=number, velocity=given)
         return self
 
     def place(self, agent: int, position: Any) -> "Flight":
         """Put an agent somewhere else, m, one number per axis."""
         number = self._there(agent)
         given = vector("position", position, self.scenario.dimensions, "m")
-        self._begin()
-        self._put("", number, given)
+        self._course.begin()
+        self._course.put("", number, given)
         self._state.look_at_pairs()
-        self._note("place", agent=number, position=given)
+        self._course.note("place", agent=number, position=given)
         return self
 
     # -------------------------------------------------------------------------------------------- single agents
@@ -396,8 +381,8 @@ class Flight:
         Raises ScenarioError, and the flight is as it was.
         """
         given = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
-        base = self._coming[0] if self._coming else self.scenario
-        at = (self.step + (1 if self._sensed else 0)) * self.scenario.flight.dt
+        base = self._course.latest
+        at = (self.step + (1 if self._course.sensed else 0)) * self.scenario.flight.dt
         entry = {"kind": kind, "at": at, **given, **numbers}
         data = {"kind": kind, **given, **numbers}
         return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", data), wait)
@@ -408,10 +393,10 @@ class Flight:
         reason : for the list of events
         """
         number = self._there(agent)
-        self._begin()
-        self._let_come_and_go()
+        self._course.begin()
+        self._course.let_come_and_go()
         leave(self._state, [number])
-        self._note("remove", agent=number, **({"reason": str(reason)} if reason else {}))
+        self._course.note("remove", agent=number, **({"reason": str(reason)} if reason else {}))
         return self
 
     def add(self, agent: int, position: Any, velocity: Any = None) -> "Flight":
@@ -426,7 +411,7 @@ class Flight:
         at = vector("position", position, dims, "m")
         v = vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
         join(self._state, number, at, v)
-        self._note("add", agent=number, position=at, velocity=v)
+        self._course.note("add", agent=number, position=at, velocity=v)
         return self
 
     def _there(self, agent: Any) -> int:
@@ -436,17 +421,6 @@ class Flight:
             raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")
         return number
 
-    def _let_come_and_go(self) -> None:
-        """Go on with a driver that knows who is absent; in the same window of scores."""
-        if self._state.plan.absence:
-            return
-        old, state = self._state, self._opened(self.scenario, absence=True)
-        carry(old, state, self.step)
-        for name in ("sums", "values"):
-            state.arrays[name][:] = old.arrays[name]
-        state.arrays["there"][:] = (self.step - self._since) * self.agents
-        self._state = state
-
     def event(self, kind: str, /, **data: Any) -> "Flight":
         """Do what an event says: the method of the same name."""
         if kind == "change":
@@ -454,7 +428,7 @@ class Flight:
         if kind == "fault":
             return self.fault(**{"kind": "", **data})
         if kind == "branch":
-            self._to_world(data.get("world"))
+            self._course.to_world(data.get("world"))
             return self
         (event,) = events_of([Event(self.step, kind, data)])
         try:
@@ -463,45 +437,19 @@ class Flight:
             raise FlightError(f"event {kind}: {', '.join(data)} are not what it needs") from fault
         return done
 
-    def _put(self, prefix: str, agent: int, values: Sequence[float], add: bool = False) -> None:
-        names = [f"{prefix}{axis}" for axis in self._state.plan.axes]
-        rows = self._state.rows(names)
-        rows[:, agent] = np.array(values, rows.dtype) + (rows[:, agent] if add else 0)
-        self._state.put(names, rows)
-
-    def _note(self, kind: str, /, **data: Any) -> None:
-        self.events.append(Event(self.step, kind, data))
-
     # ------------------------------------------------------------------------------------------------ branching
 
     def snapshot(self) -> Snapshot:
         """Keep the present moment, to go back to with `restore`."""
-        return Snapshot(
-            __version__, self.origin, self.scenario, self._state, self._state.buffer.copy(), self.step, self._sensed,
-            self._since, tuple(self.events), tuple(self.windows), tuple(self._frames),
-            tuple(self._sampled), self._state.tables.due,
-        )  # fmt: skip
+        return self._course.snapshot()
 
     def restore(self, snapshot: Snapshot) -> "Flight":
         """Go back (or on) to a moment of this flight or of a branch of it.
 
         Raises FlightError for a moment of another scenario, seed, precision, start or version.
         """
-        if snapshot.version != __version__:
-            raise FlightError(f"snapshot: made by version {snapshot.version}, this is {__version__}")
-        if snapshot.origin is not self.origin:
-            theirs, seed = snapshot.origin[0].name, snapshot.origin[1]
-            raise FlightError(f"snapshot: of {theirs}, seed {seed}, in a flight of its own; not of this flight")
-        self._coming, self._planned = None, []
-        if self._state is not snapshot.state:
-            self._state = snapshot.state.twin()
-        self._state.buffer[:] = snapshot.bytes
-        self._state.expect(snapshot.due)
-        self.scenario, self.step, self._sensed = snapshot.scenario, snapshot.step, snapshot.sensed
-        self._since, self._steps = snapshot.begin, self._state.whole("steps")
-        self.events, self.windows = list(snapshot.events), list(snapshot.windows)
-        self._frames, self._sampled = list(snapshot.frames), list(snapshot.sampled)
-        self.world = self._state.whole("world")
+        self._course.restore(snapshot)
+        self._planned = []
         return self
 
     def branch(self, world: int | None = None) -> "Flight":
@@ -510,26 +458,10 @@ class Flight:
         world : the same (default) meets the same noise, another one an independent future
         """
         twin = object.__new__(Flight)
-        twin.__dict__.update(self.__dict__)
-        twin._state = self._state.twin()
-        twin._planned, twin._coming = list(self._planned), None
-        twin.events, twin.windows = list(self.events), list(self.windows)
-        twin._frames, twin._sampled = list(self._frames), list(self._sampled)
+        twin._course, twin._planned = self._course.twin(), list(self._planned)
         if world is not None and world != self.world:
-            twin._to_world(world)
+            twin._course.to_world(world)
         return twin
-
-    def _to_world(self, world: Any) -> None:
-        """Draw from another world's random numbers from now on."""
-        if isinstance(world, bool) or not isinstance(world, int) or not 0 <= world < 2**32:
-            raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
-        self.world = world
-        self._state.set_whole("world", world)
-        if self._state.plan.faults:
-            before = [onset for onset in self._state.tables.due if onset.step < self.step]
-            coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
-            self._state.expect((*before, *coming))
-        self._note("branch", world=world)
 
     def again(self) -> "Flight":
         """The same flight from its start, with the same events to come."""
@@ -543,10 +475,3 @@ class Flight:
             events=self.events,
             device=self.device,
         )
-
-
-def _compiled(state: State) -> State:
-    """A state whose driver has been compiled; nothing is flown."""
-    with cpu.compiling(state.plan.model.name):
-        state.compile()
-    return state

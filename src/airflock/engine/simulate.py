@@ -15,12 +15,13 @@ from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe, probe_fault
 from airflock.engine.state import State
-from airflock.engine.tables import clock, tables
-from airflock.engine.threads import in_threads
+from airflock.engine.tables import tables
 from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
+from airflock.scenarios.timing import clock
+from airflock.threads import in_threads
 from airflock.world.place import half_sizes
 
 
@@ -77,6 +78,8 @@ def plan_of(
         links=scenario.radio.kind == "links",
         faults=kinds,
         varied=scenario.varied,
+        topology=scenario.meets if scenario.model.neighbour is not None else None,
+        fading=scenario.topology.fading > 0.0,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )
@@ -325,12 +328,20 @@ def _pays(scenario: Scenario) -> bool:
         and scenario.model.reach is not None
         and scenario.model.neighbour is not None
         and perfect
+        and _by_cells(scenario)
         and scenario.radio.kind == "constant"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
         and not any(letter == "p" for letter, _ in scenario.varied)
         and _has_room(scenario)
     )
+
+
+def _by_cells(scenario: Scenario) -> bool:
+    """Whether cells as wide as the law's reach hold all who decide whom an agent meets."""
+    kind = scenario.meets
+    walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
+    return kind is None or (kind.near and not (walls and kind.asks("hidden")))
 
 
 def _has_room(scenario: Scenario) -> bool:

@@ -95,7 +95,7 @@ class Perceiving:
             self._place = scenario, Place(scenario)
         place, course = self._place[1], Course(scenario)
         if len(memory.arrays["later"]):
-            place.scene[0][:] = memory.arrays["shapes"].astype(float).tolist()
+            place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
         if course.points and scenario.goals.kind != "own":
             x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
             course.at = x, y, z

@@ -1,0 +1,239 @@
+"""Course: where a flight stands, what it has behind it, and the driver that flies it on; `Flight` is its face."""
+
+from collections.abc import Sequence
+from concurrent.futures import Future
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock import __version__
+from airflock.engine import cpu, failure
+from airflock.engine.carry import carry
+from airflock.engine.events import Event
+from airflock.engine.moments import Snapshot, Window
+from airflock.engine.onsets import onsets
+from airflock.engine.simulate import finish, opened
+from airflock.engine.state import State
+from airflock.errors import FlightError
+from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_background
+
+
+class Course:
+    """A flight as its drivers see it: steps flown one after another, whatever is asked of it between them.
+
+    scenario : in force now; seed, precision, record, device : of the whole flight
+    start    : positions and velocities to start from, (component, agent), or None
+    state    : of the driver in force; steps : how many the flight has
+    step     : the next to be flown; sensed : whether its agents have perceived and decided already
+    since    : step since which the present window is scored
+    events   : done so far; windows : scored so far
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, precision: int, record: bool, start: Any, device: str):
+        self.scenario, self.seed, self.world = scenario, seed, 0
+        self.precision, self.record, self.device = precision, record, device
+        self.state = opened(scenario, seed, precision, record, start, device=device)
+        self.origin = (scenario, seed, precision, None if start is None else np.array(start))
+        self.steps, self.step, self.since, self.sensed = self.state.whole("steps"), 0, 0, False
+        self.events: list[Event] = []
+        self.windows: list[Window] = []
+        self._frames: list[NDArray[Any]] = []
+        self._sampled: list[NDArray[Any]] = []
+        self._coming: tuple[Scenario, list[Event], Future[State]] | None = None
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return min(self.step, self.steps) * self.scenario.flight.dt
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more can be flown, not even the last sample."""
+        return self.state.ended or self.step > self.steps
+
+    # ------------------------------------------------------------------------------------------------- flying
+
+    def begin(self) -> None:
+        """Place the agents, where that has not been done: the driver draws the start."""
+        if not self.state.begun:
+            self.call(self.step, self.step)
+
+    def call(self, first: int, last: int, half: int = 0) -> None:
+        """One call of the driver, for what is not a part of the flight itself."""
+        with cpu.compiling(self.state.plan.model.name):
+            self._placed(self.state.advance(first, last, half))
+
+    @property
+    def ready(self) -> bool:
+        """Whether the driver in force flies at once."""
+        return cpu.is_compiled(self.state.driver)
+
+    def compile(self) -> None:
+        """Have it compiled."""
+        _compiled(self.state)
+
+    def advance(self, last: int) -> None:
+        """Fly all steps before `last`, and keep their samples."""
+        self.take_over()
+        if last <= self.step:
+            return
+        state, first, every = self.state, self.step, self.state.whole("sample_every")
+        frames = None
+        if self.record:
+            count = -(-last // every) - -(-first // every)
+            frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
+        with cpu.compiling(state.plan.model.name):
+            done = self._placed(cpu.advance(state, first, last, frames, 1 if self.sensed else 0))
+        self.step, self.sensed = done, False
+        if frames is not None:
+            frames = frames[: -(-done // every) - -(-first // every)] if state.ended else frames
+            self._frames.append(frames)
+            self._sampled.append((-(-first // every) + np.arange(len(frames))) * every * self.scenario.flight.dt)
+
+    def _placed(self, done: int) -> int:
+        """What a driver returned. Raises FlightError if that is an agent that found no place."""
+        if done < 0:
+            raise FlightError(failure.no_place(self.scenario, self.seed, -done - 1))
+        return done
+
+    @property
+    def frame_times(self) -> NDArray[Any]:
+        """Times of the samples, s."""
+        return np.concatenate([np.zeros(0), *self._sampled])
+
+    @property
+    def frames(self) -> NDArray[Any]:
+        """Samples, (time, component, agent)."""
+        shape = (0, 3 * self.state.plan.dimensions, self.state.agents)
+        return np.concatenate([np.zeros(shape, self.state.tables.row.dtype), *self._frames])
+
+    # ----------------------------------------------------------------------------------------------- changing
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a change waits for its compiler."""
+        return self._coming is not None
+
+    @property
+    def latest(self) -> Scenario:
+        """The scenario last asked for: one that waits for its compiler, or the one in force."""
+        return self._coming[0] if self._coming else self.scenario
+
+    def change(self, new: Scenario, event: Event, wait: bool) -> None:
+        """Go on as another scenario: now, or once its driver has been compiled. Raises FlightError."""
+        known = self._coming[1] if self._coming else []
+        state = self._opened(new, self.state.plan.absence)
+        if state.whole("steps") < self.step:
+            raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
+        said = [*known, event]
+        if state.driver is self.state.driver or wait:
+            self._coming = None
+            self._take(new, said, state)
+        else:
+            self._coming = (new, said, in_background(lambda: _compiled(state)))
+
+    def take_over(self) -> None:
+        """Take the change over that has been compiled meanwhile."""
+        if self._coming and self._coming[2].done():
+            (new, said, compiled), self._coming = self._coming, None
+            self._take(new, said, compiled.result())
+
+    def _take(self, scenario: Scenario, events: Sequence[Event], state: State) -> None:
+        """Go on as another scenario, in a new window of scores."""
+        self.begin()
+        if self.state.plan.absence and not state.plan.absence:  # somebody left while the change waited
+            state = self._opened(scenario, absence=True)
+        if self.step > self.since:
+            begin = self.since * self.scenario.flight.dt
+            scores = finish(self.scenario, self.state.values())
+            self.windows.append(Window(self.scenario, begin, self.time, scores))
+        carry(self.state, state, self.step)
+        for event in events:
+            self.note(event.kind, **event.data)
+        self.scenario, self.state, self.steps, self.since = scenario, state, state.whole("steps"), self.step
+
+    def _opened(self, scenario: Scenario, absence: bool) -> State:
+        """State of this flight under a scenario; nothing is in it yet."""
+        return opened(
+            scenario, self.seed, self.precision, self.record, world=self.world, device=self.device,
+            given_start=self.state.plan.given_start, absence=absence,
+        )  # fmt: skip
+
+    def let_come_and_go(self) -> None:
+        """Go on with a driver that knows who is absent; in the same window of scores."""
+        if self.state.plan.absence:
+            return
+        old, state = self.state, self._opened(self.scenario, absence=True)
+        carry(old, state, self.step)
+        for name in ("sums", "values"):
+            state.arrays[name][:] = old.arrays[name]
+        state.arrays["there"][:] = (self.step - self.since) * state.agents
+        self.state = state
+
+    def put(self, prefix: str, agent: int, values: Sequence[float], add: bool = False) -> None:
+        """Set the rows that begin with `prefix`, one per axis, of one agent; `add` to what they hold."""
+        names = [f"{prefix}{axis}" for axis in self.state.plan.axes]
+        rows = self.state.rows(names)
+        rows[:, agent] = np.array(values, rows.dtype) + (rows[:, agent] if add else 0)
+        self.state.put(names, rows)
+
+    def note(self, kind: str, /, **data: Any) -> None:
+        """Write down what was done before the next step."""
+        self.events.append(Event(self.step, kind, data))
+
+    # ---------------------------------------------------------------------------------------------- branching
+
+    def snapshot(self) -> Snapshot:
+        """The present moment."""
+        return Snapshot(
+            __version__, self.origin, self.scenario, self.state, self.state.buffer.copy(), self.step, self.sensed,
+            self.since, tuple(self.events), tuple(self.windows), tuple(self._frames), tuple(self._sampled),
+            self.state.tables.due,
+        )  # fmt: skip
+
+    def restore(self, moment: Snapshot) -> None:
+        """Go back (or on) to a moment of this course or of a twin of it. Raises FlightError for any other."""
+        if moment.version != __version__:
+            raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
+        if moment.origin is not self.origin:
+            theirs, seed = moment.origin[0].name, moment.origin[1]
+            raise FlightError(f"snapshot: of {theirs}, seed {seed}, in a flight of its own; not of this flight")
+        self._coming = None
+        if self.state is not moment.state:
+            self.state = moment.state.twin()
+        self.state.buffer[:] = moment.bytes
+        self.state.expect(moment.due)
+        self.scenario, self.step, self.sensed = moment.scenario, moment.step, moment.sensed
+        self.since, self.steps, self.world = moment.begin, self.state.whole("steps"), self.state.whole("world")
+        self.events, self.windows = list(moment.events), list(moment.windows)
+        self._frames, self._sampled = list(moment.frames), list(moment.sampled)
+
+    def twin(self) -> "Course":
+        """Another course that goes on from here."""
+        twin = object.__new__(Course)
+        twin.__dict__.update(self.__dict__)
+        twin.state, twin._coming = self.state.twin(), None
+        twin.events, twin.windows = list(self.events), list(self.windows)
+        twin._frames, twin._sampled = list(self._frames), list(self._sampled)
+        return twin
+
+    def to_world(self, world: Any) -> None:
+        """Draw from another world's random numbers from now on. Raises FlightError."""
+        if isinstance(world, bool) or not isinstance(world, int) or not 0 <= world < 2**32:
+            raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
+        self.world = world
+        self.state.set_whole("world", world)
+        if self.state.plan.faults:
+            before = [onset for onset in self.state.tables.due if onset.step < self.step]
+            coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
+            self.state.expect((*before, *coming))
+        self.note("branch", world=world)
+
+
+def _compiled(state: State) -> State:
+    """A state whose driver has been compiled; nothing is flown."""
+    with cpu.compiling(state.plan.model.name):
+        state.compile()
+    return state
