@@ -27,8 +27,14 @@ def fleet(
         str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
     ] = None,
     silence: Annotated[
-        bool, typer.Option("--silence/--no-silence", help="Stop while a neighbour that is lost could be near.")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--silence/--no-silence",
+            show_default=False,
+            help="Stop while a neighbour that is lost could be near. [default: yes, but beside the simulator as its "
+            "silence.rule says]",
+        ),
+    ] = None,
     ground: Annotated[
         bool, typer.Option("--ground", help="Take off, gather, flock, return and land, instead of starting in the air.")
     ] = False,
@@ -57,7 +63,9 @@ def fleet(
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
     operator = _operator(ground)
-    card = compare.software_card(found, vehicle=vehicle, operator=operator[1], silent=silence and against is None)
+    card = compare.software_card(
+        found, vehicle=vehicle, operator=operator[1], silent=True if silence is None and not against else silence
+    )
     broken = read_faults(faults, card.members) if faults else ()
     rows: list[dict[str, Any]] = []
     beside: list[dict[str, Any]] = []

@@ -76,6 +76,7 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
@@ -327,6 +328,7 @@ def _pays(scenario: Scenario) -> bool:
         and scenario.model.neighbour is not None
         and perfect
         and scenario.radio.kind == "constant"
+        and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
         and not any(letter == "p" for letter, _ in scenario.varied)

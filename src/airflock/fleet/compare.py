@@ -27,10 +27,13 @@ KEPT = ("x", "y", "z")
 
 
 def software_card(
-    scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", silent: bool = True, margin: float = 40.0,
-    as_simulated: bool = True,
+    scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", silent: bool | None = None,
+    margin: float = 40.0, as_simulated: bool = True,
 ) -> Card:  # fmt: skip
-    """Card of a fleet in software: one tick and one packet per decision, as the simulated agents."""
+    """Card of a fleet in software: one tick and one packet per decision, as the simulated agents.
+
+    silent : whether the rule of silence stops a drone; by default where the scenario says so
+    """
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 
 from airflock.body.motion import Parameters as Multirotor
 from airflock.core.parameters import Parameters
-from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import complete
 from airflock.errors import CardError
 from airflock.onboard.card import VERSION
 from airflock.onboard.safety import Safety
@@ -26,7 +26,7 @@ CIRCLE = 16  # sides of the polygon around a circular arena
 def card_document(
     scenario: Scenario, *, site: tuple[float, float, float], members: Sequence[int], mission: int, expires: int,
     operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = MARGIN,
-    as_simulated: bool = False, safety: Mapping[str, Any] | None = None, silent: bool = True,
+    as_simulated: bool = False, safety: Mapping[str, Any] | None = None, silent: bool | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Document of a flight card, without its hash.
 
@@ -35,7 +35,8 @@ def card_document(
     margin       : of the fence around the law's walls, m
     as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
     safety       : limits that differ from those that follow from the scenario
-    silent       : whether the rule of silence stops a drone
+    silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
+                   simulated where the scenario says so
 
     Raises CardError where the scenario has no walls, or a law of its own that is not in the package.
     """
@@ -51,7 +52,8 @@ def card_document(
     top = limits.base + limits.layer * (len(members) - 1)
     stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
     held = scenario.radio.kind == "constant" and as_simulated
-    silence = Silence(closing=2.0 * _speed(scenario)) if silent else Silence(closing=0.0, keep=0.0)
+    silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
+    silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
     return {
         "airflock_card": VERSION,
         "name": scenario.name,

@@ -29,7 +29,7 @@ from airflock.world import arena
 from airflock.world.place import Place, Shapes, polygon_fault
 from airflock.world.shapes import COLUMNS
 
-VERSION = 1
+VERSION = 2  # a card of version 1 does not name its rule of silence
 KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "world",
     "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",

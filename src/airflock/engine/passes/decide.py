@@ -9,7 +9,7 @@ from airflock.engine.passes import flock, grid, percept, scene
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
-from airflock.engine.stages import faults, surfaces
+from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.state import own_row
 from airflock.engine.stages.words import live
@@ -107,6 +107,13 @@ def decide(build: Builder) -> None:
         body += ["rays_[i] = real(counts[0])"]
     percept.bind(build)
     build.stage("decide", "k_, n, time, row, whole, work, mem, edges, spans, scene", lines, build.each(body))
+
+
+def stop(build: Builder) -> None:
+    """Function stop: who has lost somebody stands still, where the scenario says so."""
+    if build.plan.silent:
+        made = specialise(build, silence.stop)
+        build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
 
 
 def overrule(build: Builder) -> None:

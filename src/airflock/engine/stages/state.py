@@ -46,6 +46,7 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
+    stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body                                 : what the body remembers, by field of its Memory
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
@@ -66,6 +67,7 @@ class Flock:
         self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
+        self.stop_position = axes("stop_")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
         self._take = take
@@ -94,6 +96,11 @@ class Flock:
     def clock(self) -> Row:
         """How far the clock of each agent is ahead, s."""
         return self._take("clock")
+
+    @property
+    def stopped(self) -> Row:
+        """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
+        return self._take("stopped")
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
