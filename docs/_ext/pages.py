@@ -172,8 +172,8 @@ def robots() -> None:
     from airflock.scenarios.keys import keys as keys_of
 
     pieces = [
-        "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. Neighbours hear of it "
-        "through the radio, and an agent knows itself through its sensors.\n",
+        "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
+        "Neighbours hear of it through the radio, and an agent knows itself through its sensors.\n",
         _abilities(BODIES),
     ]
     for name, body in BODIES.items():

@@ -31,8 +31,8 @@ def fleet(
         typer.Option(
             "--silence/--no-silence",
             show_default=False,
-            help="Stop while a neighbour that is lost could be near. [default: yes, but beside the simulator as its "
-            "silence.rule says]",
+            help="Stop while a neighbour that is lost could be near; by default yes, but beside the simulator as its "
+            "silence.rule says.",
         ),
     ] = None,
     ground: Annotated[
