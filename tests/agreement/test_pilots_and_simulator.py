@@ -23,7 +23,7 @@ from airflock.core.silence import complete, could_be_near
 from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
-from airflock.onboard.card import _frozen
+from airflock.onboard.fields import frozen
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
 from flocks import ISLANDS, PENTAGON
@@ -54,7 +54,7 @@ def place_of(scenario):
     text = json.dumps({"world": plain(scenario.world), "shapes": tables})
     read = json.loads(text)
     look = 1e30 if rule is None else rule(scenario.parameters)
-    world = arena.Parameters(**_frozen(read["world"]))
+    world = arena.Parameters(**frozen(read["world"]))
     return Place(world, Shapes(**read["shapes"]), look=look, casts=scenario.model.sight is not None)
 
 
