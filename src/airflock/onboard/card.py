@@ -26,6 +26,8 @@ from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
 from airflock.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
 from airflock.onboard.safety import Safety
+from airflock.topology import parameters as topologies
+from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, polygon_fault
 
@@ -34,6 +36,7 @@ KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "own",
     "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
+OPTIONAL = ("topology",)  # left out where a drone meets all whom it hears
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
@@ -69,6 +72,7 @@ class Card:
     hearing: Hearing
     delay: float
     silence: Silence
+    topology: topologies.Parameters
     safety: Safety
     fence: Fence
     low: float
@@ -91,7 +95,7 @@ class Card:
         return Pilot(
             self.model, p, self.place.seen(_look(self.model, p)), index=index, period=self.period,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
-            seed=self.seed,
+            seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
@@ -140,8 +144,8 @@ def card_of(document: Any, where: str = "card") -> Card:
         raise CardError([f"{where}: is not a flight card of version {VERSION}"])
     faults: list[str] = []
     for key in document:
-        if key not in KEYS:
-            near = get_close_matches(key, KEYS, n=1)
+        if key not in (*KEYS, *OPTIONAL):
+            near = get_close_matches(key, (*KEYS, *OPTIONAL), n=1)
             faults.append(f"{key} is not known{f'; did you mean {near[0]}?' if near else ''}")
     faults += [f"{key} is missing" for key in KEYS if key not in document]
     if faults:
@@ -187,6 +191,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     own = _own(d, law, body, faults)
     world = record(arena.Parameters, d["world"], "world", faults)
     silence = record(Silence, d["silence"], "silence", faults)
+    topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
     safety = record(Safety, d["safety"], "safety", faults)
     rows = d["shapes"]
     if not are_shapes(rows):
@@ -203,7 +208,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
         own=own,
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
-        silence=silence, safety=safety,
+        silence=silence, topology=topology, safety=safety,
         fence=Fence(corners),
         low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
         period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
@@ -230,6 +235,9 @@ def _geometry_faults(card: Card) -> list[str]:
         if card.outside(x, y, card.height) > 1e-6:
             faults.append(f"fence: does not hold the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
+    kind = TOPOLOGIES[card.topology.kind]
+    if kind is not None and kind.flat and not card.flat:
+        faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
     for member in card.members if card.own else card.members[:1]:

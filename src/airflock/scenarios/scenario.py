@@ -14,6 +14,7 @@ from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete
+from airflock.core.topology import Topology
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.geometry import largest_extension
@@ -21,6 +22,8 @@ from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
+from airflock.topology import parameters as topologies
+from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena, goals, scenery, start
 
 
@@ -29,7 +32,7 @@ class Scenario:
     """Everything about a flight but the seed; `airflock.load` makes one.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
+    body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
     vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
     groups    : agents that share numbers; faults: what befalls single agents
@@ -59,6 +62,7 @@ class Scenario:
     aero: descent.Parameters
     silence: Silence
     metrics: metric_parameters.Parameters
+    topology: topologies.Parameters
     flight: Flight
     vehicle: Body
     measures: MetricSet
@@ -108,6 +112,11 @@ class Scenario:
     def order_parameters(self) -> tuple[Metric, ...]:
         """The metrics that measure a flight."""
         return self.measures.of(self.metrics)
+
+    @property
+    def meets(self) -> Topology | None:
+        """Which of those whom an agent hears it meets; None: all of them."""
+        return TOPOLOGIES[self.topology.kind]
 
     @property
     def fault_kinds(self) -> tuple[Fault, ...]:

@@ -13,6 +13,7 @@ from airflock.core import silence
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.metrics import parameters as metrics
+from airflock.topology import parameters as topology
 from airflock.world import arena, goals, scenery, start
 
 
@@ -104,6 +105,7 @@ ORDER = (
     Section("wing", wing.Parameters, "wing"),
     Section("aero", descent.Parameters, "aero"),
     Section("wind", wind.Parameters, "air", dryden.Numbers),
+    Section("topology", topology.Parameters, "topology"),
     Section("silence", silence.Parameters, "silence"),
 )
 SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

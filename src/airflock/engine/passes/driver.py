@@ -16,11 +16,13 @@ from llvmlite import ir
 from numba import njit, prange, types
 from numba.extending import intrinsic
 
+from airflock.engine.compiler import CALLED, INNER
+
 real = np.float{bits}
 integer = np.int{bits}
 COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
-JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True, _nrt=COUNTED)
-INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED)
+INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED, **INNER)
+JIT = INLINE | dict(nogil=True, forceinline=True)
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)
@@ -60,6 +62,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     perceive.perceive(build)
     perceive.tune(build)
     perceive.receive(build)
+    perceive.meet(build)
     decide.neighbours(build)
     decide.boundaries(build)
     flock.flock(build)
@@ -86,7 +89,8 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
-        choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
+        more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
+        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store', *more])})"]
         choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
@@ -233,6 +237,6 @@ def _text(build: Builder, label: str) -> str:
     head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits) + blocks)
     if not build.plan.grid:  # which sorts cells into arrays of its own
         head = must_replace(head, "COUNTED = True", "COUNTED = False")
-    last = must_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
+    last = must_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT | CALLED)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {build.rows!r}"]
     return "\n\n".join(parts) + "\n"
