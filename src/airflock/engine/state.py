@@ -312,7 +312,7 @@ def _layout(
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
     m, dims = lanes(agents), plan.dimensions
     label = np.int32 if plan.bits == 32 else np.int64
-    packets = (agents, 2 * dims + 1, m) if plan.links else (1, 2 * dims + 1, 1)
+    packets = (agents, 2 * dims + 1, m) if plan.packets else (1, 2 * dims + 1, 1)
     values, sums = sums_of(plan)
     beginnings = {
         "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,

@@ -7,7 +7,7 @@ from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import decide as deciding
-from airflock.engine.stages import faults, surfaces
+from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.words import live, wants
@@ -90,6 +90,13 @@ def decide(build: Builder) -> None:
     percept.bind(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
     build.stage("decide", arguments, made.once, made.body, made.answer)
+
+
+def stop(build: Builder) -> None:
+    """Function stop: who has lost somebody stands still, where the scenario says so."""
+    if build.plan.silent:
+        made = specialise(build, silence.stop)
+        build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
 
 
 def overrule(build: Builder) -> None:

@@ -51,6 +51,7 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
+    stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
     away, apart                          : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
@@ -77,6 +78,7 @@ class Flock:
         self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
+        self.stop_position = axes("stop_")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
@@ -142,6 +144,11 @@ class Flock:
     def clock(self) -> Row:
         """How far the clock of each agent is ahead, s."""
         return self._take("clock")
+
+    @property
+    def stopped(self) -> Row:
+        """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
+        return self._take("stopped")
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
