@@ -84,7 +84,7 @@ class World:
             "work": rng.uniform(-12.0, 12.0, (len(self.build.rows), n)),
             "ring": rng.uniform(-12.0, 12.0, (2, 2 * dims, n)),
             "words": np.zeros((4, n), np.uint32).astype(object),
-            "store": np.concatenate([rng.uniform(-9.0, 9.0, (n, 2 * dims, n)), np.full((n, 1, n), -1e9)], 1),
+            "store": np.concatenate([rng.uniform(-9.0, 9.0, (2 * dims, n, n)), np.full((1, n, n), -1e9)]),
             "gust": np.array([0.3, -0.2, 0.1, 0.5, -0.4])[: 5 if self.plan.dryden else 3],
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
@@ -97,6 +97,7 @@ class World:
         held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT")}
         held |= {name: getattr(random, name) for name in random.PRIMITIVES}
         held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
+        held["apart"] = lambda: None
         held["njit"] = lambda *_, **__: lambda function: function
         exec("\n\n".join([*self.build.source.blocks, *self.build.functions]), held)
         return held
@@ -107,7 +108,7 @@ class World:
         common = self.row, self.tables.whole.tolist(), state["work"]
         made["snapshot"](1, n, state["work"], state["ring"])
         made["perceive"](step, 0, n, *common, state["ring"], state["words"])
-        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"])
+        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], state["words"])
         made["boundaries"](n, *common, *self.rest.values())
         state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
         return state
@@ -129,6 +130,8 @@ class World:
         def take(name):
             if name[0] == "u" and name[1:].isdigit():
                 return state["words"][int(name[1:])]
+            if name.startswith("packet"):
+                return state["store"][int(name[len("packet") :])]
             # a row that no driver has holds what nobody asks for
             return state["work"][self.build.row(name)] if self.build.row(name) < len(state["work"]) else np.zeros(n)
 
@@ -136,14 +139,15 @@ class World:
         measuring.snapshot(flock, 1, n, state["ring"], plan=plan)
         measuring.perceive(flock, numbers, whole, step, 0, n, state["ring"], plan=plan)
 
-        def hear(i):
-            receive.receive(flock, numbers, whole, i, step, n, 0.7, 0.2, state["store"], plan=plan)
+        def draw(i):
+            receive.draw(range(n), flock, whole, i, step, n, plan=plan)
 
         fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, 0.2, hear, plan=plan, model=model, sums=sums, images=plan.periodic
-        )
+            range(n), range(n), flock, numbers, step, 0.7, 0.2, state["words"], draw, None, plan=plan, model=model,
+            sums=sums, images=plan.periodic,
+        )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step,

@@ -7,6 +7,7 @@ from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
 from airflock.engine.passes import flock, grid, percept, scene
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.perceive import RECEIVE
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import faults, surfaces
@@ -30,14 +31,15 @@ def neighbours(build: Builder) -> None:
         return
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
-    hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)
+    given = {"draw": draw, "drawn": drawn, "decision": argument("k_")}
     images = build.images and not plan.grid  # candidates that come by cells come at their image
-    made = specialise(build, meeting.neighbours, receive=hear, sums=sums, images=images)
+    made = specialise(build, meeting.neighbours, sums=sums, images=images, **given)
     if plan.grid:
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
-    arguments = "k_, n, m, time, late, row, whole, work, store"
-    build.stage("neighbours", arguments, made.once, made.body, made.answer)
+    arguments = "k_, n, m, time, late, row, whole, work, store, words"
+    build.stage("neighbours", arguments, made.once, made.body, made.answer, apart=True)
 
 
 def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str], list[str]]:

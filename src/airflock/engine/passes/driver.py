@@ -85,7 +85,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
-        choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
+        choose += [f"neighbours(k, n, m, time, late, row, whole, work, store, words{', cells' if plan.grid else ''})"]
         choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]

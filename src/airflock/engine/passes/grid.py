@@ -91,7 +91,8 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = must_replace(lines, "CHUNKS", str(CHUNKS))
-    build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
+    arguments = "k_, n, m, time, late, row, whole, work, store, words, cells"
+    build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
 def _box(build: Builder) -> list[str]:
