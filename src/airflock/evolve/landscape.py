@@ -25,7 +25,8 @@ ADVICE = {
 def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[float | None]) -> None:
     """Raise StudyError once a search has seen one value only; what it is and why, in one line.
 
-    values : first objective of every candidate so far
+    generation : number of the generation, of those with whole flights, from 0
+    values     : first objective of every candidate so far that flew a whole flight
     """
     found = [value for value in values if value is not None]
     last = generation + 1 == study.whole("generations")
@@ -42,7 +43,7 @@ def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[fl
 def dead(study: Study, rows: Sequence[Mapping[str, Any] | None]) -> str:
     """Why a winner does not fly, if its fitness, a product, is zero in all flights on fresh seeds; else empty."""
     sound = [row for row in rows if row is not None]
-    if study.objectives[0].name != "fitness" or not _parts(sound):
+    if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
         return ""
     if max(float(row["fitness"]) for row in sound) >= ZERO:
         return ""

@@ -27,6 +27,7 @@ class Model:
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
+    terms    : vectors among its Sums (their fields without x, y, z) → what the law calls them, and their unit (TERMS)
     """
 
     name: str
@@ -50,6 +51,7 @@ class Model:
     interaction_range: Callable[..., float] | None = None
     doc: str = ""
     violates: Mapping[str, str] = field(default_factory=dict)
+    terms: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
@@ -126,4 +128,16 @@ def model(namespace: Any, name: str = "") -> Model:
         interaction_range=found.get("interaction_range"),
         doc=str(found.get("__doc__") or ""),
         violates=dict(found.get("VIOLATES", {})),
+        terms=_terms(found.get("TERMS", {}), found.get("Sums"), name),
     )
+
+
+def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
+    """Words of a law for its vectors; each stands for fields that there are."""
+    fields = getattr(sums, "_fields", ())
+    for stem, words in dict(given).items():
+        if not any(f"{stem}{joint}x" in fields for joint in ("", "_")):
+            raise RuleError(f"model {name}: TERMS[{stem!r}]: Sums has no field {stem}x")
+        if not (isinstance(words, tuple) and len(words) == 2 and all(isinstance(word, str) for word in words)):
+            raise RuleError(f"model {name}: TERMS[{stem!r}] = {words!r}; give a word and a unit")
+    return dict(given)

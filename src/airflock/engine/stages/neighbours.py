@@ -8,9 +8,10 @@ from airflock.core import random
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import by_clock, first_of_four, keep, sent, unheard, word_of
+from airflock.engine.stages.receive import by_clock, carries, first_of_four, hear, newest, sent, unheard, word_of
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
+    HALF,
     LIMIT,
     ONE,
     SIDES,
@@ -31,11 +32,6 @@ from airflock.engine.stages.words import (
 from airflock.world.edges import nearest_image
 
 
-def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
-    """Square of how far packets of agent j carry to agent i, m²."""
-    return least(least(range2, flock.reach_in[i]), flock.reach_out[j]) if plan.suffers("radio") else range2
-
-
 def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
     """How old the data of agent j are on arrival, as the clocks of both tell, s."""
     return late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late
@@ -43,14 +39,15 @@ def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
 
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
     agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, decision: int, time: float, late: float,
-    words: Any, draw: Callable[[int], None] | None, drawn: Callable[[int, int], Any] | None, *, plan: Plan,
-    model: Model, sums: tuple[tuple[int, str], ...], images: bool,
+    words: Any, draw: Callable[[int], None] | None, drawn: Callable[[int, int], Any] | None,
+    meet: Callable[[int], None], *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
 ) -> None:  # fmt: skip
-    """Sum the neighbour rule over all others in range of each agent.
+    """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : how old is what is heard on arrival, s
     draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
     drawn  : instead of it, draws the random word of what agent j sends agent i
+    meet   : finds whom of those whom agent i hears it meets, where that is not all of them
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
@@ -65,7 +62,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     if model.reach is not None and not plan.varies("p"):
         near = least(ask(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if exact else near * near
-    if plan.links:
+    if plan.links and plan.topology is None:
         fast = sent(decision, k.fast_rate, numbers)
         slow = sent(decision, k.slow_rate, numbers)
     for i in agents:
@@ -81,13 +78,15 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                 if first_of_four(i, flock):
                     draw(i)
             lot = words[flock.number[i] & 3]
+        if plan.topology is not None:
+            meet(i)
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         for a in axes:
             own[a] = flock.measured_position[a][i]
             v[a] = flock.measured_velocity[a][i]
         if plan.dimensions == 2:
             v[Z] = ZERO
-        if true_range:
+        if true_range and plan.topology is None:
             for a in axes:
                 true[a] = flock.position[a][i]
         f = ONE / norm(v[X], v[Y], v[Z])
@@ -98,19 +97,19 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
         for j in others:
             d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
             age = heard_age(i, j, late, flock, plan=plan)
-            if true_range:
+            if true_range and plan.topology is None:
                 for a in axes:
                     o[a] = flock.position[a][j] - true[a]
                 if plan.periodic:
                     for a in axes:
                         o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
                 apart2 = sum(o[a] * o[a] for a in axes)
+            if plan.links and plan.topology is None:
+                carried2 = carries(i, j, range2, flock, plan=plan)
+                hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
+            elif plan.links:
+                newest(i, j, packet, flock, plan=plan)
             if plan.links:
-                miss = unheard(math.sqrt(apart2 + TINY), fast, slow, k, plan=plan)
-                got = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (
-                    random.uniform(word_of(i, j, lot, drawn)) >= miss
-                )
-                keep(i, j, got, by_clock(time - late, j, flock, plan=plan), packet, flock, plan=plan)
                 age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
                 for a in axes:
                     d[a] = packet[a] + packet[a + plan.dimensions] * age - own[a]
@@ -131,7 +130,9 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
             for a in (X, Y, Z):
                 nh[a] = g * (v[a] + dv[a])
-            if plan.links:  # the newest packet is heard on and on, as long as its sender is in range
+            if plan.topology is not None:
+                ok = flock.met[j] > HALF
+            elif plan.links:  # the newest packet is heard on and on, as long as its sender is in range
                 ok = (apart2 <= range2) & (packet[2 * plan.dimensions] > -1e8) & (integer(j) != ii)
             elif true_range:
                 ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
@@ -139,7 +140,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                 ok = (r2 <= range2) & (integer(j) != ii)
             if model.reach is not None:
                 ok = ok & (r2 <= near2)
-            if plan.lossy and not plan.links:
+            if plan.lossy and not plan.links and plan.topology is None:
                 distance = math.sqrt(apart2 + TINY) if true_range else r
                 ok = ok & (random.uniform(word_of(i, j, lot, drawn)) >= unheard(distance, ZERO, ZERO, k, plan=plan))
             t = ask(

@@ -1,5 +1,6 @@
 """Receive: which packets of the others arrive at an agent, and over two lossy links the newest that it has of each."""
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -7,7 +8,7 @@ from airflock.body import radio
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import choose, integer, real
+from airflock.engine.stages.words import TINY, choose, integer, least, real
 
 PACKET = random.PACKET
 
@@ -65,15 +66,32 @@ def _missed(distance: Any, fast: Any, slow: Any, k: Any, *, plan: Plan) -> Any:
     return radio.missed_few(distance, fast, slow, k) if plan.few else radio.missed(distance, fast, slow, k)
 
 
-def keep(i: int, j: int, got: Any, stamp: Any, packet: Any, flock: Flock, *, plan: Plan) -> None:
-    """Keep what agent i has just got of agent j, if it has; `packet` is then the newest that it has.
+def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Square of how far packets of agent j carry to agent i, m²."""
+    return least(least(range2, flock.reach_in[i]), flock.reach_out[j]) if plan.suffers("radio") else range2
 
-    stamp : when it was sent by the clock of its sender, s
+
+def hear(
+    i: int, j: int, apart2: Any, carried2: Any, fast: Any, slow: Any, lot: Any,
+    drawn: Callable[[int, int], Any] | None, stamp: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan,
+) -> None:  # fmt: skip
+    """Over two lossy links: `packet` is then the newest that agent i has of agent j, and is kept.
+
+    apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
+    fast, slow       : packets sent on each link; stamp : when, s
     """
     dims = plan.dimensions
+    miss = unheard(math.sqrt(apart2 + TINY), fast, slow, numbers.k, plan=plan)
+    got = (apart2 <= carried2) & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
     for a in range(dims):
         packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
         packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
-    packet[2 * dims] = choose(got, stamp, flock.packet[2 * dims][i, j])
+    packet[2 * dims] = choose(got, by_clock(stamp, j, flock, plan=plan), flock.packet[2 * dims][i, j])
     for c in range(2 * dims + 1):
         flock.packet[c][i, j] = packet[c]
+
+
+def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
+    """Over two lossy links: `packet` is then the newest that agent i has of agent j."""
+    for c in range(2 * plan.dimensions + 1):
+        packet[c] = flock.packet[c][i, j]
