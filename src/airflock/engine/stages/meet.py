@@ -7,7 +7,7 @@ from typing import Any
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import by_clock, carries, hear, sent, unheard
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import (
     FAR,
     HALF,
@@ -42,10 +42,6 @@ def hide(
 ) -> None:
     """Whom obstacles or the scene hide from agent i, as it believes both to be placed: row `hidden`."""
     x = flock.measured_position
-    if plan.scene:
-        shapes = scene[0]
-        nodes = scene[1]
-        links = scene[2]
     for j in others:
         flock.hidden[j] = ZERO
         if flock.apart[j] < HALF * FAR:
@@ -66,7 +62,7 @@ def hide(
                     else:
                         free = least(free, rays.to_edges(x[X][i], x[Y][i], ux, uy, edges, spans[o, 0], spans[o, 1]))
             if plan.scene:
-                free = least(free, bvh.cast(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, ZERO, shapes, nodes, links))
+                free = least(free, bvh.cast(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, ZERO, *tree(scene)))
             flock.hidden[j] = ONE if free < r else ZERO
 
 
@@ -94,7 +90,7 @@ def meet(  # noqa: C901 - tests of the plan leave one way through
     own, true = vector(), vector()
     for a in axes:
         own[a] = flock.measured_position[a][i]
-    if plan.perturbed:
+    if plan.perturbed or plan.packets:
         for a in axes:
             true[a] = flock.position[a][i]
     if plan.lossy or plan.links:
@@ -104,16 +100,17 @@ def meet(  # noqa: C901 - tests of the plan leave one way through
         slow = sent(decision, k.slow_rate, numbers)
     for j in others:
         d, o, packet = vector(), vector(), totals()
-        if plan.perturbed:
+        if plan.perturbed or plan.packets:
             for a in axes:
                 o[a] = flock.position[a][j] - true[a]
             if plan.periodic:
                 for a in axes:
                     o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
             apart2 = sum(o[a] * o[a] for a in axes)
-        if plan.links:
-            carried2 = carries(i, j, range2, flock, plan=plan)
+        if plan.packets:
+            carried2 = carries(i, j, range_ * range_, flock, plan=plan)
             hear(i, j, apart2, carried2, fast, slow, lot, None, time - late, packet, flock, numbers, plan=plan)
+        if plan.links:
             age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
             for a in axes:
                 d[a] = packet[a] + packet[a + plan.dimensions] * age - own[a]

@@ -86,7 +86,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             v[a] = flock.measured_velocity[a][i]
         if plan.dimensions == 2:
             v[Z] = ZERO
-        if true_range and plan.topology is None:
+        if (true_range or plan.packets) and plan.topology is None:
             for a in axes:
                 true[a] = flock.position[a][i]
         f = ONE / norm(v[X], v[Y], v[Z])
@@ -97,17 +97,17 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
         for j in others:
             d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
             age = heard_age(i, j, late, flock, plan=plan)
-            if true_range and plan.topology is None:
+            if (true_range or plan.packets) and plan.topology is None:
                 for a in axes:
                     o[a] = flock.position[a][j] - true[a]
                 if plan.periodic:
                     for a in axes:
                         o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
                 apart2 = sum(o[a] * o[a] for a in axes)
-            if plan.links and plan.topology is None:
-                carried2 = carries(i, j, range2, flock, plan=plan)
+            if plan.packets and plan.topology is None:
+                carried2 = carries(i, j, range_ * range_, flock, plan=plan)
                 hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
-            elif plan.links:
+            elif plan.packets:
                 newest(i, j, packet, flock, plan=plan)
             if plan.links:
                 age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]

@@ -75,14 +75,16 @@ def hear(
     i: int, j: int, apart2: Any, carried2: Any, fast: Any, slow: Any, lot: Any,
     drawn: Callable[[int, int], Any] | None, stamp: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Over two lossy links: `packet` is then the newest that agent i has of agent j, and is kept.
+    """Where packets are kept: `packet` is then the newest that agent i has of agent j.
 
     apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
     fast, slow       : packets sent on each link; stamp : when, s
     """
     dims = plan.dimensions
-    miss = unheard(math.sqrt(apart2 + TINY), fast, slow, numbers.k, plan=plan)
-    got = (apart2 <= carried2) & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
+    got = apart2 <= carried2
+    if plan.lossy or plan.links:
+        miss = unheard(math.sqrt(apart2 + TINY), fast, slow, numbers.k, plan=plan)
+        got = got & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
     for a in range(dims):
         packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
         packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
@@ -92,6 +94,6 @@ def hear(
 
 
 def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
-    """Over two lossy links: `packet` is then the newest that agent i has of agent j."""
+    """Where packets are kept: `packet` is then the newest that agent i has of agent j."""
     for c in range(2 * plan.dimensions + 1):
         packet[c] = flock.packet[c][i, j]
