@@ -234,6 +234,7 @@ def vocabulary() -> None:
         "clock": "of a fault: how far its clock is ahead, s",
         "overrule": "of a fault: the command that reaches the body",
         "motion": "of a fault: the velocity after a step of motion",
+        "meet": "of a topology: fills a row with 1.0 for each neighbour that an agent meets",
         "leaves": "of a fault: time from its beginning until the agent is absent, s",
         "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
     }

@@ -58,7 +58,7 @@ def tune(
     if like is None and (len(scenario) > 1 or heard is not None):
         faults.append(f"{', '.join(scenario)}: one scenario is tuned; of logs, give --like PRESET")
     elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
-        faults.append(f"{scenario[0]}: is no scenario (.toml); of logs, give --like PRESET")
+        faults.append(f"{scenario[0]}: is not a scenario file (.toml); of logs, give --like PRESET")
     else:
         with options.gathering(faults):
             found = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)

@@ -117,8 +117,6 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[Any]:
         """Numba's passes, with those of this file in their places."""
         found = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        if self.state.flags.auto_parallel.enabled:
-            return [found]
         inner = self.state.flags.no_cpython_wrapper
         other = {NopythonTypeInference: Typing, NativeLowering: InlinedLowering if inner else NativeLowering}
         made = PassManager("driver")

@@ -14,9 +14,9 @@ from airflock.engine.beginnings import NEVER, beginning, memories
 from airflock.engine.onsets import Onset, strike
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
-from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
+from airflock.engine.stages.decide import NEAR
 from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached, samples, sums_of
