@@ -57,7 +57,8 @@ class Flock:
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body                                 : what the body remembers, by field of its Memory
-    goal                                 : where its own goal is, m
+    goal, departed                       : where its own goal is, and where it started, m
+    before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
 
@@ -80,7 +81,7 @@ class Flock:
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
-        self.goal = axes("goal_")
+        self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
         self._take = take
 
     @property
@@ -92,6 +93,11 @@ class Flock:
     def age(self) -> Row:
         """How old that is, s."""
         return self._take("age")
+
+    @property
+    def touches(self) -> Row:
+        """Whether each agent touched the scene since it was last looked at, 1 or 0."""
+        return self._take("touches_")
 
     @property
     def rays(self) -> Row:
