@@ -131,7 +131,8 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
         scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
-        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), body=scenario.vehicle, b=b,
+        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), silence=scenario.silent_by(),
+        body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
         told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
     )  # fmt: skip
@@ -147,6 +148,8 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
             continue
         if leaves:
             agent.present, left = False, True
+            for other in flock:
+                other.pilot.forget(number)
             continue
         known = {f"at_{name}": value for name, value in agent.state._asdict().items()}
         known |= dict(zip(("at_cx", "at_cy", "at_cz"), agent.command, strict=True))
@@ -248,25 +251,13 @@ def hear(
         carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
         carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
-        pair = i * len(flock) + j
-        arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
-            distance, k
-        )
+        period = clock(scenario)["decide_every"] * scenario.flight.dt
+        u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
         if in_range:
             found.add(j)
-        arrives = arrives and in_range and carries
-        if arrives and (k.kind == "constant" or linked(scenario, seed, number, pair, distance)):
+        if in_range and carries and u >= radio.unheard(distance, number, period, k):
             flock[i].pilot.hear(j, said[j], time - late + theirs, time + mine)
     return found
-
-
-def linked(scenario: Scenario, seed: int, number: int, pair: int, distance: float) -> bool:
-    """Whether at least one packet arrives on the fast or the slow link of a pair in this period."""
-    k, period = scenario.radio, clock(scenario)["decide_every"] * scenario.flight.dt
-    missed = 1.0
-    for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
-        missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, period)
-    return bool(random.uniform(random.words(seed, random.LINK, 0, number, pair)[0]) >= missed)
 
 
 # --------------------------------------------------------------------------------------------------------- motion

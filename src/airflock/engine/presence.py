@@ -66,10 +66,10 @@ def _set(state: "State", here: int) -> None:
     for c, axis in enumerate(plan.axes):
         work[rows[axis], lanes] = AWAY
         state.arrays["past"][:, c, lanes] = AWAY
-    if plan.links:
-        for part in (state.arrays["store"][lanes], state.arrays["store"][:, :, lanes]):
-            part[...] = 0.0
-        state.arrays["store"][lanes, -1] = state.arrays["store"][:, -1, lanes] = NEVER
+    if plan.packets:
+        store = state.arrays["store"]
+        store[:, lanes] = store[:, :, lanes] = 0.0
+        store[-1, lanes] = store[-1, :, lanes] = NEVER
     count, real = state.agents - here, work.dtype
     state.arrays["mem"][:, lanes] = beginning(plan.model.Memory, count, real)
     state.arrays["memory"][:, lanes] = memories(plan, count, real)
@@ -84,6 +84,6 @@ def _put(state: "State", places: list[int]) -> None:
     arrays: dict[str, Any] = state.arrays
     for name in ("work", "past", "mem", "memory"):
         arrays[name][..., : state.agents] = arrays[name][..., at]
-    if state.plan.links:
-        arrays["store"][...] = arrays["store"][at]
+    if state.plan.packets:
+        arrays["store"][...] = arrays["store"][:, at]
         arrays["store"][..., : state.agents] = arrays["store"][..., at]

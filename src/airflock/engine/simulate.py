@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from airflock.body import radio
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
@@ -76,6 +77,8 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        few=_few_packets(scenario),
+        silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
         topology=scenario.meets if scenario.model.neighbour is not None else None,
@@ -83,6 +86,15 @@ def plan_of(
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )
+
+
+def _few_packets(scenario: Scenario) -> bool:
+    """Whether each of two lossy links sends at most `radio.FEW` packets between two decisions; True without links."""
+    k = scenario.radio
+    if k.kind != "links":
+        return True
+    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    return max(k.fast_rate, k.slow_rate) * period <= radio.FEW - 0.1  # rounding may make it one packet more
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
@@ -330,6 +342,7 @@ def _pays(scenario: Scenario) -> bool:
         and perfect
         and _by_cells(scenario)
         and scenario.radio.kind == "constant"
+        and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
         and not any(letter == "p" for letter, _ in scenario.varied)

@@ -7,7 +7,7 @@ fleet whose packets arrive once per decision loses the very packets that the sim
 import heapq
 import math
 import random as dice
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from airflock.body import radio
 from airflock.core import random
@@ -21,12 +21,15 @@ class Ether:
     """Datagrams between the members of a fleet.
 
     k : parameters of the radio; members: system ids; period: s between two packets of a drone
+    reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
-        self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = ()
-    ):
+        self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
+        reach: Callable[[int, int, float], float] | None = None,
+    ):  # fmt: skip
         self._k, self._members, self._seed, self._period, self._faults = k, list(members), seed, period, faults
+        self._reach = reach
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
@@ -63,21 +66,15 @@ class Ether:
 
     def _passes(self, now: float, number: int, who: int, to: int, distance: float) -> bool:
         """Whether a packet over this distance (m) gets through."""
-        k, pair = self._k, to * len(self._members) + who
+        k = self._k
         if distance > k.range or self._cut(now, who, to):
+            return False
+        if self._reach is not None and distance > self._reach(who, to, now):
             return False
         if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
             return False
-        if k.loss > 0.0:
-            u = random.uniform(random.words(self._seed, random.LOSS, 0, number, pair)[0])
-            if u < radio.lost(distance, k):
-                return False
-        if k.kind == "constant":
-            return True
-        missed = 1.0
-        for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
-            missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, self._period)
-        return bool(random.uniform(random.words(self._seed, random.LINK, 0, number, pair)[0]) >= missed)
+        u = random.pair_uniform(self._seed, random.PACKET, 0, number, to, who, len(self._members))
+        return bool(u >= radio.unheard(distance, number, self._period, k))
 
     def _cut(self, now: float, who: int, to: int) -> bool:
         if self._of("outage", who, now) or self._of("outage", to, now):

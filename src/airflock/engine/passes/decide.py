@@ -4,10 +4,11 @@ import ast
 
 from airflock.engine.passes import grid, perceive, percept
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.perceive import RECEIVE
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import decide as deciding
-from airflock.engine.stages import faults, surfaces
+from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.words import live, wants
@@ -28,17 +29,19 @@ def neighbours(build: Builder) -> None:
         return
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
-    hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)
     more = perceive.around(plan)
-    meet = Call(f"meet({', '.join(['i, k_, n, m, row, whole, work', *more])})")
+    meet = Call(f"meet({', '.join([perceive.MEET, *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image
-    made = specialise(build, meeting.neighbours, receive=hear, meet=meet, sums=sums, images=images)
+    made = specialise(
+        build, meeting.neighbours, decision=argument("k_"), draw=draw, drawn=drawn, meet=meet, sums=sums, images=images
+    )
     if plan.grid:
         met = None if plan.topology is None else _met_in_cells(build)
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums], met)
         return
-    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store", *more])
-    build.stage("neighbours", arguments, made.once, made.body, made.answer)
+    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
+    build.stage("neighbours", arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
 def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str], list[str]]:
@@ -90,6 +93,13 @@ def decide(build: Builder) -> None:
     percept.bind(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
     build.stage("decide", arguments, made.once, made.body, made.answer)
+
+
+def stop(build: Builder) -> None:
+    """Function stop: who has lost somebody stands still, where the scenario says so."""
+    if build.plan.silent:
+        made = specialise(build, silence.stop)
+        build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
 
 
 def overrule(build: Builder) -> None:

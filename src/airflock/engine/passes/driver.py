@@ -67,6 +67,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     decide.boundaries(build)
     flock.flock(build)
     decide.decide(build)
+    decide.stop(build)
     decide.overrule(build)
     move.begin(build)
     move.move(build)
@@ -89,13 +90,14 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
         more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
-        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store', *more])})"]
+        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store, words', *more])})"]
         choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
+    choose += ["stop(n, time, row, work, store)"] if plan.silent else []
     choose += ["overrule(n, time, row, work)"] if plan.suffers("overrule") else []
     step = ["time = real(step) * c.dt"]
     if plan.sequential:  # who senses and who moves alternate: there is no place to cut a step
