@@ -58,7 +58,8 @@ class Flock:
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body                                 : what the body remembers, by field of its Memory
-    goal                                 : where its own goal is, m
+    goal, departed                       : where its own goal is, and where it started, m
+    before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
 
@@ -82,8 +83,13 @@ class Flock:
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
         self.packet = Columns("packet", take)
-        self.goal = axes("goal_")
+        self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
         self._take = take
+
+    @property
+    def touches(self) -> Row:
+        """Whether each agent touched the scene since it was last looked at, 1 or 0."""
+        return self._take("touches_")
 
     @property
     def rays(self) -> Row:
