@@ -246,7 +246,7 @@ def test_clusters_are_what_links_between_agents_join(count, distance, periodic, 
 GROUPS = [{"name": "slow", "agents": [0, 3], "model": {"v_flock": 3.0}}, {"name": "rest"}]
 
 
-def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers():
+def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers(interpreted):
     player = Player(PRESET, {**FEW, "groups": GROUPS}, 3)
     player.flight.fault("motor", 5)
     player.fly(30)

@@ -79,8 +79,8 @@ class Remembering:
         return getattr(self._context, name)
 
     def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """Signature of a call."""
-        if named or not isinstance(function, types.Function):
+        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled."""
+        if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
         key = self._context, function, given
         if key not in self._known:
