@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import dryden, radio, sensors, wind
+from airflock.body import dryden, radio, wind
 from airflock.checking.flock import of_model
 from airflock.core import random
 from airflock.core.agent import Heard, State, answer, decide
@@ -48,6 +48,7 @@ class Agent:
     sent: State = State(*ZERO, *ZERO)
     memory: Any = None
     kept: Any = None
+    sensed: Any = None
     rays: float = 0.0
     packets: dict[int, tuple[State, float]] = field(default_factory=dict)
     faults: dict[str, Suffering] = field(default_factory=dict)
@@ -74,7 +75,8 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
     memory = scenario.vehicle.Memory
-    flock = [Agent(state, kept=memory() if memory else None) for state in begun]
+    senses = scenario.sensor.Memory
+    flock = [Agent(state, kept=memory() if memory else None, sensed=senses() if senses else None) for state in begun]
     for i, agent in enumerate(flock):
         agent.p = own_parameters(scenario, "model", scenario.parameters, i, seed)
         agent.b = own_parameters(scenario, "body", scenario.body, i, seed)
@@ -102,7 +104,7 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
         course.advance(step * dt, dt, states(flock, None if scenario.goals.kind == "own" else there))
         place.appear(step * dt, states(flock, there))
         if (step + delay) % every == 0:
-            past[(step + delay) // every] = states(flock)
+            past[(step + delay) // every] = told_of(scenario, flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
             shared = dict(zip(there, solve(states(flock, there)), strict=True)) if solve else None
@@ -152,6 +154,11 @@ def states(flock: Sequence[Agent], who: Sequence[int] | None = None) -> list[Sta
     return [agent.state for agent in flock] if who is None else [flock[i].state for i in who]
 
 
+def told_of(scenario: Scenario, flock: Sequence[Agent]) -> list[State]:
+    """What agents send: the true state, or that with the errors of the last measurement."""
+    return states(flock) if scenario.sensor.measure is None else [plus(agent.state, agent.own) for agent in flock]
+
+
 def components(flock: Sequence[Agent], dims: int) -> NDArray[np.float64]:
     """Position, velocity and command, (component, agent), only the axes that are flown."""
     rows = [
@@ -174,9 +181,9 @@ def decisions(
     time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
-    if scenario.sensors.noise > 0.0:
+    if not scenario.sensor.is_exact(scenario.sensors):
         for i, agent in enumerate(flock):
-            drift(scenario, seed, number, i, agent)
+            drift(scenario, seed, number, i, agent, time)
     period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
     sent = number * period - clock(scenario)["delay"] * scenario.flight.dt
     said = [
@@ -207,18 +214,39 @@ def decisions(
         agent.memory = made.memory
 
 
-def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent) -> None:
-    """Advance both errors of one agent by one sensor period."""
+def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> None:
+    """Advance both errors of one agent by one sensor period, or have it measure."""
+    if scenario.sensor.measure is not None:
+        agent.own, agent.sensed = sensed(scenario, seed, number, i, agent, time)
+        return
     s, period = scenario.sensors, clock(scenario)["decide_every"] * scenario.flight.dt
     own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
     own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
-    agent.own = swing(agent.own, (own_x, own_y, own_z), period, s)
-    agent.sent = swing(agent.sent, (sent_x, sent_y, sent_z), period, s)
+    rule = scenario.sensor.error
+    agent.own = swing(rule, agent.own, (own_x, own_y, own_z), period, s)
+    agent.sent = swing(rule, agent.sent, (sent_x, sent_y, sent_z), period, s)
 
 
-def swing(error: State, g: Vector, period: float, s: sensors.Parameters) -> State:
+def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> tuple[State, Any]:
+    """How far what an agent measures is off, and what its sensor remembers."""
+    sensor, period = scenario.sensor, clock(scenario)["decide_every"] * scenario.flight.dt
+    drawn = [g for block in (8, 9, 10) for g in normals(seed, random.SENSOR, number, i, draw=block)]
+    chances = [random.uniform(word) for word in random.words(seed, random.SENSOR, 0, number, i, draw=11)]
+    given = agent.state._asdict() | {f"g{c}": g for c, g in enumerate(drawn)}
+    given |= {f"u{c}": u for c, u in enumerate(chances)}
+    given |= {"memory": agent.sensed, "time": time, "period": period, "s": scenario.sensors}
+    found = answer(sensor.measure, "measure", given, sensor.name)
+    off = [a - b for a, b in zip(found[:6], agent.state, strict=True)]
+    if scenario.dimensions == 2:
+        off[2] = off[5] = 0.0
+    return State(*off), found[6] if sensor.Memory else None
+
+
+def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
     """One step of an error on all axes."""
-    steps = [sensors.langevin(error[c], error[3 + c], g[c], period, s) for c in range(3)]
+    steps = [
+        answer(rule, "error", {"q": error[c], "u": error[3 + c], "g": g[c], "period": period, "s": s}) for c in range(3)
+    ]
     return State(*(q for q, _ in steps), *(u for _, u in steps))
 
 

@@ -11,6 +11,8 @@ from typing import Any
 from airflock.core.contract import Body, MetricSet, Model, model
 from airflock.core.contract import body as gathered_body
 from airflock.core.fault import Fault, fault
+from airflock.core.sensor import Sensor
+from airflock.core.sensor import sensor as gathered_sensor
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import AirflockError, ScenarioError
 from airflock.metrics.registry import as_set
@@ -21,6 +23,7 @@ from airflock.scenarios.ground import file_faults, with_ground
 from airflock.scenarios.own_code import own_code
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import USUAL as USUAL_SENSOR
 
 MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
@@ -54,6 +57,7 @@ def load(
     *,
     metrics: Any = None,
     body: Any = None,
+    sensor: Any = None,
     faults: Any = None,
     trust: bool = False,
 ) -> Scenario:
@@ -75,11 +79,14 @@ def load(
         ours, or a namespace such as globals(); likewise the name of a set or a file.
     body : optional
         A body of your own carries the agents: a `Body`, a namespace, or a name or file.
+    sensor : optional
+        A sensor of your own by which agents know themselves: a `Sensor`, a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
     trust : bool
-        Whether code that the file names, or a file that it extends, may run: a law, a body, order parameters.
+        Whether code that the file names, or a file that it extends, may run: a law, a body, a sensor, order
+        parameters.
 
     Returns
     -------
@@ -106,7 +113,7 @@ def load(
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
-        document, own = _given(document, metrics, body)
+        document, own = _given(document, metrics, body, sensor)
         own["kinds"] = _kinds(faults)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, told = with_ground(document, settings or {}, folder)
@@ -134,8 +141,8 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
-def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics and the body which the caller gives, and these themselves for `make`.
+def _given(document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A document that names the metrics, the body and the sensor which the caller gives, and these for `make`.
 
     Giving them is consent to run them. Raises ScenarioError.
     """
@@ -155,6 +162,14 @@ def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[s
         own["vehicle"] = body if isinstance(body, Body) else gathered_body(body)
     if body is not None:
         document["body"] = {"kind": own["vehicle"].name}
+    if isinstance(sensor, (str, os.PathLike)):
+        own["sensor"], more = checks.sensor_of({"kind": str(sensor)}, trust=True)
+        faults = [*faults, *more]
+    elif sensor is not None:
+        own["sensor"] = sensor if isinstance(sensor, Sensor) else gathered_sensor(sensor)
+    if sensor is not None:
+        period = {key: value for key, value in document.get("sensors", {}).items() if key == "period"}
+        document["sensors"] = {**period, "kind": own["sensor"].name}
     if faults:
         raise ScenarioError(faults)
     return document, own
@@ -198,6 +213,7 @@ def make(
     law: Model | None = None,
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
+    sensor: Sensor | None = None,
     kinds: Mapping[str, Fault] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
@@ -205,13 +221,13 @@ def make(
     """Scenario from a nested dict.
 
     where : names it in faults; notes : what is known of it already
-    law, measures, vehicle : a model, a metric set, a body given directly, not by name
+    law, measures, vehicle, sensor : a model, a metric set, a body, a sensor given directly, not by name
     kinds : kinds of fault given directly, by name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
-    document, left_out = _with_body(document, settings or {})
+    document, left_out = _with_kinds(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -233,14 +249,18 @@ def make(
     if measures is None:
         measures, more = checks.metrics_set(merged.get("metrics", {}), folder, trust=trust)
         faults += more
-    own = SECTIONS | {"body": vehicle.Parameters, "metrics": measures.Parameters}
+    if sensor is None:
+        sensor, more = checks.sensor_of(merged.get("sensors", {}), folder, trust=trust)
+        faults += more
+    own = SECTIONS | {"body": vehicle.Parameters, "sensors": sensor.Parameters, "metrics": measures.Parameters}
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
+    faults += more + _faults_between(parts, found, sensor, measures)
+    faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
     single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
     faults += more
     if faults or found is None:
@@ -248,8 +268,8 @@ def make(
     published = _published(merged.get("published", {}))
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
-        name=where, model=found, vehicle=vehicle, measures=measures, published=published, document=merged, **parts,
-        **single,
+        name=where, model=found, vehicle=vehicle, sensor=sensor, measures=measures, published=published,
+        document=merged, **parts, **single,
     )  # fmt: skip
     faults = places.place_faults(scenario)
     if faults:
@@ -293,15 +313,21 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
-def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """A document without the numbers of its body, where the settings name a body of another kind; and a note of it."""
-    given = document.get("body", {})
-    if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
-        return document, ()
-    known = set(given) - {"kind"}
-    kind = given.get("kind", "multirotor")
-    note = f"body.kind = {settings['body.kind']!r}: the numbers of the file's {kind} are left out"
-    return {**document, "body": {}}, (note,) if known else ()
+KINDS = {"body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",))}  # usual kind; keys of every kind
+
+
+def _with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body or sensor, where the settings name another kind; and notes of it."""
+    notes: list[str] = []
+    for section, (usual, shared) in KINDS.items():
+        given, key = document.get(section, {}), f"{section}.kind"
+        if key not in settings or not isinstance(given, Mapping) or settings[key] == given.get("kind"):
+            continue
+        if set(given) - {"kind", *shared}:
+            kind = given.get("kind", usual)
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
+        document = {**document, section: {name: given[name] for name in shared if name in given}}
+    return document, tuple(notes)
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -338,7 +364,7 @@ def _parts(
     faults: list[str] = []
     for section, record in records.items():
         given = merged.get(section, {})
-        if section == "body" and isinstance(given, Mapping):
+        if section in KINDS and isinstance(given, Mapping):
             given = {key: value for key, value in given.items() if key != "kind"}
         parts[section], more = schema.check(section, given, record)
         faults += more
@@ -352,7 +378,7 @@ def _parts(
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -> list[str]:
+def _faults_between(parts: Mapping[str, Any], found: Model | None, sensor: Sensor, measures: MetricSet) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight = parts["flight"]
@@ -368,7 +394,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
         faults += geometry.faults(parts["world"], count, separation or 0.0, begin)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += _timing_faults(flight, parts["sensors"].period, parts["metrics"])
-        faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
+        faults += checks.order_faults(flight, sensor, parts["sensors"], parts["radio"])
         faults += checks.metric_faults(measures, parts["metrics"], parts["world"])
         faults += wings.faults(parts, found, measures)
     return faults

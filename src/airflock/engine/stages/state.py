@@ -47,8 +47,9 @@ class Flock:
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
-    body                                 : what the body remembers, by field of its Memory
-    errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
+    body, sense                          : what the body and the sensor remember, by field of their Memory
+    errors, chances                      : normal and uniform numbers of the sensors
+    outer, words                         : normal numbers of the outer noise, and random words
 
     take       : the row of a name in the driver
     dimensions : 2 or 3
@@ -68,6 +69,7 @@ class Flock:
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
+        self.sense, self.chances = Columns("sense", take), Columns("chance", take)
         self._take = take
 
     @property
@@ -102,6 +104,11 @@ class Flock:
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""
         return self._take(own_row(letter, name))
+
+
+def fields(record: Any) -> range:
+    """Numbers of the fields of a record; none where there is no record."""
+    return range(len(getattr(record, "_fields", ())))
 
 
 def fault_row(kind: str, what: str) -> str:
