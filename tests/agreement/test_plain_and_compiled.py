@@ -25,7 +25,8 @@ FLIGHTS = {
     }),
     "polygon": ("vasarhelyi_2018", {
         "agents": 8, "world.arena": "polygon", "world.corners": NOTCHED, "radio.kind": "links", "radio.loss": 0.6,
-        "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5, "sensors.noise": 0.0,
+        "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5,
+        "sensors.kind": "delayed", "sensors.lag": 0.4,
         "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
     }),
     "circle": ("vasarhelyi_2018", {
@@ -36,6 +37,9 @@ FLIGHTS = {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
         "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
         "wind.kind": "dryden", "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
+        "sensors.kind": "gnss",
+        "sensors.drift_time": 3.0, "sensors.bias": 1.0, "sensors.white": 0.3, "sensors.jump_rate": 0.2,
+        "sensors.jump_time": 1.0, "sensors.outage_rate": 0.2, "sensors.outage_time": 0.8,
     }),
     "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
     "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),

@@ -245,7 +245,8 @@ def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, tim
 def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
     """One step of an error on all axes."""
     steps = [
-        answer(rule, "error", {"q": error[c], "u": error[3 + c], "g": g[c], "period": period, "s": s}) for c in range(3)
+        answer(rule, "error", {"dx": error[c], "dv": error[3 + c], "g": g[c], "period": period, "s": s})
+        for c in range(3)
     ]
     return State(*(q for q, _ in steps), *(u for _, u in steps))
 

@@ -31,7 +31,7 @@ def packed(tmp_path):
     (tmp_path / "set.toml").write_text(
         'scenario = "vasarhelyi_2018/4ms"\n[set]\n"model.kind" = "EVIL"\n'.replace("EVIL", str(tmp_path / "evil.py"))
     )
-    for section in ("body", "metrics"):
+    for section in ("body", "sensors", "metrics"):
         text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
         (tmp_path / f"{section}.toml").write_text(text)
     text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
@@ -110,6 +110,7 @@ WAYS = {
         CONSENT,
     ),
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
+    "sensor of a scenario": (python('airflock.load("sensors.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),
     "fault of an event": (

@@ -102,10 +102,10 @@ def _believed(found: Sensor, s: Any, track: Track, period: float, seed: int) -> 
         given = _given(found, s, state, number, period, memory, seed)
         if found.error is not None:
             each = [
-                answer(found.error, "error", {"q": q, "u": u, "g": given[f"g{c}"], "period": period, "s": s})
-                for c, (q, u) in enumerate(zip(off[:3], off[3:], strict=True))
+                answer(found.error, "error", {"dx": dx, "dv": dv, "g": given[f"g{c}"], "period": period, "s": s})
+                for c, (dx, dv) in enumerate(zip(off[:3], off[3:], strict=True))
             ]
-            off = State(*(q for q, _ in each), *(u for _, u in each))
+            off = State(*(dx for dx, _ in each), *(dv for _, dv in each))
             made[number] = state + np.array(off)
             continue
         answered = answer(found.measure, "measure", given, found.name)  # type: ignore[arg-type]
@@ -170,6 +170,6 @@ def _single(found: Sensor, s: Any, period: float) -> str:
     memory = found.Memory() if found.Memory is not None else None
     for number in range(5):
         given = _given(found, s, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), number, period, memory, number)
-        given |= {"q": 0.3, "u": 0.1, "g": given["g0"]}
+        given |= {"dx": 0.3, "dv": 0.1, "g": given["g0"]}
         run(rule, {"s": choices(s)}, given, asks(rule, kind, found.name))
     return ""

@@ -25,8 +25,8 @@ class Sensing:
         if self.sensor.is_exact(self.s):
             return self.off
         found = self._added(number, period) if self.sensor.error is not None else self._measured(number, true, period)
-        q, u = found
-        self.off = State(q[0], q[1], 0.0 if self.flat else q[2], u[0], u[1], 0.0 if self.flat else u[2])
+        x, v = found
+        self.off = State(x[0], x[1], 0.0 if self.flat else x[2], v[0], v[1], 0.0 if self.flat else v[2])
         return self.off
 
     def _added(self, number: int, period: float) -> tuple[list[float], list[float]]:
@@ -35,10 +35,10 @@ class Sensing:
         low, high = (random.words(self.seed, random.SENSOR, 0, number, self.agent, draw) for draw in (0, 1))
         normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
         steps = [
-            answer(self.sensor.error, "error", {"q": q, "u": u, "g": g, "period": period, "s": self.s})
-            for q, u, g in zip(self.off[:3], self.off[3:], normal, strict=True)
+            answer(self.sensor.error, "error", {"dx": dx, "dv": dv, "g": g, "period": period, "s": self.s})
+            for dx, dv, g in zip(self.off[:3], self.off[3:], normal, strict=True)
         ]
-        return [q for q, _ in steps], [u for _, u in steps]
+        return [dx for dx, _ in steps], [dv for _, dv in steps]
 
     def _measured(self, number: int, true: State, period: float) -> tuple[list[float], list[float]]:
         """What `measure` believes, minus the true state."""

@@ -135,8 +135,8 @@ SENSED = {
     "period": "time between two measurements, s",
 }
 AXIS_ERROR = {
-    "q": "error of the position along one axis at the last measurement, m",
-    "u": "error of the velocity along this axis at the last measurement, m/s",
+    "dx": "error of the position along one axis at the last measurement, m",
+    "dv": "error of the velocity along this axis at the last measurement, m/s",
     "g": "normal random number of this axis",
     "period": "time between two measurements, s",
 }

@@ -80,7 +80,7 @@ def probe_sensor(sensor: Sensor) -> None:
     given: dict[str, Any] = {name: 0.5 + 0.01 * k for k, name in enumerate(VOCABULARY[kind])}
     given["s"], given["memory"] = sensor.Parameters(), sensor.Memory() if sensor.Memory is not None else None
     answer = _call(rule, kind, given, sensor.name)
-    shape = "q, u" if kind == "error" else ", ".join((*COMPONENTS, *(["Memory(...)"] if sensor.Memory else [])))
+    shape = "dx, dv" if kind == "error" else ", ".join((*COMPONENTS, *(["Memory(...)"] if sensor.Memory else [])))
     if not isinstance(answer, tuple) or len(answer) != len(shape.split(", ")):
         raise RuleError(f"{_place(rule)}: {sensor.name}.{kind} must return {shape}")
     if sensor.Memory is not None:

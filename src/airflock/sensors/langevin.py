@@ -30,12 +30,12 @@ def exact(s):
     return s.noise == 0.0
 
 
-def error(q, u, g, period, s):
-    """One period of an error along one axis: position q (m), velocity u (m/s), normal number g → new q, u.
+def error(dx, dv, g, period, s):
+    """One period of an error along one axis: of the position dx (m), of the velocity dv (m/s), from a normal number g.
 
     A damped oscillator with a random push (authors' program; the paper says only "Langevin, parabolic potential").
     """
     push = math.sqrt(2.0 * s.damping * period * s.noise)
     spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale
-    new_u = u + push * g - spring * period * q - s.damping * period * u
-    return q + period * new_u, new_u
+    new = dv + push * g - spring * period * dx - s.damping * period * dv
+    return dx + period * new, new

@@ -81,7 +81,7 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for g, ((error, drift), a) in enumerate(kinds):
                 for i in range(m):
                     error[a][i], drift[a][i] = ask(
-                        plan.sensor.error, q=error[a][i], u=drift[a][i], g=flock.errors[g][i],
+                        plan.sensor.error, dx=error[a][i], dv=drift[a][i], g=flock.errors[g][i],
                         period=numbers.c.period, s=numbers.s,
                     )  # fmt: skip
         for a in axes:
