@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 
 HERE = Path(__file__).parent
 

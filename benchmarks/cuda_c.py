@@ -10,7 +10,7 @@ import numpy as np
 from c_reference import PARAMETERS, SCORES, parameters_of
 
 from airflock.engine.cuda import device
-from airflock.engine.tables import clock
+from airflock.scenarios.timing import clock
 
 HERE = Path(__file__).parent
 

@@ -7,7 +7,7 @@ import numpy as np
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 
 ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
 NOTCHED = [[-45.0, -38.0], [40.0, -38.0], [40.0, 4.0], [2.0, 6.0], [6.0, 44.0], [-45.0, 40.0]]  # an L

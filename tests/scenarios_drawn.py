@@ -18,7 +18,8 @@ from airflock.body.registry import BODIES as KNOWN_BODIES
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
-from airflock.scenarios.files import MODELS, find_model, make
+from airflock.scenarios.laws import MODELS, find_model
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.sensors.registry import SENSORS

@@ -54,9 +54,10 @@ def equations(name: str) -> dict[str, str]:
 
 def models() -> None:
     """A page for each model: docstring, equations beside code, parameters, presets, what reproduces."""
-    from airflock.scenarios.files import MODELS, find_model, load
+    from airflock.scenarios.files import load
     from airflock.scenarios.files import presets as known
     from airflock.scenarios.keys import keys as keys_of
+    from airflock.scenarios.laws import MODELS, find_model
 
     scenarios = {name: load(name) for name in known()}
     rows = []
@@ -265,9 +266,9 @@ def vocabulary() -> None:
 
 def keys() -> None:
     """Every key of a scenario file, and the units that values may carry."""
-    from airflock.scenarios.files import MODELS
     from airflock.scenarios.keys import about, records
     from airflock.scenarios.keys import keys as keys_of
+    from airflock.scenarios.laws import MODELS
     from airflock.scenarios.units import UNITS
 
     pieces = [

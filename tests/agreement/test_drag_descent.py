@@ -39,7 +39,7 @@ class Still:
 def test_without_gain_no_bit_of_a_flight_changes(seed):
     bare = load(PRESET, SMALL)
     document = {key: value for key, value in bare.document.items() if key != "aero"}
-    alone = airflock.scenarios.files.make(document, "alone")
+    alone = airflock.scenarios.making.make(document, "alone")
     assert alone.model.flock is None
     frames = [
         fly(each, seed, record=True, device="python").frames for each in (alone, load(PRESET, SMALL | {"aero.k_d": 0}))

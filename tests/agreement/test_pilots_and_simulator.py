@@ -1,5 +1,9 @@
-"""N pilots, each with its own packets, fly what the simulator flies; a place asked on board is the engine's world."""
+"""N pilots that hear as a card says and carry its map fly what the simulator flies, and what a pilot is.
 
+That pilots fly any valid scenario as the simulator does is in `test_random_scenarios.py`: the reference is N pilots.
+"""
+
+import json
 import math
 from functools import cache
 
@@ -9,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import airflock
+from airflock.body.registry import BODIES
 from airflock.core.agent import State, answer
 from airflock.core.contract import model
 from airflock.core.parameters import choices
@@ -16,7 +21,9 @@ from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import could_be_near
 from airflock.errors import RuleError
+from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
+from airflock.onboard.card import _frozen
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
 from flocks import ISLANDS, PENTAGON
@@ -41,11 +48,14 @@ FLIGHTS = {
 
 
 def place_of(scenario):
-    """The world of a scenario as a drone carries it."""
+    """The world of a scenario as a drone carries it: read from the text of a card."""
     stands, rule = scenario.stands(), scenario.model.wall_reach
-    shapes = Shapes(stands.shapes.tolist(), stands.nodes.tolist(), stands.links.tolist())
+    tables = {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()}
+    text = json.dumps({"world": plain(scenario.world), "shapes": tables})
+    read = json.loads(text)
     look = 1e30 if rule is None else rule(scenario.parameters)
-    return Place(scenario.world, shapes, look=look, casts=scenario.model.sight is not None)
+    world = arena.Parameters(**_frozen(read["world"]))
+    return Place(world, Shapes(**read["shapes"]), look=look, casts=scenario.model.sight is not None)
 
 
 @cache
@@ -79,24 +89,12 @@ def fly(scenario, start, seed):
                         pilot.hear(j, said[j], (step - late) * dt, step * dt)
                     else:
                         pilot.forget(j)
-                commands[i] = law_command(pilot, now[i], step * dt)
+                commands[i] = pilot.decide(now[i], step * dt).command
         if step % sampled == 0:
             frames.append([s[:dims] for s in now])
         now = [moved(scenario, s, c, dt) for s, c in zip(now, commands, strict=True)]
         past.append(now)
     return np.array(frames)
-
-
-def law_command(pilot, own, time):
-    """What the law commands, before the pilot turns it into a setpoint: the bodies here take it as it is."""
-    kept, made = pilot.setpoint, []
-    pilot.setpoint = lambda own, command: made.append(command) or kept(own, command)
-    velocity = pilot.decide(own, time).command
-    pilot.setpoint = kept
-    x, y, z = made[0]
-    if pilot.model.command == "velocity":
-        assert velocity[:2] == (x, y)
-    return x, y, 0.0 if pilot.flat else z
 
 
 def moved(scenario, s, c, dt):
@@ -132,7 +130,7 @@ def test_pilots_fly_what_the_simulator_flies(name):
 @pytest.mark.parametrize("name", ["square", "islands", "silo", "pentagon", "forest"])
 @given(at=st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-60, 60)), turn=st.floats(0, 6.28))
 @settings(max_examples=60, deadline=None)
-def test_a_place_on_board_is_the_engines_world(name, at, turn):
+def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
     from airflock.engine.place import Place as Engine
 
     scenario = build(name)
@@ -141,8 +139,8 @@ def test_a_place_on_board_is_the_engines_world(name, at, turn):
     u = (math.cos(turn), math.sin(turn), 0.0)
     assert list(ours.surfaces(x, y, z)) == list(theirs.surfaces(x, y, z))
     assert ours.excursion(x, y, z) == theirs.excursion(x, y, z)
-    assert ours.ray(x, y, z, *u, 70.0) == min(70.0, theirs.ray(x, y, z, *u))
-    assert ours.cast(x, y, z, *u, 70.0, 0.5) == theirs.cast(State(x, y, z, 0.0, 0.0, 0.0), u, 70.0, 0.5)
+    assert ours.ray(x, y, z, *u, 70.0) == theirs.ray(x, y, z, *u, 70.0)
+    assert ours.cast(x, y, z, *u, 70.0, 0.5) == theirs.cast(x, y, z, *u, 70.0, 0.5)
 
 
 @given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=3, max_size=7))
@@ -194,6 +192,36 @@ def test_only_the_newest_sound_packet_counts():
     assert not one.heard(10.1)
 
 
+def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock():
+    one = pilot(hearing=Hearing.simulated(links=False))
+    own, east = State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0), State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    assert one.hear(1, east, 7.0, 5.0), "its clock is 2 s ahead"
+    assert one.hear(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
+    (heard,) = one.heard(5.0)
+    assert heard.state.x == 8.0 and heard.age == 1.0
+    met, alone = one.decide(own, 5.0).command, one.decide(own, 5.2).command
+    assert met != alone and not one.heard(5.2)
+    links = pilot(hearing=Hearing.simulated(links=True))
+    links.hear(1, east, 4.0, 5.0)
+    links.decide(own, 5.0)
+    assert links.heard(500.0)[0].state.x == 9.0 + 496.0
+
+
+def test_who_is_out_of_sight_does_not_count():
+    one, own = pilot(), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    alone = one.decide(own, 1.0).command
+    one.hear(1, State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0), 1.0, 1.0)
+    assert one.decide(own, 1.0, only=()).command == alone != one.decide(own, 1.0, only={1}).command
+
+
+def test_an_autopilot_is_asked_for_a_velocity_whatever_the_law_commands():
+    law, turning = model(vicsek_1995), BODIES["heading"]
+    b = turning.Parameters()
+    one = Pilot(law, law.Parameters(), Place(arena.Parameters()), index=0, period=0.2, flat=True, body=turning, b=b)
+    own = State(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    assert math.hypot(*one.steer(own, 0.0)) == pytest.approx(b.speed)
+
+
 @given(st.floats(0, 200), st.floats(0, 60), st.floats(0, 60))
 def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, age, longer):
     s = Silence()
@@ -210,5 +238,6 @@ def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
     assert one.decide(own, 4.0).command == (0.0, 0.0, 0.0)
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
     assert math.hypot(*one.decide(own, 4.2).command[:2]) > 1.0
+    assert one.steer(own, 9.0) == (0.0, 0.0, 0.0)
     one.forget(1)
     assert not one.lost_near(own, 9.0)

@@ -11,7 +11,7 @@ import pytest
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
 from airflock.engine.tables import tables
-from airflock.engine.threads import in_threads
+from airflock.threads import in_threads
 from flocks import flown, interpreted, scenario
 
 PAPER = {
@@ -20,7 +20,7 @@ PAPER = {
 FRESH = """
 import hashlib
 from airflock.engine.simulate import fly
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 settings = {settings!r}
 found = make({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)
 print(hashlib.sha256(fly(found, {seed}, record=True).frames.tobytes()).hexdigest())

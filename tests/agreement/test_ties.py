@@ -11,7 +11,8 @@ import pytest
 
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters, quantity
-from airflock.scenarios.files import load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 from flocks import interpreted
 from reference.flight import fly_plainly
 

@@ -54,3 +54,45 @@ def test_pause_seek_and_space(recording, tab, tmp_path):
     time.sleep(1.0)
     assert places(coloured(shot(tab), right=740)) >= 10
     assert not tab.faults
+
+
+def test_colours_stand_for_what_the_menu_says(tab, tmp_path):
+    given = {"agents": 12, "duration": 12.0, "groups": [{"agents": [4, 5], "name": "slow"}, {"name": "rest"}]}
+    scenario = airflock.load("vasarhelyi_2018/4ms", given)
+    events = [{"step": 300, "kind": "fault", "data": {"kind": "motor", "agents": [7]}}]
+    flown = airflock.simulate(scenario, 1, events=events)
+    opened(tab, flown, tmp_path)
+    menu = tab.get_by_label("colour by")
+
+    def tones():
+        found = np.array(tab.evaluate("Array.from({length: 12}, (_, a) => replay.colour(a))"))
+        return [tuple(tone) for tone in found.round(6).tolist()]
+
+    tab.evaluate("replay.play(false)")
+    menu.select_option("group")
+    tab.evaluate("replay.seek(2)")
+    tab.wait_for_function("document.getElementById('names').textContent.includes('slow')", timeout=PATIENCE)
+    tab.wait_for_function("new Set([0, 1, 4].map(a => replay.colour(a).join())).size === 2", timeout=PATIENCE)
+    found = tones()
+    assert len(set(found)) == 2 and found[4] == found[5] != found[0]
+    menu.select_option("fault")
+    tab.wait_for_function("new Set([0, 4, 7].map(a => replay.colour(a).join())).size === 1", timeout=PATIENCE)
+    tab.evaluate("replay.seek(8)")
+    tab.wait_for_function("replay.colour(7).join() !== replay.colour(0).join()", timeout=PATIENCE)
+    assert [agent for agent, tone in enumerate(tones()) if tone != tones()[0]] == [7]
+    assert not tab.faults
+
+
+def test_whoever_has_left_is_gone_from_the_picture(tab, tmp_path):
+    scenario = airflock.load("vasarhelyi_2018/4ms", {"agents": 12, "duration": 12.0})
+    events = [{"step": 500, "kind": "remove", "data": {"agent": agent}} for agent in range(1, 12)]
+    opened(tab, airflock.simulate(scenario, 1, events=events), tmp_path)
+    tab.evaluate("replay.play(false)")
+    tab.get_by_label("trail").select_option("0")
+    tab.evaluate("replay.seek(2)")
+    time.sleep(1.0)
+    before = places(coloured(shot(tab), right=740))
+    tab.evaluate("replay.seek(9)")
+    time.sleep(1.0)
+    assert places(coloured(shot(tab), right=740)) <= before - 10
+    assert not tab.faults

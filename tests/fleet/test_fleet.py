@@ -8,13 +8,16 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 
+from airflock.core import random
 from airflock.core.agent import State
 from airflock.errors import ScenarioError
 from airflock.fleet import compare
+from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import KINDS, Fault, read_faults
 from airflock.fleet.lockstep import KEY
@@ -113,6 +116,17 @@ def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
         fast, slow = (radio.received(70.0, float(link), k) for link in (0, 1))
         share = 1.0 - (1.0 - fast) ** 2 * (0.8 + 0.2 * (1.0 - slow))  # the slow link sends in each fifth period
     assert heard / count == pytest.approx(share, abs=0.03)
+
+
+@pytest.mark.parametrize("three", [False, True])
+def test_outer_noise_of_a_block_is_that_of_each_step(three):
+    noise, seed = OuterNoise(2**40 + 7, 3, three), 2**40 + 7
+    for step in (0, 1, 2, 255, 256, 1001, 4096):
+        for drone in range(3):
+            words = random.words(seed, random.OUTER, 0, step if three else step // 2, drone)
+            four = (*random.normal_pair(*words[:2]), *random.normal_pair(*words[2:]))
+            flat = (*(four[2:] if step % 2 else four[:2]), 0.0)
+            assert noise(step, drone) == (four[:3] if three else flat)
 
 
 # ------------------------------------------------------------------------------------------------ whole missions
@@ -237,9 +251,7 @@ def test_px4_takes_our_mode_only_after_a_second_of_setpoints():
 
 
 def test_a_vehicle_takes_any_bytes_and_only_finite_setpoints():
-    import random
-
-    v, rng, say = vehicle(), random.Random(4), Speaker(AUTOPILOTS["px4"], 1)
+    v, rng, say = vehicle(), Random(4), Speaker(AUTOPILOTS["px4"], 1)
     for _ in range(300):
         v.receive(rng.randbytes(rng.randrange(300)), 0.0)
     pack = dialect.common()

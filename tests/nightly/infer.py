@@ -20,7 +20,7 @@ import xarray as xr
 
 import airflock
 from airflock.infer.run import LAWS, Inferred, interval
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 
 NOISE, MISSING = 0.02, 0.02
 AGENTS, SECONDS, PERIOD = 20, 120.0, 0.1

@@ -157,12 +157,13 @@ def test_a_wall_turns_an_agent_round_and_a_far_one_does_nothing(law):
 
 
 def test_an_agent_runs_without_arrays_or_compilers():
-    """core.agent imports nothing that a companion computer lacks."""
+    """core.agent and core.pilot import nothing that a companion computer lacks."""
     import subprocess
     import sys
 
     code = (
-        "import sys; import airflock.core.agent, airflock.models.vasarhelyi_2018, airflock.models.viragh_2014;"
+        "import sys; import airflock.core.agent, airflock.core.pilot;"
+        "import airflock.models.vasarhelyi_2018, airflock.models.viragh_2014;"
         "print([m for m in ('numpy', 'numba', 'xarray', 'pydantic', 'shapely') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

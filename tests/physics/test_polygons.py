@@ -9,7 +9,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from airflock.core.agent import State
 from airflock.engine.place import Place as Seen
 from airflock.stage.scene import prism as drawn_prism
 from airflock.world import arena, polygon
@@ -192,5 +191,5 @@ def test_a_law_that_casts_sees_a_prism_between_its_heights():
         u = -math.cos(turn), -math.sin(turn), 0.0
         at = -26.0 - 20.0 * u[0], 14.0 - 20.0 * u[1]
         for z in (3.0, 14.0):
-            seen = place.cast(State(*at, z, 0.0, 0.0, 0.0), u, 60.0, 0.0)
+            seen = place.cast(*at, z, *u, 60.0, 0.0)
             assert seen == pytest.approx(min(60.0, polygon.ray_to_prism(*at, z, *u, edges, first, last)), abs=1e-6)

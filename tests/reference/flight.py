@@ -1,6 +1,8 @@
-"""The flight: lists and floats, one agent after the other, who perceives, decides and moves.
+"""The flight: N pilots, as a drone carries one, with a world, bodies and an ether around them in lists and floats.
 
-It runs the same rules on the same random numbers in the same order as a driver.
+What decides is `core.pilot.Pilot`, given what it measures and what it hears. Here stands what is outside: true states,
+errors of measurement, the air between agents, wind, bodies, edges, faults. All rules run on the random numbers of a
+driver, in its order.
 """
 
 from collections.abc import Sequence
@@ -13,14 +15,15 @@ from numpy.typing import NDArray
 from airflock.body import dryden, radio, wind
 from airflock.checking.flock import of_model
 from airflock.core import random
-from airflock.core.agent import Heard, State, answer, decide
+from airflock.core.agent import State, answer
 from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
+from airflock.core.pilot import Hearing, Pilot
 from airflock.engine.cpu import Flown
-from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
+from airflock.engine.place import Course, Place, reach_of_walls
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
 from reference.scores import Scores
@@ -34,27 +37,24 @@ class Agent:
     """One agent in the air.
 
     state      : true position (m) and velocity (m/s)
-    command    : what its model decided last
+    pilot      : what decides; b: the numbers of its body, kept: the body's Memory; sensed: the sensor's
+    command    : what it flies by: its pilot's last command, if no fault has overruled it
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
-    memory     : the model's Memory; kept: the body's; rays: how many it cast at its last decision
+    rays       : how many it cast at its last decision
     faults     : by kind, the latest that has hit it; present : whether it is there
-    p, b       : its numbers of model and body
-    packets    : on two links, the newest packet from each other agent: its state and the time it was taken, s
     """
 
     state: State
+    pilot: Pilot
+    b: Any = None
+    kept: Any = None
+    sensed: Any = None
     command: Vector = ZERO
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
-    memory: Any = None
-    kept: Any = None
-    sensed: Any = None
     rays: float = 0.0
-    packets: dict[int, tuple[State, float]] = field(default_factory=dict)
     faults: dict[str, Suffering] = field(default_factory=dict)
     present: bool = True
-    p: Any = None
-    b: Any = None
 
 
 def fly_plainly(  # noqa: C901 - one loop that a reader can follow
@@ -74,12 +74,7 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
     place, times = Place(scenario), clock(scenario)
     dims, dt, delay, every = scenario.dimensions, scenario.flight.dt, times["delay"], times["decide_every"]
     begun = begin(scenario, seed, place) if start is None else given(start, dims)
-    memory = scenario.vehicle.Memory
-    senses = scenario.sensor.Memory
-    flock = [Agent(state, kept=memory() if memory else None, sensed=senses() if senses else None) for state in begun]
-    for i, agent in enumerate(flock):
-        agent.p = own_parameters(scenario, "model", scenario.parameters, i, seed)
-        agent.b = own_parameters(scenario, "body", scenario.body, i, seed)
+    flock = [boarded(scenario, seed, place, i, state) for i, state in enumerate(begun)]
     due, here = begins(scenario, seed), 0
     may_leave = any(entry.fault.leaves for entry in scenario.faults if entry.fault in scenario.fault_kinds)
     count = times["steps"] // times["sample_every"] + 1
@@ -128,6 +123,21 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
                 advance(scenario, seed, step, i, agent, gust, place)
     told = {"present": here / ((step + 1) * len(flock))} if may_leave else {}
     return Flown(scores.totals() | course.values() | told, frames, components(flock, dims)[: 2 * dims], 0)
+
+
+def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -> Agent:
+    """Agent i with its pilot, which carries the map, its own numbers, and its seed."""
+    p = own_parameters(scenario, "model", scenario.parameters, i, seed)
+    b = own_parameters(scenario, "body", scenario.body, i, seed)
+    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    pilot = Pilot(
+        scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
+        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), body=scenario.vehicle, b=b,
+        flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
+        told=scenario.model.flock is not None,
+    )  # fmt: skip
+    kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
+    return Agent(state, pilot, b, kept, sensed)
 
 
 def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
@@ -184,34 +194,26 @@ def decisions(
     if not scenario.sensor.is_exact(scenario.sensors):
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent, time)
-    period, (place, course) = clock(scenario)["decide_every"] * scenario.flight.dt, world
-    sent = number * period - clock(scenario)["delay"] * scenario.flight.dt
+    times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
+    sent = (number * times["decide_every"] - times["delay"]) * dt
     said = [
         misled(agent, ("sense", "tell"), sent, plus(state, agent.sent), scenario.dimensions)
         for state, agent in zip(past, flock, strict=True)
     ]
     for i in [k for k, agent in enumerate(flock) if agent.present] if turn is None else turn:
-        agent = flock[i]
+        agent, pilot = flock[i], flock[i].pilot
         own = misled(agent, ("sense",), time, plus(agent.state, agent.own), scenario.dimensions)
-        heard = [
-            Heard(h.who, place.beside(own, h.state), h.age)
-            for h in hear(scenario, seed, number, i, flock, said, time, place)
-        ]
-        rule = scenario.model.wall_reach
-        place.look = place.look if rule is None else answer(rule, "wall_reach", {"p": agent.p})
-        senses = Senses.of(place, course, own, time, seed, number, i)
-        made = decide(
-            scenario.model, agent.p, own, heard, place.surfaces(own.x, own.y, own.z), agent.memory,
-            time=time, period=period, index=i, percept=senses, shared=shared[i] if shared else None, wing=scenario.wing,
-            aero=scenario.aero,
+        near = hear(scenario, seed, number, i, flock, said, time, place)
+        made = pilot.decide(
+            own, time + ahead(agent, time), goal=course.of(i), time=time, only=near,
+            shared=shared[i] if shared else None,
         )  # fmt: skip
-        agent.rays = float(senses.rays)
+        agent.rays = float(pilot.senses.rays)
         x, y, z = made.command
         for suffering in agent.faults.values():
             stuck = suffering.asked("overrule", time, cx=x, cy=y, cz=z)
             x, y, z = (x, y, z) if stuck is None else stuck
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
-        agent.memory = made.memory
 
 
 def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> None:
@@ -248,15 +250,14 @@ def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
         answer(rule, "error", {"dx": error[c], "dv": error[3 + c], "g": g[c], "period": period, "s": s})
         for c in range(3)
     ]
-    return State(*(q for q, _ in steps), *(u for _, u in steps))
+    return State(*(dx for dx, _ in steps), *(dv for _, dv in steps))
 
 
 def hear(
     scenario: Scenario, seed: int, number: int, i: int, flock: list[Agent], said: list[State], time: float, place: Place
-) -> list[Heard]:
-    """Whom agent i hears at decision `number`: in range by true distance, not lost; on links, the newest packet."""
-    k, late = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt
-    found = []
+) -> set[int]:
+    """Hand the pilot of agent i the packets that arrive at decision `number`; returns who is in range, truly."""
+    k, late, found = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt, set()
     for j, other in enumerate(flock):
         if j == i or not other.present:
             continue
@@ -271,14 +272,11 @@ def hear(
         arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
             distance, k
         )
-        if k.kind == "constant":
-            if arrives and in_range and carries:
-                found.append(Heard(j, said[j], late + mine - theirs))
-            continue
-        if arrives and in_range and carries and linked(scenario, seed, number, pair, distance):
-            flock[i].packets[j] = (said[j], time - late + theirs)
-        if in_range and j in flock[i].packets:
-            found.append(extrapolated(j, *flock[i].packets[j], time + mine))
+        if in_range:
+            found.add(j)
+        arrives = arrives and in_range and carries
+        if arrives and (k.kind == "constant" or linked(scenario, seed, number, pair, distance)):
+            flock[i].pilot.hear(j, said[j], time - late + theirs, time + mine)
     return found
 
 
@@ -289,13 +287,6 @@ def linked(scenario: Scenario, seed: int, number: int, pair: int, distance: floa
     for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
         missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, period)
     return bool(random.uniform(random.words(seed, random.LINK, 0, number, pair)[0]) >= missed)
-
-
-def extrapolated(j: int, state: State, stamp: float, time: float) -> Heard:
-    """An old packet carried forward with its own velocity."""
-    age = time - stamp
-    x, y, z, vx, vy, vz = state
-    return Heard(j, State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz), age)
 
 
 # --------------------------------------------------------------------------------------------------------- motion

@@ -9,8 +9,7 @@ from importlib import import_module
 
 import pytest
 
-from airflock import atomic
-from airflock.engine import store
+from airflock import atomic, cache
 
 
 def child(action):
@@ -92,29 +91,29 @@ def test_a_link_is_followed_and_a_named_pipe_refused(tmp_path):
 @pytest.mark.parametrize("mode", [0o777, 0o775])
 def test_a_cache_that_others_may_write_is_not_used(tmp_path, monkeypatch, mode):
     base = tmp_path / "shared"
-    (base / store.DRIVERS).mkdir(parents=True)
+    (base / cache.DRIVERS).mkdir(parents=True)
     base.chmod(mode)
     monkeypatch.setenv("AIRFLOCK_CACHE", str(base))
-    assert "may be written by other users" in store.cache_trouble(base)
-    spare = store.cache_folder()
+    assert "may be written by other users" in cache.cache_trouble(base)
+    spare = cache.cache_folder()
     assert spare != base and spare.stat().st_mode & 0o077 == 0 and spare.name != f"airflock-{os.getuid()}"
 
 
 def test_a_cache_of_another_user_is_not_used(tmp_path):
     if os.geteuid() != 0:
         pytest.skip("only root can give a folder to another user")
-    (tmp_path / store.DRIVERS).mkdir()
-    os.chown(tmp_path / store.DRIVERS, 65534, 65534)
-    assert "is not a folder of this user's" in store.cache_trouble(tmp_path)
+    (tmp_path / cache.DRIVERS).mkdir()
+    os.chown(tmp_path / cache.DRIVERS, 65534, 65534)
+    assert "is not a folder of this user's" in cache.cache_trouble(tmp_path)
     os.chown(tmp_path, 65534, 65534)
-    assert "belongs to another user" in store.cache_trouble(tmp_path)
+    assert "belongs to another user" in cache.cache_trouble(tmp_path)
 
 
 def test_drivers_that_others_could_have_written_are_thrown_away(tmp_path):
-    inner = tmp_path / store.DRIVERS
+    inner = tmp_path / cache.DRIVERS
     (inner / ("0" * 20)).mkdir(parents=True)
     inner.chmod(0o777)
-    assert store.cache_trouble(tmp_path) == ""
+    assert cache.cache_trouble(tmp_path) == ""
     assert list(inner.iterdir()) == [] and inner.stat().st_mode & 0o777 == 0o700
 
 
@@ -122,16 +121,16 @@ def test_the_drivers_that_were_not_used_for_longest_go_first(tmp_path, monkeypat
     monkeypatch.setenv("AIRFLOCK_CACHE", str(tmp_path))
     now = time.time()
     for i in range(5):
-        folder = tmp_path / store.DRIVERS / f"{i:020x}"
+        folder = tmp_path / cache.DRIVERS / f"{i:020x}"
         folder.mkdir(parents=True)
         (folder / "a.py").write_bytes(bytes(1000))
         used = now - (10_000.0 * (5 - i) if i < 4 else 0.0)
         os.utime(folder, (used, used))
     (tmp_path / "studies").mkdir()
-    assert store.shrink(tmp_path, most=2500) == 3
-    assert sorted(path.name[-1] for path in (tmp_path / store.DRIVERS).iterdir()) == ["3", "4"]
-    assert store.shrink(tmp_path, most=0) == 1  # the one in use stays
-    assert store.clear_cache() == (1, 1000) and (tmp_path / "studies").is_dir()
+    assert cache.shrink(tmp_path, most=2500) == 3
+    assert sorted(path.name[-1] for path in (tmp_path / cache.DRIVERS).iterdir()) == ["3", "4"]
+    assert cache.shrink(tmp_path, most=0) == 1  # the one in use stays
+    assert cache.clear_cache() == (1, 1000) and (tmp_path / "studies").is_dir()
 
 
 COMMAND = [sys.executable, "-m", "airflock"]

@@ -21,7 +21,8 @@ from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
-from airflock.scenarios.files import load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 
 LIMIT = "r_min<1 at 2%"
 

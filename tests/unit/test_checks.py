@@ -20,7 +20,7 @@ from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import METRICS, SETS
 from airflock.models import vasarhelyi_2018, viragh_2014
 from airflock.models.vasarhelyi_2018 import Sums
-from airflock.scenarios.files import MODELS, find_model
+from airflock.scenarios.laws import MODELS, find_model
 from airflock.sensors.registry import SENSORS
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from airflock.metrics import registry
-from airflock.scenarios.files import MODELS
+from airflock.scenarios.laws import MODELS
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))

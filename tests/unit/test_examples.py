@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from airflock.models import formation
-from airflock.scenarios.files import MODELS, load
+from airflock.scenarios.files import load
+from airflock.scenarios.laws import MODELS
 from flocks import interpreted
 from reference.flight import fly_plainly
 

@@ -1,6 +1,8 @@
 """Fields from GeoJSON and KML: the same metres from both, true to the ellipsoid; what is wrong is one line each."""
 
 import json
+import math
+import random
 import re
 from pathlib import Path
 
@@ -13,7 +15,9 @@ from airflock.doors import TextError, xml
 from airflock.errors import ScenarioError
 from airflock.mavlink.coordinates import Site
 from airflock.recordings.scores import scenario_of
-from airflock.scenarios.files import load, make
+from airflock.scenarios import geometry
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 from airflock.scenes.outlines import ground_of
 
 FIELDS = Path(__file__).parents[1] / "fields"
@@ -170,3 +174,16 @@ def test_what_is_not_loaded_reads_no_file():
     flight = airflock.open(load("vasarhelyi_2018/4ms", FEW), 1, device="python")
     with pytest.raises(ScenarioError, match="and not here"):
         flight.change({"world.file": str(FIELDS / "field.kml")})
+
+
+@pytest.mark.parametrize("kind", ["scattered", "grid", "circle", "line"])
+def test_the_largest_extension_is_that_of_all_pairs(kind):
+    rng = random.Random(kind)
+    for count in (0, 1, 2, 3, 4, 5, 7, 12, 40) * 20:
+        points = {
+            "scattered": [(rng.uniform(-9.0, 9.0), rng.uniform(-9.0, 9.0)) for _ in range(count)],
+            "grid": [(float(rng.randint(-2, 2)), float(rng.randint(-2, 2))) for _ in range(count)],
+            "circle": [(math.cos(math.tau * k / count), math.sin(math.tau * k / count)) for k in range(count)],
+            "line": [(0.1 * k, 0.3 * k) for k in range(count)],
+        }[kind]
+        assert geometry.diameter(points) == max((math.dist(a, b) for a in points for b in points), default=0.0)

@@ -12,7 +12,8 @@ from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
-from airflock.scenarios.files import load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 
 
 def test_recipe_moves_the_way_of_table_s4_and_stays_inside_ranges():

@@ -14,7 +14,7 @@ from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.engine import law
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
-from airflock.scenarios.files import MODELS
+from airflock.scenarios.laws import MODELS
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
 

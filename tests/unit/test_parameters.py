@@ -20,7 +20,8 @@ from airflock.core.parameters import (
     quantity_fault,
 )
 from airflock.errors import ParameterError, ScenarioError
-from airflock.scenarios.files import MODELS, load
+from airflock.scenarios.files import load
+from airflock.scenarios.laws import MODELS
 from airflock.scenarios.sections import SECTIONS
 
 RECORDS = {

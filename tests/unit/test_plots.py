@@ -8,6 +8,7 @@ import imageio.v3 as iio
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
@@ -19,14 +20,15 @@ from airflock.plots import scene, style
 from airflock.plots.exposure import develop, exposure, light
 from airflock.plots.film_stage import Stage
 from airflock.plots.heatmap import heatmap
-from airflock.plots.rules import alignment, allowed_difference, repulsion, rules, wall_response
+from airflock.plots.responses import alignment, allowed_difference, repulsion, wall_response
+from airflock.plots.rules import rules
 from airflock.plots.save import PictureError, save_figure
 from airflock.plots.series import Pen, rotations, series
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
 from airflock.recordings.layout import dataset
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors
 
 RADIUS, PACE = 50.0, 4.0
@@ -259,8 +261,7 @@ def test_rules_of_any_model_are_drawn_vector_by_vector():
     apart, velocity = repulsion(found, parameters, r)
     assert np.allclose(apart.values, 1.0 / r) and not velocity.values.any()
     figure = rules(make({"agents": 3}, "own", law=found), difference=2.0)
-    assert len(figure.axes) == 3  # two panels, and velocities on an axis of their own
-    assert "m/s²" in figure.axes[0].get_ylabel()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["apart", "v"]  # a panel for each vector
 
 
 def test_transfer_functions_are_those_of_the_fitness():
@@ -523,8 +524,6 @@ def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given(kind):
     left, right = figure.subplots(1, 2)
     assert airflock.plot(flight(document=SQUARE), kind, ax=right) is figure
     assert not left.has_data() and right.has_data()
-    with pytest.raises(AirflockError, match="panels of its own"):
-        airflock.plot(flight(document=SQUARE), "series", ax=left)
 
 
 def test_a_chart_beside_a_video_moves_with_it():
@@ -537,3 +536,41 @@ def test_a_chart_beside_a_video_moves_with_it():
     assert stage.cursor.get_xdata() == [18.0, 18.0]
     with pytest.raises(RecordingError, match="this recording has"):
         Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="mood")
+
+
+def test_terms_are_drawn_in_the_words_of_the_law():
+    figure = rules(airflock.load("couzin_2002/torus"))
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["A  repulsion", "B  orientation", "C  attraction"]
+    p = airflock.load("couzin_2002/torus").parameters
+    close, along, towards = ([axes.lines[0].get_xdata(), axes.lines[0].get_ydata()] for axes in figure.axes)
+    assert np.allclose(close[1], close[0] < p.r_r)
+    assert np.allclose(along[1], (along[0] >= p.r_r) & (along[0] < p.r_r + p.dr_o))
+    far = (towards[0] >= p.r_r + p.dr_o) & (towards[0] < p.r_r + p.dr_o + p.dr_a)
+    assert np.allclose(towards[1], far) and figure.axes[2].lines[0].get_label() == "towards it"
+
+
+def test_words_for_vectors_that_are_not_there_are_refused():
+    broken = {**vars(vasarhelyi_2018), "TERMS": {"q": ("push", "m/s")}}
+    with pytest.raises(airflock.AirflockError, match="Sums has no field qx"):
+        airflock.model(broken, "broken")
+
+
+@pytest.mark.parametrize("kind", ["series", "rules", "transfer", "trajectories", "exposure"])
+def test_every_kind_of_picture_is_drawn_where_the_given_axes_are(kind):
+    figure = style.Picture(8.0, 6.0)
+    places = figure.subplots(2, 1)
+    what = "vasarhelyi_2018/4ms" if kind in ("rules", "transfer") else flight()
+    assert airflock.plot(what, kind, ax=places[1]) is figure
+    drawn = [axes for axes in figure.findobj(Axes) if axes not in places.tolist()] or [places[1]]
+    figure.draw_without_rendering()
+    upper = places[0].get_position().y0
+    for axes in drawn:
+        low, high = figure.transFigure.inverted().transform(axes.get_window_extent())[:, 1]
+        assert low >= -0.01 and high <= upper + 0.02
+    assert not places[0].lines and not places[0].images
+
+
+def test_a_picture_of_panels_needs_axes_of_a_grid():
+    figure = style.Picture(4.0, 4.0)
+    with pytest.raises(airflock.AirflockError, match="axes of a grid"):
+        airflock.plot("vasarhelyi_2018/4ms", "rules", ax=figure.add_axes((0.1, 0.1, 0.8, 0.8)))

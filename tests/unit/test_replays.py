@@ -1,5 +1,6 @@
 """Replays: positions packed and unpacked, and a page that holds everything that it needs."""
 
+import base64
 import hashlib
 import html
 import json
@@ -14,17 +15,27 @@ from hypothesis.extra.numpy import arrays
 
 import airflock
 from airflock.errors import RecordingError
-from airflock.replays.pack import pack, unpack
+from airflock.replays.pack import Packed, pack, unpack
+from airflock.stage.clusters import clusters
 
+MOTOR = {"kind": "motor", "agents": [7]}
 FRAMES = st.tuples(st.integers(1, 9), st.integers(2, 3), st.integers(1, 4))
 
 
 @given(FRAMES.flatmap(lambda shape: arrays(float, shape, elements=st.floats(-1e4, 1e4, width=32))))
 def test_unpacked_positions_lie_within_half_a_quantum(position):
     packed = pack(position)
-    away = np.abs(unpack(packed) - position).max(axis=(0, 2))
+    away = np.abs(unpack(packed)[0] - position).max(axis=(0, 2))
     assert (away <= 0.5 * np.array(packed.quantum) + 1e-9 * np.abs(position).max()).all()
     assert (np.array(packed.quantum) <= np.maximum(np.ptp(position, axis=(0, 2)) / 65535, 1e-12)).all()
+
+
+@given(st.integers(1, 9), st.integers(1, 4), st.integers(0, 3), st.integers(0, 2**32 - 1))
+def test_rows_of_bytes_are_kept_exactly(frames, agents, count, seed):
+    rng = np.random.default_rng(seed)
+    rows = list(rng.integers(0, 256, (count, frames, agents)).astype(np.uint8))
+    found = unpack(pack(rng.normal(size=(frames, 2, agents)), rows))[1]
+    assert len(found) == count and all((a == b).all() for a, b in zip(found, rows, strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -72,11 +83,45 @@ def test_names_cannot_break_out_of_the_page(recording):
     assert about(page)["name"] == "</script><b>@DATA@ & co" and "</script><b>" not in page.text
 
 
-def test_gaps_and_wrong_endings_are_one_line(recording, tmp_path):
+def shown(page):
+    """Rows of bytes of a page, by the names of its layers; at last, of a recording with gaps, who is there."""
+    told = about(page)
+    data = base64.b64decode(re.search(r'id="data">(.*?)</script>', page.text, re.S)[1])
+    rows = unpack(Packed(told["low"], told["quantum"], tuple(told["shape"]), data))[1]
+    return dict(zip([*(layer["name"] for layer in told["layers"]), "there"], rows, strict=False))
+
+
+def test_whoever_is_absent_is_not_shown_and_stays_where_it_was(recording):
     holes = recording.copy(deep=True)
-    holes["position"][3, 0, 0, 0] = np.nan
-    with pytest.raises(RecordingError, match="missing, first agent_0"):
-        airflock.replay(holes)
+    holes["position"][3:8, 0, 0, 0] = np.nan
+    holes["position"][:4, 1, 0, 2] = np.nan
+    page = airflock.replay(holes)
+    absent = shown(page)["there"] == 0
+    assert absent[3:8, 0].all() and absent[:4, 2].all() and absent.sum() == 9
+    assert not about(airflock.replay(recording))["layers"] or "there" not in shown(airflock.replay(recording))
+    assert None not in about(page)["charts"][0][1]
+
+
+def test_layers_hold_clusters_faults_groups_and_what_the_recording_knows_of_each():
+    given = {"agents": 12, "duration": 6.0, "groups": [{"agents": [4, 5], "name": "slow"}, {"name": "rest"}]}
+    scenario = airflock.load("vasarhelyi_2018/4ms", given)
+    recording = airflock.simulate(scenario, 1, events=[{"step": 200, "kind": "fault", "data": MOTOR}])
+    speed = np.sqrt((recording["velocity"] ** 2).sum("space")).isel(keypoint=0, drop=True)
+    page = airflock.replay(recording.assign(pace=speed), colour="pace")
+    told, rows = {layer["name"]: layer for layer in about(page)["layers"]}, shown(page)
+    assert rows["group"][0].tolist() == [1, 1, 1, 1, 0, 0, *[1] * 6] and told["group"]["names"] == ["slow", "rest"]
+    times = recording["time"].values
+    assert ((rows["fault"] == 0) == ((times >= 2.0)[:, None] & (np.arange(12) == 7))).all()
+    assert np.abs(rows["pace"] / 254 * np.ptp(speed.values) + speed.values.min() - speed.values).max() < 0.02
+    reach = scenario.measured_by().r_cluster
+    last = clusters(recording["position"].values[-1, :, 0].T, reach)
+    assert ((rows["cluster"][-1] == 255) == (last < 0)).all()
+    assert len(set(rows["cluster"][-1].tolist()) - {255}) == len(set(last.tolist()) - {-1})
+
+
+def test_unknown_colours_and_wrong_endings_are_one_line(recording, tmp_path):
+    with pytest.raises(RecordingError, match="colour = 'mood' is none that this recording knows: speed, heading"):
+        airflock.replay(recording, colour="mood")
     with pytest.raises(RecordingError, match="the only format written here"):
         airflock.replay(recording).save(tmp_path / "show.pdf")
 

@@ -8,7 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import AirflockError, ScenarioError
-from airflock.scenarios.files import load, make, presets
+from airflock.scenarios.files import load, presets
+from airflock.scenarios.making import make
 
 DOCUMENTS = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in presets().items()}
 SQUARE = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]

@@ -13,17 +13,20 @@ import airflock
 from airflock.errors import ScenarioError, StudioError
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
-from airflock.stage import colours
+from airflock.stage import colours, shades
+from airflock.stage.clusters import clusters
 from airflock.stage.scene import dart, stage_of, turned
+from airflock.stage.shades import Shade
 from airflock.studio import door, measures
 from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.controls import controls_of, span
-from airflock.studio.drawing import arrival
+from airflock.studio.drawing import Flock, arrival
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.perceiving import Perceiving
 from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
+from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Origin, Side, value_of
 
 PRESET = "vasarhelyi_2018/4ms"
@@ -205,13 +208,63 @@ def test_a_stage_holds_the_flock_and_what_stands_in_its_world(name):
     assert bool(stage.solids) == (name in ("vasarhelyi_2018/obstacles", "kidger/city"))
 
 
-@pytest.mark.parametrize("way", colours.WAYS)
-def test_colours_of_different_agents_differ(way):
+@pytest.mark.parametrize("way", shades.MOTION)
+def test_colours_of_different_motions_differ(way):
     velocity = np.array([[1.0, 0.0, 0.0], [0.0, 4.0, 0.0], [-2.0, 0.0, 0.0]])
     position = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [0.0, 0.0, 9.0]])
-    found = colours.colours(way, position, velocity, 4.0, (0.0, 10.0))
-    assert len({tuple(c) for c in found.tolist()}) == 3
-    assert way in colours.key(way, 4.0, (0.0, 10.0)) or way == "agent"
+    found = shades.of_motion(way, position, velocity, 4.0, (0.0, 10.0))
+    assert len({tuple(c) for c in found.tones.tolist()}) == 3
+    assert way in found.key
+
+
+@given(st.integers(1, 60), st.floats(0.0, 3.0), st.booleans(), st.integers(0, 2**32 - 1))
+def test_clusters_are_what_links_between_agents_join(count, distance, periodic, seed):
+    rng = np.random.default_rng(seed)
+    where = np.column_stack([rng.uniform(-5.0, 5.0, (count, 2)), np.zeros(count)])
+    off = where[:, None] - where[None]
+    if periodic:
+        off -= 10.0 * np.round(off / 10.0) * (1.0, 1.0, 0.0)
+    linked = np.linalg.norm(off, axis=2) < distance
+    for middle in range(count):  # Warshall's closure
+        linked |= linked[:, middle : middle + 1] & linked[middle]
+    linked[np.diag_indices(count)] = distance > 0.0
+    alone = linked.sum(axis=1) < 2
+    expected = np.where(alone, -1, linked.argmax(axis=1))
+    box = np.array([10.0, 10.0, 1e9]) if periodic else None
+    np.testing.assert_array_equal(clusters(where, distance, box), expected)
+
+
+GROUPS = [{"name": "slow", "agents": [0, 3], "model": {"v_flock": 3.0}}, {"name": "rest"}]
+
+
+def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers():
+    player = Player(PRESET, {**FEW, "groups": GROUPS}, 3)
+    player.flight.fault("motor", 5)
+    player.fly(30)
+    flock, shading = Flock(player.side, np.zeros(3)), Shading()
+    assert {"group", "fault", "cluster", "model.v_flock", "nearest agent"} <= set(ways([flock]))
+
+    def seen(way):
+        shading.way = way
+        return shading.of([flock], flock.velocity, 6.0, (0.0, 0.0))
+
+    assert seen("group").values.tolist() == [0, 1, 1, 0, *[1] * 8] and "slow" in seen("group").key
+    assert [k for k, v in enumerate(seen("fault").values) if v == 0] == [5] and "motor" in seen("fault").key
+    assert seen("model.v_flock").values.tolist() == [3.0, 4.0, 4.0, 3.0, *[4.0] * 8]
+    tones = seen("model.v_flock").tones
+    assert (tones[0] == tones[3]).all() and (tones[0] != tones[1]).any()
+    assert "3" in seen("model.v_flock").key and "m/s" in seen("model.v_flock").key
+    where = flock.position.astype(float)
+    apart = np.linalg.norm(where[:, None] - where, axis=2) + 1e9 * np.eye(12)
+    np.testing.assert_allclose(seen("nearest agent").values, apart.min(axis=0), rtol=1e-6)
+    assert (seen("cluster").values == clusters(where, player.scenario.measured_by().r_cluster)).all()
+
+
+def test_two_flocks_have_one_scale_and_one_list_of_names():
+    first = Shade("fault", "names", np.array([0, -1]), names=("motor",), told="sound")
+    second = Shade("fault", "names", np.array([1, 0]), names=("stuck", "motor"), told="sound")
+    both = together([first, second])
+    assert both.names == ("motor", "stuck") and both.values.tolist() == [0, -1, 0, 1]
 
 
 def test_only_the_token_or_its_cookie_opens_the_page():

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from airflock.certify.seeds import identity
 from airflock.errors import StudyError
 from airflock.evolve.race import ROUNDS
-from airflock.scenarios.files import load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 from airflock.tune import run as tuning
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
 from airflock.tune.run import tune

@@ -115,7 +115,7 @@ class Flyer:
 
     def __call__(self, batch: int, lineages: list[Lineage]) -> list[Falls]:
         """How the smallest distance fell in each flight; batch -1 is the start. Raises TimeOver."""
-        from airflock.engine.threads import in_threads
+        from airflock.threads import in_threads
 
         place = Batch("split", self.number, batch + 1)
         flown = {i: values for (i, _), values in self.store.flown(place).items() if values is not None}
@@ -166,7 +166,7 @@ def least_distances(positions: NDArray[Any]) -> NDArray[np.float64]:
 
 def _period(scenario: Scenario) -> float:
     """Time between two samples, s."""
-    from airflock.engine.tables import clock
+    from airflock.scenarios.timing import clock
 
     return float(clock(scenario)["sample_every"] * scenario.flight.dt)
 

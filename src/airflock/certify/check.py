@@ -16,7 +16,7 @@ from airflock.certify.seeds import COUNT, seed
 from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.folder import versions
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 
@@ -132,7 +132,7 @@ def _flown_again(
     document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
 ) -> list[str]:
     from airflock.engine.simulate import compile_for
-    from airflock.engine.threads import in_threads
+    from airflock.threads import in_threads
 
     wanted, every = document["check"]["digests"], int(document["check"]["every"])
     numbers = [every * i for i in range(len(wanted))]

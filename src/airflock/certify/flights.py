@@ -18,7 +18,7 @@ from airflock.evolve.executors.cluster import compiling, rebuild, worker_name
 from airflock.evolve.executors.here import land
 from airflock.evolve.folder import plain
 from airflock.evolve.space import with_parameters
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration

@@ -215,7 +215,7 @@ def executor_for(
         task = Task(campaign.scenario, campaign.limits, campaign.precision)
         return Cluster(None, scheduler, timeout=timeout, task=task)
     from airflock.engine.simulate import compile_for, takes_all_cores
-    from airflock.engine.threads import cores
+    from airflock.threads import cores
 
     score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)
     if campaign.device != "cpu":

@@ -18,7 +18,7 @@ from airflock.engine.simulate import plan_of
 from airflock.engine.tables import tables
 from airflock.metrics.registry import as_set
 from airflock.scenarios import checks
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 AGENTS, INSTANTS, FLIGHTS = 6, 5, 8

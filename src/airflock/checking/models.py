@@ -28,7 +28,7 @@ from airflock.core.contract import Model, model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
 from airflock.engine.simulate import fly, plan_of
-from airflock.scenarios.files import find_model
+from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario
 
 SCENES = 12  # random scenes that each symmetry is tried on

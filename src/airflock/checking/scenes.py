@@ -13,7 +13,7 @@ from airflock.checking.units import Units
 from airflock.core.agent import Heard, State, decide
 from airflock.core.contract import Model
 from airflock.core.vocabulary import Percept
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 AGENTS = 4  # in a flight

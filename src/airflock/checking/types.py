@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import airflock
 from airflock.atomic import write
+from airflock.cache import cache_trouble, usual_folder
 from airflock.checking.annotations import TypedCopy, typed_copy
 from airflock.doors import from_outside, read_text
-from airflock.engine.store import cache_trouble, usual_folder
 from airflock.errors import RuleError
 
 PACKAGE = Path(airflock.__file__).parent

@@ -23,6 +23,9 @@ CODE = {"law": "law", "trust": "trust"}
 LOADED = {"changes": "airflock.load(name, settings)", "agents": "airflock.load", "duration": "airflock.load"}
 LOADED |= {"law": "airflock.load", "trust": "airflock.load"}
 TABLE = {"as_json": "the value returned"}
+SEARCH = (
+    "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "start", "averages",
+)  # fmt: skip
 SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
 FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
 
@@ -51,7 +54,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
             "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
             "quiet": "watch", "trust": "trust",
-            **dict.fromkeys(("algorithm", "population", "generations", "seeds", "seed", "restarts"), "search_keys"),
+            **dict.fromkeys(SEARCH, "search_keys"),
         },
     ),
     "harden": Counterpart(
@@ -111,7 +114,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         "airflock.replay(recording)", "replay",
         {
             "what": "recording", "page": "airflock.replays.Replay.save", "seed": "airflock.simulate", "rate": "rate",
-            **LOADED,
+            "colour": "colour", **LOADED,
         },
     ),
     "display": Counterpart(
@@ -183,7 +186,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.validate("mine.toml")', "validate", {"files": "name", "changes": "settings", **CODE}
     ),
     "types": Counterpart('airflock.check_types("mine.py")', "check_types", {"files": "files", "out": "out", **TABLE}),
-    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.engine.store.clear_cache"}),
+    "doctor": Counterpart("airflock.doctor()", "doctor", {**TABLE, "clear": "airflock.cache.clear_cache"}),
 }  # fmt: skip
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (

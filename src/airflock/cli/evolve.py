@@ -18,6 +18,18 @@ def evolve(
     seeds: Annotated[int | None, typer.Option(help="Flights of a candidate.", show_default="1")] = None,
     seed: Annotated[int | None, typer.Option(help="Decides all chance of the study.", show_default="0")] = None,
     restarts: Annotated[int | None, typer.Option(help="Independent further runs.", show_default="0")] = None,
+    flights: Annotated[
+        str | None,
+        typer.Option(help="whole, or growing: from an eighth of a flight up to whole ones.", show_default="whole"),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(help="Where CMA-ES starts: middle of all ranges, or scenario (warm).", show_default="middle"),
+    ] = None,
+    averages: Annotated[
+        int | None,
+        typer.Option(help="Averages of the last means that also fly in the final.", show_default="0"),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")
@@ -55,6 +67,9 @@ def evolve(
         "seeds": seeds,
         "seed": seed,
         "restarts": restarts,
+        "flights": flights,
+        "start": start,
+        "averages": averages,
     }
     study = study_of(
         scenario,

@@ -87,7 +87,7 @@ def doctor(
     Example: airflock doctor
     """
     if clear:
-        from airflock.engine.store import clear_cache, usual_folder
+        from airflock.cache import clear_cache, usual_folder
 
         count, size = clear_cache()
         if as_json:

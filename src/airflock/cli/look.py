@@ -106,6 +106,9 @@ def replay(
     ),
     seed: Seed = 0,
     rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Frames per second that are kept at most.")] = 10.0,
+    colour: Annotated[
+        str, typer.Option(metavar="NAME", help="By speed, heading, agent, cluster, group, fault or a variable.")
+    ] = "speed",
     changes: options.Set = None,
     law: options.Law = None,
     trust: options.Trust = False,
@@ -114,13 +117,13 @@ def replay(
 ) -> None:
     """Write a flight as one HTML file that plays in any browser, from disk and without network.
 
-    Example: airflock replay flight.nc --html show.html
+    Example: airflock replay flight.nc --html show.html --colour cluster
     """
     options.writable((page, PAGES))
     from airflock.plots.picture import flight_of
     from airflock.replays import replay as make_replay
 
     recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
-    made = make_replay(recording, rate=rate)
+    made = make_replay(recording, rate=rate, colour=colour)
     made.save(page)
     tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

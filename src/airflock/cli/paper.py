@@ -49,7 +49,7 @@ def paper(
 
 def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]) -> None:
     """Every paper in its small form, against the committed verdicts."""
-    from airflock.engine.store import cache_folder
+    from airflock.cache import cache_folder
     from airflock.errors import AirflockError
     from airflock.papers import quick as tier
 

@@ -3,15 +3,15 @@
 Checked once, when it is made: a law that asks for what a drone does not have is refused then, never in flight.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from airflock.core import random
 from airflock.core.agent import Decision, Heard, State, answer, decide, first_memory
 from airflock.core.contract import Body, Model
-from airflock.core.maths import norm
+from airflock.core.maths import FAR, norm
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import could_be_near
 from airflock.core.vocabulary import Percept, asks
@@ -20,8 +20,15 @@ from airflock.errors import RuleError
 EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by two clocks that differ
 
 
+Vector = tuple[float, float, float]
+STILL: Vector = (0.0, 0.0, 0.0)
+
+
 class World(Protocol):
     """What a pilot asks of the world: `world.place.Place` answers from a map."""
+
+    def beside(self, own: State, other: State, /) -> State:
+        """State of another agent at its image nearest to own: itself wherever space is not periodic."""
 
     def surfaces(self, x: float, y: float, z: float, /) -> Iterable[tuple[float, float, float, float]]:
         """Distance (m) and unit normal of every wall and obstacle."""
@@ -41,19 +48,30 @@ class Hearing:
 
     extrapolate : carry them forward with their own velocity to the moment of the decision
     forget      : age (s) beyond which they say nothing; the rule of silence has its own
+    once        : they say something at the one decision after they came, as over a radio of one constant delay
+    early       : how far (s) in the future they may seem to be, by two clocks that differ
+    in_order    : believe stamps: what is older than what is known says nothing
     """
 
     extrapolate: bool = True
     forget: float = 5.0
+    once: bool = False
+    early: float = EARLY
+    in_order: bool = True
+
+    @classmethod
+    def simulated(cls, links: bool) -> "Hearing":
+        """As a simulated agent hears: packets of one constant delay count once, those of links until the next one."""
+        return cls(extrapolate=links, forget=FAR, once=not links, early=FAR, in_order=False)
 
 
 class Packet:
-    """The newest state of one neighbour, and when it held, s."""
+    """The newest state of one neighbour, when it held (s), and how many decisions there were before it came."""
 
-    __slots__ = ("sent_at", "state")
+    __slots__ = ("came", "sent_at", "state")
 
-    def __init__(self, state: State, sent_at: float):
-        self.state, self.sent_at = state, sent_at
+    def __init__(self, state: State, sent_at: float, came: int):
+        self.state, self.sent_at, self.came = state, sent_at, came
 
     def carried(self, now: float) -> State:
         """The state carried forward with its own velocity."""
@@ -62,20 +80,28 @@ class Packet:
         return State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz)
 
 
+def level(state: State) -> State:
+    """A state in the plane."""
+    x, y, _, vx, vy, _ = state
+    return State(x, y, 0.0, vx, vy, 0.0)
+
+
 class Senses(Percept):
     """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
 
     place: World
     at: State
     asker: tuple[int, int, int]
+    rays: int
 
     @classmethod
     def of(
-        cls, place: World, own: State, time: float, goal: tuple[float, float, float], asker: tuple[int, int, int]
-    ) -> "Senses":
-        """Percept at a position; goal: offset to it (m); asker: seed, number of the decision, index of the agent."""
-        found = cls(time, -own.x, -own.y, -own.z, *goal)
-        found.place, found.at, found.asker = place, own, asker
+        cls, place: World, own: State, time: float, goal: Vector | None = None, asker: tuple[int, int, int] = (0, 0, 0)
+    ) -> Self:
+        """Percept at a position; goal: where it is (m), if there is one; asker: seed, number of decision and agent."""
+        offset = STILL if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
+        found = cls(time, -own.x, -own.y, -own.z, *offset)
+        found.place, found.at, found.asker, found.rays = place, own, asker, 0
         return found
 
     def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
@@ -83,7 +109,8 @@ class Senses(Percept):
         return self.place.ray(*self.at[:3], ux, uy, uz, length)
 
     def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance of a sphere of this radius along the unit vector u, at most length, m."""
+        """Free distance of a sphere of this radius along the unit vector u, at most length, m; counted in `rays`."""
+        self.rays += 1
         return self.place.cast(*self.at[:3], ux, uy, uz, length, radius)
 
     def normal(self, draw: int) -> float:
@@ -108,6 +135,8 @@ class Pilot:
     silence  : the rule for neighbours that are lost; None: they are forgotten, as in a simulation without it
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
+    wing, aero : parameters of the wing and of drag descent, for laws that ask for them
+    told     : the law decides for the whole flock; somebody who knows all states tells `decide` what it found
 
     Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
     """
@@ -115,19 +144,22 @@ class Pilot:
     def __init__(
         self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
         body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
-        wing: Any = None,
+        wing: Any = None, aero: Any = None, told: bool = False,
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
-        self.hearing, self.silence, self.flat, self.seed, self.wing = hearing or Hearing(), silence, flat, seed, wing
-        self.body, self.b = body, b
+        self.hearing, self.silence, self.flat, self.seed = hearing or Hearing(), silence, flat, seed
+        self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
         self.memory = first_memory(model)
         self.packets: dict[int, Packet] = {}
         self.decisions = 0
+        self.senses: Percept | None = None
         self._check()
 
     def _check(self) -> None:
         """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
-        if self.model.flock is not None or "shared" in asks(self.model.decide, "decide", self.model.name):
+        if not self.told and (
+            self.model.flock is not None or "shared" in asks(self.model.decide, "decide", self.model.name)
+        ):
             raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
         if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
             raise RuleError(
@@ -137,11 +169,10 @@ class Pilot:
             raise RuleError(f"period = {self.period:g} s between two decisions is not positive")
         own, other = State(0.0, 0.0, 0.0, 1.0, 0.5, 0.0), State(7.0, -3.0, 0.0, -0.5, 1.0, 0.0)
         walls = [(5.0, 1.0, 0.0, 0.0), *self.place.surfaces(0.0, 0.0, 0.0)]
+        record: Any = self.model.Shared
+        shared = None if record is None else record(*(0.0 for _ in record._fields))
         for near in ([], [Heard(self.index + 1, other, 0.0)]):
-            made = decide(
-                self.model, self.p, own, near, walls, self.memory, time=0.0, period=self.period, index=self.index,
-                percept=Senses.of(self.place, own, 0.0, (0.0, 0.0, 0.0), (self.seed, 0, self.index)), wing=self.wing,
-            )  # fmt: skip
+            made = self._decided(own, near, walls, 0.0, Senses.of(self.place, own, 0.0), shared)
             setpoint = self.setpoint(own, made.command)
             if not all(map(isfinite, setpoint)):
                 raise RuleError(f"{self.model.name} commands {setpoint}, which is no velocity")
@@ -149,11 +180,11 @@ class Pilot:
     def hear(self, who: int, state: State, sent_at: float, now: float) -> bool:
         """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan."""
         known = self.packets.get(who)
-        if who == self.index or not all(map(isfinite, state)) or not sent_at <= now + EARLY:
+        if who == self.index or not all(map(isfinite, state)) or not sent_at <= now + self.hearing.early:
             return False
-        if known is not None and sent_at <= known.sent_at:
+        if known is not None and self.hearing.in_order and sent_at <= known.sent_at:
             return False
-        self.packets[who] = Packet(state, sent_at)
+        self.packets[who] = Packet(state, sent_at, self.decisions)
         return True
 
     def forget(self, who: int) -> None:
@@ -162,12 +193,12 @@ class Pilot:
 
     def heard(self, now: float) -> list[Heard]:
         """All neighbours whose data are fresh enough, by their number."""
-        found = []
+        found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            if age <= self.hearing.forget:
-                state = packet.carried(now) if self.hearing.extrapolate else packet.state
-                found.append(Heard(who, state._replace(z=0.0, vz=0.0) if self.flat else state, age))
+            if age <= rule.forget and not (rule.once and packet.came < self.decisions):
+                state = packet.carried(now) if rule.extrapolate else packet.state
+                found.append(Heard(who, level(state) if self.flat else state, age))
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
@@ -175,37 +206,61 @@ class Pilot:
         if self.silence is None:
             return False
         for packet in self.packets.values():
-            s = packet.state
+            s = self.place.beside(own, packet.state)
             distance = norm(s.x - own.x, s.y - own.y, 0.0 if self.flat else s.z - own.z)
             if could_be_near(distance, now - packet.sent_at, self.silence) > 0.5:
                 return True
         return False
 
     def decide(
-        self, own: State, now: float, percept: Percept | None = None, goal: tuple[float, float, float] | None = None
-    ) -> Decision:
-        """Velocity to fly at (m/s) from the own state as measured, and the law's new memory.
+        self, own: State, now: float, percept: Percept | None = None, goal: Vector | None = None, *,
+        time: float | None = None, only: Container[int] | None = None, shared: Any = None,
+    ) -> Decision:  # fmt: skip
+        """The law's command from the own state as measured, and its new memory; zero where `silence` stops a velocity.
 
-        now     : time of the flight, s
+        now     : by the own clock, s
         percept : of a real range finder; without it the map answers
         goal    : where the law is to go, m; without one its offset is zero
+        time    : of the flight (s), if that is not the own clock's
+        only    : neighbours that count, by their number, where somebody knows who is in sight; None: all that are heard
+        shared  : what a law for the whole flock found for this agent
         """
         if self.flat:
-            own = own._replace(z=0.0, vz=0.0)
-        offset = (0.0, 0.0, 0.0) if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
-        percept = percept or Senses.of(self.place, own, now, offset, (self.seed, self.decisions, self.index))
-        made = decide(
-            self.model, self.p, own, self.heard(now), self.place.surfaces(own.x, own.y, own.z), self.memory, time=now,
-            period=self.period, index=self.index, percept=percept, wing=self.wing,
-        )  # fmt: skip
+            own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
+        time = now if time is None else time
+        self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
+        near = [
+            Heard(heard.who, self.place.beside(own, heard.state), heard.age)
+            for heard in self.heard(now)
+            if only is None or heard.who in only
+        ]
+        made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
         self.memory = made.memory
-        velocity = self.setpoint(own, made.command)
-        if self.lost_near(own, now):
-            velocity = (0.0, 0.0, 0.0)
-        return Decision((velocity[0], velocity[1], 0.0) if self.flat else velocity, made.memory)
+        stops = self.model.command == "velocity" and self.lost_near(own, now)
+        x, y, z = STILL if stops else made.command
+        return Decision((x, y, 0.0) if self.flat else (x, y, z), made.memory)
 
-    def setpoint(self, own: State, command: tuple[float, float, float]) -> tuple[float, float, float]:
+    def _decided(
+        self, own: State, near: list[Heard], walls: Iterable[tuple[float, float, float, float]], time: float,
+        percept: Percept, shared: Any,
+    ) -> Decision:  # fmt: skip
+        return decide(
+            self.model, self.p, own, near, walls, self.memory, time=time, period=self.period, index=self.index,
+            percept=percept, shared=shared, wing=self.wing, aero=self.aero,
+        )  # fmt: skip
+
+    def steer(self, own: State, now: float, goal: Vector | None = None) -> Vector:
+        """Velocity (m/s) to ask an autopilot for: what the law decides now, through its body; zero where it stops."""
+        made = self.decide(own, now, goal=goal)
+        if self.flat:
+            own = level(own)
+        if self.model.command != "velocity" and self.lost_near(own, now):
+            return STILL
+        x, y, z = self.setpoint(own, made.command)
+        return (x, y, 0.0) if self.flat else (x, y, z)
+
+    def setpoint(self, own: State, command: Vector) -> Vector:
         """A law's command as a velocity, m/s: itself, or where its body would be at the next decision, in still air."""
         if self.model.command == "velocity":
             return command

@@ -15,9 +15,9 @@ from airflock.engine.moments import Snapshot, Window
 from airflock.engine.onsets import onsets
 from airflock.engine.simulate import finish, opened
 from airflock.engine.state import State
-from airflock.engine.threads import in_background
 from airflock.errors import FlightError
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_background
 
 
 class Course:

@@ -17,8 +17,8 @@ from airflock.engine.plan import Plan
 from airflock.engine.state import State
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
-from airflock.engine.threads import heed
 from airflock.errors import RuleError
+from airflock.threads import heed
 
 
 @dataclass(frozen=True)

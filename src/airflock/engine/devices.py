@@ -9,10 +9,11 @@ import numpy as np
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
 from airflock.engine.plan import Plan
-from airflock.engine.tables import clock, tables
-from airflock.engine.threads import cores
+from airflock.engine.tables import tables
 from airflock.errors import DeviceError, ScenarioError
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
+from airflock.threads import cores
 
 DEVICES = ("auto", "cpu", "cuda", "python")
 PAIR = 1.5e-9  # s that one core takes for one pair of agents (2 cores of 2023, single precision)

@@ -2,7 +2,7 @@
 
 from numba.core.event import Event, Listener
 
-from airflock.engine.threads import heed
+from airflock.threads import heed
 
 
 class Heeding(Listener):  # type: ignore[misc]  # Numba has no types

@@ -12,8 +12,8 @@ from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.engine.beginnings import NEVER
 from airflock.engine.state import State
-from airflock.engine.tables import clock
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from airflock.world import edges
 
 

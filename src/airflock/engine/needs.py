@@ -11,9 +11,9 @@ from airflock.engine.cuda.memory import most_below
 from airflock.engine.passes import grid
 from airflock.engine.plan import Plan
 from airflock.engine.state import lanes
-from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 
 SMALL = 2**28  # bytes that are not worth a look at what is free
 SHARE = 0.9  # of the free memory that one flight may take

@@ -1,88 +1,56 @@
-"""Place: the world around one agent in plain Python, its surfaces, edges, rays, casts and goals, outside a driver."""
+"""Place: the world around one agent in plain Python, its edges and what appears in it, and goals, outside a driver."""
 
 import math
-from collections.abc import Iterator
+from copy import copy
 from typing import Any
 
-from airflock.core import random
 from airflock.core.agent import State, answer
+from airflock.core.contract import Model
 from airflock.core.maths import FAR
-from airflock.core.vocabulary import Percept
-from airflock.engine.plan import EDGES, arena_ray, arena_surfaces
-from airflock.engine.tables import faces, unbuilt
+from airflock.engine.plan import EDGES
+from airflock.engine.tables import unbuilt
 from airflock.scenarios.scenario import Scenario
-from airflock.world import arena, bvh, edges, goals, polygon, rays
+from airflock.world import bvh, goals
 from airflock.world.inside import inside
-from airflock.world.place import edge_rows, half_sizes, middle, obstacle_rule, raised
+from airflock.world.place import Place as Map
+from airflock.world.place import Shapes
 
 
-class Place:
-    """The world of a scenario: its surfaces, edges and rays, and how far outside a position is."""
+class Place(Map):
+    """The world of a flight: the map that a drone carries, with what happens in it: edges act, shapes appear."""
 
     def __init__(self, scenario: Scenario):
-        world = scenario.world
-        functions, self.beyond = arena_surfaces(world)
-        self.clear, self.edge, self.dims = arena_ray(world), EDGES[world.edges], scenario.dimensions
-        rows, counts = faces(scenario)
-        families = [function for function, count in zip(functions, counts, strict=False) for _ in range(count)]
-        self.walls = list(zip(families, rows, strict=True))
-        self.half = half_sizes(scenario.world)
-        self.edges, self.corners, self.obstacles = edge_rows(world)
-        self.obstacle, self.middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
-        stands = scenario.stands()
+        stands, self.edge, self.dims = scenario.stands(), EDGES[scenario.world.edges], scenario.dimensions
         shapes, later = unbuilt(stands)
-        self.scene = shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()
-        self.later, self.clearance, self.meshed = (
-            later.tolist(),
-            scenario.start.clearance,
-            scenario.scene.kind == "mesh",
-        )
-        self.casts = scenario.model.sight is not None  # polygons are part of the scene then
-        rule = scenario.model.wall_reach
-        self.look = FAR if rule is None else answer(rule, "wall_reach", {"p": scenario.parameters})
-        self.flat = world.arena == "polygon" and world.edges != "periodic"
+        super().__init__(
+            scenario.world, Shapes(shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()),
+            look=reach_of_walls(scenario.model, scenario.parameters), casts=scenario.model.sight is not None,
+        )  # fmt: skip
+        self.later, self.clearance = later.tolist(), scenario.start.clearance
+        self.meshed = scenario.scene.kind == "mesh"
 
-    def surfaces(self, x: float, y: float, z: float) -> Iterator[arena.Surface]:
-        """Distance and normal of every wall and every obstacle, as seen from a position."""
-        for function, row in self.walls:
-            yield function(x, y, z, *row)
-        if self.flat:
-            yield from self.sides(x, y, z)
-        for first, last in self.obstacles if not self.casts else ():
-            yield self.obstacle(x, y, z, self.edges, first, last)
-        for ground in (0.0, 1.0)[: self.dims - 1]:
-            found = bvh.nearest_of(x, y, z, self.look, ground, *self.scene)
-            if found.distance < self.look:
-                yield found
+    @property
+    def shapes(self) -> Any:
+        """Rows of all shapes, as they stand now."""
+        return self._scene[0]
 
-    def sides(self, x: float, y: float, z: float) -> Iterator[arena.Surface]:
-        """Distance and normal of the sides of a polygonal arena that act on a position."""
-        for e in range(self.corners):
-            found = polygon.wall(x, y, z, self.edges, e, self.corners, self.look)
-            if found.distance < self.look:
-                yield found
-        found = polygon.outside(x, y, z, self.edges, self.corners)
-        if found.distance < 0.0:
-            yield found
-
-    def excursion(self, x: float, y: float, z: float) -> float:
-        """Distance outside the arena or inside an obstacle, m; negative where flying is allowed."""
-        out: float = self.beyond(x, y, z - self.middle, *self.half, self.edges, self.corners)
-        for first, last in self.obstacles:
-            out = max(out, -self.obstacle(x, y, z, self.edges, first, last).distance)
-        return float(max(out, -bvh.nearest(x, y, z, 1e8, *self.scene).distance))
+    def seen(self, look: float) -> "Place":
+        """The same world, shapes that appear and all, for an agent to whom shapes say something up to `look`, m."""
+        found = copy(self)
+        found._look = look
+        return found
 
     def roomy(self, x: float, y: float, z: float) -> bool:
         """Whether an agent may start here: inside the arena, at start.clearance from what stands in the scene."""
-        if self.scene[0] and bvh.nearest(x, y, z, self.clearance, *self.scene).distance < self.clearance:
+        if self.shapes and bvh.nearest(x, y, z, self.clearance, *self._scene).distance < self.clearance:
             return False
-        if self.meshed and inside(x, y, z, *self.scene) > 0.5:
+        if self.meshed and inside(x, y, z, *self._scene) > 0.5:
             return False
         return self.excursion(x, y, z) <= 0.0
 
     def touches(self, a: State, b: State, radius: float) -> float:
         """1.0 if a sphere of this radius (m) met the scene on its way from a to b."""
-        return float(bvh.touches(*a[:3], *b[:3], radius, *self.scene)) if self.scene[0] else 0.0
+        return float(bvh.touches(*a[:3], *b[:3], radius, *self._scene)) if self.shapes else 0.0
 
     def appear(self, time: float, flock: list[State]) -> None:
         """Let stand what is due, unless an agent is in its place."""
@@ -90,49 +58,22 @@ class Place:
             if 0.0 <= row[6] <= time:
                 gaps = [bvh.beside(s.x, s.y, s.z, [row], 0) for s in flock]
                 if min(gaps) > self.clearance**2:
-                    self.scene[0][int(row[7])][:6] = row[:6]
+                    self.shapes[int(row[7])][:6] = row[:6]
                     row[6] = -1.0
-
-    def image(self, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
-        """Offset to the nearest image in a periodic box; elsewhere the offset itself."""
-        if self.edge is not edges.wrap:
-            return dx, dy, dz
-        x, y, z = (edges.nearest_image(d, half) for d, half in zip((dx, dy, dz), self.half, strict=True))
-        return x, y, z
-
-    def beside(self, own: State, other: State) -> State:
-        """State of another agent at the image that is nearest to own."""
-        dx, dy, dz = self.image(other.x - own.x, other.y - own.y, other.z - own.z)
-        return other if self.edge is not edges.wrap else State(own.x + dx, own.y + dy, own.z + dz, *other[3:])
 
     def settled(self, state: State) -> State:
         """State after the edges of the arena have acted on it."""
         if self.edge is None:
             return state
         edge: Any = self.edge
-        moved = [edge(state[c], state[3 + c], self.half[c]) for c in range(self.dims)]
+        moved = [edge(state[c], state[3 + c], self._half[c]) for c in range(self.dims)]
         pad = (0.0,) * (3 - self.dims)
         return State(*(x for x, _ in moved), *pad, *(v for _, v in moved), *pad)
 
-    def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float) -> float:
-        """Free distance (m) along a unit vector to walls and obstacles."""
-        free: float = self.clear(x, y, z - self.middle, ux, uy, uz, *self.half, self.edges, self.corners)
-        if self.obstacle is polygon.prism:
-            solid = [polygon.ray_to_prism(x, y, z, ux, uy, uz, self.edges, a, b) for a, b in self.obstacles]
-        else:
-            solid = [rays.to_edges(x, y, ux, uy, self.edges, a, b) for a, b in self.obstacles]
-        nearest: float = min([free, *solid])
-        return float(bvh.cast(x, y, z, ux, uy, uz, nearest, 0.0, *self.scene))
 
-    def cast(self, at: State, u: tuple[float, float, float], length: float, radius: float) -> float:
-        """Free distance (m), at most length, of a sphere along a unit vector to walls and the scene."""
-        free = length
-        if self.clear is not rays.to_nothing:
-            sides = (1e8, 1e8) if self.flat else (self.half[0] - radius, self.half[1] - radius)
-            up = self.half[2] - radius if self.dims == 3 else 1e8
-            rule = rays.to_box if self.flat else self.clear
-            free = min(free, rule(*at[:2], at[2] - self.middle, *u, *sides, up, self.edges, 0))
-        return float(bvh.cast(*at[:3], *u, free, radius, *self.scene)) if self.casts else free
+def reach_of_walls(model: Model, p: Any) -> float:
+    """How far (m) a law with these parameters looks for what stands in the world."""
+    return FAR if model.wall_reach is None else float(answer(model.wall_reach, "wall_reach", {"p": p}, model.name))
 
 
 class Course:
@@ -178,9 +119,12 @@ class Course:
         pairs = zip(self.starts, self.points, strict=True)
         self.own = [[goals.glide(a, b, time, self.duration) for a, b in zip(*pair, strict=True)] for pair in pairs]  # type: ignore[call-arg]
 
-    def of(self, agent: int) -> Any:
-        """Where the goal of an agent is."""
-        return self.own[agent] if self.given.kind == "own" else self.at
+    def of(self, agent: int) -> tuple[float, float, float] | None:
+        """Where the goal of an agent is, m; None without goals."""
+        if not self.points:
+            return None
+        x, y, z = self.own[agent] if self.given.kind == "own" else self.at
+        return x, y, z
 
     def values(self) -> dict[str, Any]:
         """What is reported of it."""
@@ -188,45 +132,3 @@ class Course:
             return {}
         count = float(len(self.points))
         return {"goals_reached": float(self.number), "goals": count, "time_to_goal": self.times}
-
-
-class Senses(Percept):
-    """A Percept whose rays and random numbers are those of a flight."""
-
-    place: Place
-    own: State
-    asker: tuple[int, int, int]
-    rays: int
-
-    @classmethod
-    def of(
-        cls, place: Place, course: Course, own: State, time: float, seed: int, decision: int, agent: int
-    ) -> "Senses":
-        """What one agent perceives at one decision."""
-        goal = [a - b for a, b in zip(course.of(agent), own, strict=False)] if course.points else [0.0] * 3
-        found = cls(time, -own.x, -own.y, -own.z, *goal)
-        found.rays = 0
-        found.place, found.own, found.asker = place, own, (seed, decision, agent)
-        return found
-
-    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
-        """Free distance along the unit vector u, at most length, m."""
-        return min(length, self.place.ray(*self.own[:3], ux, uy, uz))
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance of a sphere of this radius (m) along the unit vector u, at most length, m."""
-        self.rays += 1
-        return self.place.cast(self.own, (ux, uy, uz), length, radius)
-
-    def normal(self, draw: int) -> float:
-        """Normal random number of this agent and decision."""
-        words = self._words(draw)
-        return float(random.normal_pair(words[0], words[1])[0])
-
-    def uniform(self, draw: int) -> float:
-        """Uniform random number of this agent and decision."""
-        return float(random.uniform(self._words(draw)[0]))
-
-    def _words(self, draw: int) -> Any:
-        seed, decision, agent = self.asker
-        return random.words(seed, random.MODEL, 0, decision, agent, draw)

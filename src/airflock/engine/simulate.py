@@ -15,12 +15,13 @@ from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
 from airflock.engine.probe import probe, probe_fault, probe_sensor
 from airflock.engine.state import State
-from airflock.engine.tables import clock, tables
-from airflock.engine.threads import in_threads
+from airflock.engine.tables import tables
 from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.places import start_fault
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
+from airflock.scenarios.timing import clock
+from airflock.threads import in_threads
 from airflock.world.place import half_sizes
 
 

@@ -2,27 +2,20 @@
 
 The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler and the
 processor. What runs is always the text that was generated, never a file's; compiled code is loaded only under a seal
-(`engine.sealed`), from a folder that belongs to the user alone. `AIRFLOCK_CACHE` names another place than the user's
-cache folder.
+(`engine.sealed`), from a folder that belongs to the user alone (`airflock.cache`).
 """
 
-import atexit
 import hashlib
 import os
 import platform
-import re
-import shutil
-import stat
 import sys
-import tempfile
-import time
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
 
 from airflock import atomic
+from airflock.cache import DRIVERS, cache_folder, shrink, spare
 
 
 @cache
@@ -44,56 +37,6 @@ def toolchain() -> str:
     )
 
 
-ROOM = 20_000_000  # bytes that must be free for a driver and its compiled code
-MOST = 500_000_000  # bytes of all drivers; beyond it the ones that were not used for longest go
-IN_USE = 3600.0  # s since its last use in which no driver is removed
-DRIVERS = "drivers"
-
-
-def cache_folder() -> Path:
-    """Folder for what is kept between runs; one of this process alone if the usual place is full or not safe to use."""
-    base = usual_folder()
-    return base if not cache_trouble(base) else _spare()
-
-
-def usual_folder() -> Path:
-    """The place that the environment names, or the user's cache folder."""
-    named = os.environ.get("AIRFLOCK_CACHE")
-    return Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "airflock"
-
-
-def cache_trouble(base: Path) -> str:
-    """Why a folder cannot keep compiled code; empty if it can. It is made if it is missing."""
-    try:
-        base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = base.stat()
-        if found.st_uid not in (0, os.geteuid()):
-            return f"{base} belongs to another user"
-        if found.st_mode & 0o022 and not found.st_mode & stat.S_ISVTX:
-            return f"{base} may be written by other users"
-        (base / DRIVERS).mkdir(mode=0o700, exist_ok=True)
-        inner = os.lstat(base / DRIVERS)
-        if not stat.S_ISDIR(inner.st_mode) or inner.st_uid != os.geteuid():
-            return f"{base / DRIVERS} is not a folder of this user's"
-        if inner.st_mode & 0o077:
-            if inner.st_mode & 0o022:  # others may have put code there
-                _empty(base / DRIVERS)
-            (base / DRIVERS).chmod(0o700)
-        with tempfile.TemporaryFile(dir=base / DRIVERS):
-            return "" if shutil.disk_usage(base).free > ROOM else f"{base} has less than {ROOM / 1e6:.0f} MB free"
-    except OSError as fault:
-        return f"{base} cannot be written: {fault.strerror or fault}"
-
-
-@cache
-def _spare() -> Path:
-    """A folder of this process alone, whose name nobody can guess; it goes when the process ends."""
-    folder = Path(tempfile.mkdtemp(prefix="airflock-"))
-    (folder / DRIVERS).mkdir(mode=0o700)
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
 _loading = Lock()
 
 
@@ -111,7 +54,7 @@ def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
     try:
         path = _written(cache_folder() / DRIVERS / digest, label, text)
     except OSError:  # filled up since it was looked at
-        path = _written(_spare() / DRIVERS / digest, label, text)
+        path = _written(spare() / DRIVERS / digest, label, text)
     module = ModuleType(name)
     module.__file__ = str(path)
     sys.modules[name] = module
@@ -133,46 +76,3 @@ def _written(folder: Path, label: str, text: str) -> Path:
     if new:
         shrink(folder.parent.parent)
     return path
-
-
-def drivers(base: Path) -> list[tuple[float, int, Path]]:
-    """Last use (s since 1970), bytes and folder of every driver, those of version 0.1 included; the oldest first."""
-    found = []
-    for parent in (base, base / DRIVERS):
-        for folder in parent.iterdir() if parent.is_dir() else ():
-            if re.fullmatch("[0-9a-f]{20}", folder.name) and folder.is_dir() and not folder.is_symlink():
-                size = 0
-                for path in folder.rglob("*"):
-                    with suppress(OSError):  # removed meanwhile
-                        size += path.lstat().st_size
-                with suppress(OSError):
-                    found.append((folder.stat().st_mtime, size, folder))
-    return sorted(found)
-
-
-def shrink(base: Path, most: int = MOST) -> int:
-    """Remove the drivers that were not used for longest until all take less than `most` bytes; how many."""
-    known, count = drivers(base), 0
-    total = sum(size for _, size, _ in known)
-    for used, size, folder in known:
-        if total <= most or time.time() - used < IN_USE:
-            break
-        shutil.rmtree(folder, ignore_errors=True)
-        total, count = total - size, count + 1
-    return count
-
-
-def clear_cache() -> tuple[int, int]:
-    """Remove all drivers; how many there were, and their bytes. Studies behind papers stay."""
-    known = drivers(usual_folder())
-    for _, _, folder in known:
-        shutil.rmtree(folder, ignore_errors=True)
-    return len(known), sum(size for _, size, _ in known)
-
-
-def _empty(folder: Path) -> None:
-    for path in folder.iterdir():
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink()

@@ -11,6 +11,7 @@ from airflock.engine.onsets import Onset, onsets, row_values
 from airflock.engine.plan import WHOLE, Plan
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, Clock, Geometry
+from airflock.scenarios.timing import clock
 from airflock.scenes.tree import Scene
 from airflock.scenes.tree import scene as make_scene
 from airflock.world.arena import heights_of
@@ -55,21 +56,6 @@ class Tables:
         """The same world with other integers, by their names in `plan.WHOLE`."""
         known = dict(zip(WHOLE, self.whole.tolist(), strict=True))
         return replace(self, whole=np.array([(known | whole)[name] for name in WHOLE], np.int64))
-
-
-def clock(scenario: Scenario) -> dict[str, int]:
-    """All times of a scenario in motion steps."""
-    dt, q = scenario.flight.dt, scenario.measured_by()
-    decide_every = max(1, round(scenario.sensors.period / dt))
-    delay = round(scenario.radio.delay / dt)
-    return {
-        "steps": round(scenario.flight.duration / dt),
-        "decide_every": decide_every,
-        "sample_every": max(1, round(q.period / dt)),
-        "collide_every": round((q.collision_period or dt) / dt),
-        "delay": delay,
-        "ring": delay // decide_every + 2,
-    }
 
 
 def extents(scenario: Scenario) -> tuple[float, float, float]:

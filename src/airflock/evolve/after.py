@@ -102,7 +102,8 @@ def conclude(
     first = study.objectives[0]
     names = [objective.name for objective in study.objectives]
     table = tables.candidates(store, names)
-    sound = tables.best_first(table, first.name, first.maximise)
+    whole = tables.whole_flights(table, study.search.flights == "growing")
+    sound = tables.best_first(whole, first.name, first.maximise)
     if not len(sound):
         reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
         raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
@@ -128,7 +129,7 @@ def conclude(
         folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
         float(sound[first.name].iloc[0]), origins[i],
         {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
-        len(good), len(table), len(table) - len(sound), shown, dead(study, list(flown.values())),
+        len(good), len(table), int(table[first.name].isna().sum()), shown, dead(study, list(flown.values())),
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead:

@@ -11,7 +11,7 @@ from airflock.evolve.search import Watch
 from airflock.evolve.space import Space, declared
 from airflock.evolve.steps import Measured, Step, measured
 from airflock.evolve.study import Study, make_study
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 

@@ -11,14 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+INSIDE = 0.01  # a start on a bound lies on the edge of what pycma's smooth transformation reaches
 MIDDLE, SIXTH = 0.5, 1.0 / 6.0  # Methods, "Fitness function", last paragraph
 
 
 class CMAES:
     """Ask for a generation of points in the unit cube, tell their losses (candidate, 1)."""
 
-    def __init__(self, dimension: int, population: int, seed: int, sigma: float = SIXTH):
-        """`seed` decides all random numbers; no generator is shared with anybody."""
+    def __init__(
+        self,
+        dimension: int,
+        population: int,
+        seed: int,
+        sigma: float = SIXTH,
+        start: NDArray[np.float64] | None = None,
+    ):
+        """Start at a point (axis,) of the cube, by default its middle.
+
+        `seed` decides all random numbers; no generator is shared with anybody.
+        """
         import cma
 
         self.dimension = dimension
@@ -34,7 +45,10 @@ class CMAES:
         # pycma knows no single dimension: a second coordinate goes along that nobody looks at
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            self.strategy: Any = cma.CMAEvolutionStrategy([MIDDLE] * max(dimension, 2), sigma, options)
+            first = [MIDDLE] * max(dimension, 2)
+            if start is not None:
+                first[:dimension] = np.clip(start, INSIDE, 1.0 - INSIDE).tolist()
+            self.strategy: Any = cma.CMAEvolutionStrategy(first, sigma, options)
         self.asked: list[Any] = []
 
     def ask(self) -> NDArray[np.float64]:

@@ -25,7 +25,8 @@ ADVICE = {
 def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[float | None]) -> None:
     """Raise StudyError once a search has seen one value only; what it is and why, in one line.
 
-    values : first objective of every candidate so far
+    generation : number of the generation, of those with whole flights, from 0
+    values     : first objective of every candidate so far that flew a whole flight
     """
     found = [value for value in values if value is not None]
     last = generation + 1 == study.whole("generations")

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.evolve.cmaes import CMAES
+from airflock.evolve.cmaes import CMAES, SIXTH
 
 ALGORITHMS = ("cmaes", "ga", "nsga2", "nsga3")
 SEVERAL = ("nsga2", "nsga3")  # for several objectives
@@ -24,10 +24,19 @@ class Optimiser(Protocol):
         """Mean of the search's distribution (axis,), if it has one."""
 
 
-def optimiser(algorithm: str, dimension: int, objectives: int, population: int, seed: int) -> Optimiser:
-    """A fresh optimiser."""
+def optimiser(
+    algorithm: str,
+    dimension: int,
+    objectives: int,
+    population: int,
+    seed: int,
+    *,
+    spread: float = SIXTH,
+    start: NDArray[np.float64] | None = None,
+) -> Optimiser:
+    """A fresh optimiser; CMA-ES starts with a standard deviation `spread` at the point `start`, else in the middle."""
     if algorithm == "cmaes":
-        return CMAES(dimension, population, seed)
+        return CMAES(dimension, population, seed, spread, start)
     from airflock.evolve.genetic import GeneticSearch
     from airflock.evolve.nondominated import Nondominated
 

@@ -19,7 +19,7 @@ def draw(study: Study, store: Store, result: Result, folder: Path) -> list[Path]
 
     first = study.objectives[0]
     names = [objective.name for objective in study.objectives]
-    table = tables.candidates(store, names)
+    table = tables.whole_flights(tables.candidates(store, names), study.search.flights == "growing")
     units = {axis.key: axis.unit for axis in study.space.axes}
     bounds = {axis.key: (axis.low, axis.high) for axis in study.space.axes}
     name = study.scenario.name

@@ -194,7 +194,7 @@ def executor_for(
 
         return Cluster(study, scheduler, timeout=timeout)
     from airflock.engine.simulate import compile_for, takes_all_cores
-    from airflock.engine.threads import cores
+    from airflock.threads import cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
     compile_for(study.scenario, precision=int(study.search.precision))

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from airflock.errors import StudyError
 from airflock.evolve.executors import Executor, Flight
 from airflock.evolve.fitness import losses
+from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
+from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
+from airflock.evolve.tables import DURATION
 
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
 
@@ -78,28 +81,69 @@ def total_flights(study: Study) -> int:
 
 
 def search(study: Study, store: Store, executor: Executor, watch: Watch | None = None) -> list[NDArray[np.float64]]:
-    """Run a study to its end, or to Ctrl-C; returns the final mean (axis,) of each run whose algorithm has one."""
+    """Run a study to its end, or to Ctrl-C.
+
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its last means if asked for.
+    """
     tally = Tally(total_flights(study), watch)
     centres: list[NDArray[np.float64]] = []
-    seen: list[float | None] = []
     for run in range(study.whole("restarts") + 1):
-        seed = (study.whole("seed") << 16) + run
-        shape = (len(study.space.axes), len(study.objectives), study.population(run))
-        state = optimiser(study.search.algorithm, *shape, seed)
-        for generation in range(study.whole("generations")):
-            tally.run, tally.generation = run, generation
-            batch = Batch("search", run, generation)
-            points = _asked(store, batch, state.ask())
-            rows = evaluate(study, store, executor, batch, points, tally.note)
-            state.tell(points, losses(rows, study.objectives))
-            tally.generation_over([row[0] for row in rows], study.objectives[0].maximise)
-            seen += [row[0] for row in rows]
-            if run == 0:
-                refuse_flat(study, store, generation, seen)
-        centre = state.centre()
-        if centre is not None:
-            centres.append(np.clip(centre, 0.0, 1.0))
+        means = _run(study, store, executor, run, tally)
+        centres += [means[-1], *averaged(means, study.whole("averages"))] if means else []
     return centres
+
+
+def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally) -> list[NDArray[np.float64]]:
+    """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
+    first = study.objectives[0]
+    state = optimiser(
+        study.search.algorithm, len(study.space.axes), len(study.objectives), study.population(run),
+        (study.whole("seed") << 16) + run, spread=study.search.spread, start=_start(study),
+    )  # fmt: skip
+    length = Length(study.whole("generations"), first.maximise, growing=study.search.flights == "growing")
+    means: list[NDArray[np.float64]] = []
+    seen: list[float | None] = []
+    whole = 0
+    for generation in range(study.whole("generations")):
+        tally.run, tally.generation = run, generation
+        batch = Batch("search", run, generation)
+        points = _asked(store, batch, state.ask())
+        given = [{**study.space.parameters(point), **shortened(study, length)} for point in points]
+        rows = evaluate(study, store, executor, batch, points, tally.note, parameters=given)
+        state.tell(points, losses(rows, study.objectives))
+        values = [row[0] for row in rows]
+        centre = state.centre()
+        if length.whole:
+            tally.generation_over(values, first.maximise)
+            seen += values
+            if run == 0:
+                refuse_flat(study, store, whole, seen)
+            whole += 1
+            means += [] if centre is None else [np.clip(centre, 0.0, 1.0)]
+        length.generation_over(values)
+    return means
+
+
+def shortened(study: Study, length: Length) -> dict[str, float]:
+    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
+    return {} if length.whole else {DURATION: length.share * study.scenario.flight.duration}
+
+
+def averaged(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+    """Average (axis,) of the last half of all means, of the last quarter, and so on, as many as asked for.
+
+    On a plateau a mean wanders by chance; the average of many wanders less (Polyak & Juditsky 1992).
+    """
+    spans = (max(1, len(means) >> (k + 1)) for k in range(windows))
+    return [np.mean(means[-span:], axis=0) for span in spans]
+
+
+def _start(study: Study) -> NDArray[np.float64] | None:
+    """Where the optimiser starts: None for the middle, or the scenario's own numbers."""
+    if study.search.start == "middle":
+        return None
+    known = declared(study.scenario)
+    return study.space.point({key: float(known[key][1] or 0.0) for key in study.space.keys})
 
 
 def _asked(store: Store, batch: Batch, points: NDArray[np.float64]) -> NDArray[np.float64]:

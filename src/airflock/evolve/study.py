@@ -10,67 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from airflock import __version__
-from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
 from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.bounds import usual_space
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_objectives
-from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
+from airflock.evolve.search_table import SEED_BITS, Search, search_faults
 from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
 from airflock.scenarios import formats, schema
 from airflock.scenarios.files import load, tells_of_study
 from airflock.scenarios.scenario import Scenario
 
-S6 = "Vásárhelyi et al. 2018, Table S6"
 KEYS = ("title", "scenario", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
-SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
-
-
-@dataclass(frozen=True, kw_only=True)
-class Search(Record):
-    """How a study searches: the table [search]."""
-
-    algorithm: str = choice(
-        "cmaes",
-        ALGORITHMS,
-        source=S6,
-        meaning="CMA-ES; a binary genetic algorithm; NSGA-II or NSGA-III (Pareto fronts)",
-    )
-    population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates of a generation")
-    generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations of a run")
-    seeds: float = quantity(
-        1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights of a candidate"
-    )
-    random_numbers: str = choice(
-        "fresh",
-        ("fresh", "generation", "study"),
-        source="our choice",
-        meaning="flights' seeds: new for each candidate, common to a generation, or common to the whole study",
-    )
-    restarts: float = quantity(
-        0, "1", low=0, high=1000, source="our choice", meaning="independent further runs after the first"
-    )
-    growth: float = quantity(
-        1.0,
-        "1",
-        low=1.0,
-        high=16.0,
-        source="our choice; Auger & Hansen 2005 take 2",
-        meaning="factor by which each restart enlarges the population",
-    )
-    seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
-    precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
-    top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
-    pool: float = quantity(
-        200, "1", low=0, high=1e6, source="our choice", meaning="candidates that race for the top; 0: the luckiest win"
-    )
-    final_seeds: float = quantity(
-        100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"
-    )
 
 
 @dataclass(frozen=True)
@@ -215,7 +168,7 @@ def make_study(
         found, more = schema.check("search", table, Search)
     faults += more
     if found is not None:
-        faults += _search_faults(found, len(objectives))
+        faults += search_faults(found, len(objectives), space)
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     return Study(scenario, space, objectives, found, str(document.get("title", "")), notes=tuple(notes))
@@ -230,33 +183,6 @@ def _scenario(
         raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
     beside = folder / named if folder is not None else None
     return load(beside if beside is not None and is_file(beside) else named, {**keys, **settings}, trust=trust)
-
-
-def _search_faults(search: Search, objectives: int) -> list[str]:
-    faults = [
-        f"search.{name} = {value:g} is not a whole number"
-        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds")
-        if (value := getattr(search, name)) != int(value)
-    ]
-    if search.algorithm in SEVERAL and objectives < 2:
-        faults.append(
-            f"search.algorithm = '{search.algorithm}' is for several objectives, but there is one; "
-            "give objective.maximise a list"
-        )
-    if search.algorithm not in SEVERAL and objectives > 1:
-        faults.append(
-            f"search.algorithm = '{search.algorithm}' takes one objective, but there are {objectives}; "
-            f"give one, or search.algorithm = 'nsga2'"
-        )
-    populations = [round(search.population * search.growth**run) for run in range(min(int(search.restarts), 20) + 1)]
-    odd = [population for population in populations if population % 2]
-    if search.algorithm == "ga" and odd:
-        grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
-        faults.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
-    flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
-    if flights * search.seeds >= 2 ** (SEED_BITS - 4):
-        faults.append(f"search: {flights * search.seeds:g} flights are more than a study can number")
-    return faults
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:

@@ -12,6 +12,8 @@ from airflock.doors import FormatError, from_outside, json_value
 from airflock.errors import StudyError
 from airflock.evolve.store import Store, values_of
 
+DURATION = "duration"  # key of the scenario that short flights set, column of their table
+FLOWN = "duration_flown"  # that column beside `duration`, the time that a flight took
 KEY = ["stage", "run", "generation", "candidate"]
 
 
@@ -32,7 +34,10 @@ def candidates(store: Store, objectives: Sequence[str], stage: str = "search") -
 
 
 def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
-    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions."""
+    """One row a flight: parameters by key, seed, order parameters, why it failed, duration (s), worker, versions.
+
+    A flight of another length than the scenario's tells it as `duration_flown` (s, simulated).
+    """
     rows = store.rows(
         "SELECT f.stage, f.run, f.generation, f.candidate, f.repeat, f.seed, c.parameters, f.scores, f.reason, "
         "f.duration, f.worker, s.versions FROM flight f JOIN candidate c USING (stage, run, generation, candidate) "
@@ -46,7 +51,8 @@ def flights(store: Store, stage: str | None = None) -> pd.DataFrame:
         about = {"reason": reason, "duration": duration, "worker": worker, "versions": versions}
         with from_outside(f"{store.path}: a flight of {' '.join(map(str, key))}", StudyError):
             values = {name: v for name, v in values_of(scores or "{}").items() if not isinstance(v, list)}
-            found.append({**place, **values_of(parameters), **values, **about})
+            given = {FLOWN if key == DURATION else key: value for key, value in values_of(parameters).items()}
+            found.append({**place, **given, **values, **about})
     return pd.DataFrame(found)
 
 
@@ -86,3 +92,8 @@ def best_first(table: pd.DataFrame, objective: str, maximise: bool) -> Any:
     """Candidates without the failed ones, the best first; of equals the earlier."""
     sound = table[table[objective].notna()]
     return sound.sort_values(objective, ascending=not maximise, kind="stable")
+
+
+def whole_flights(table: pd.DataFrame, growing: bool) -> pd.DataFrame:
+    """Candidates that flew as long as the scenario says; those of a search's short flights compare with each other."""
+    return table[table[DURATION].isna()] if growing and DURATION in table else table

@@ -45,8 +45,8 @@ class Ether:
     def _late(self, to: int, now: float) -> float:
         return sum(self._dice.uniform(0.0, f.amount) for f in self._of("jitter", to, now))
 
-    def _of(self, kind: str, to: int, now: float) -> list[Fault]:
-        return [f for f in self._faults if f.kind == kind and f.holds(self._members[to], now)]
+    def _of(self, kind: str, to: int, now: float) -> Sequence[Fault]:
+        return self._faults and [f for f in self._faults if f.kind == kind and f.holds(self._members[to], now)]
 
     def deliver(self, now: float, at: Sequence[Vector]) -> Iterator[tuple[int, bytes]]:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""

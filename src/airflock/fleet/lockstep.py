@@ -5,18 +5,19 @@ At each motion step: telemetry and packets that are due arrive, nodes whose tick
 
 import hashlib
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.parameters import number_names
 from airflock.core.sensing import Sensing
+from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
-from airflock.fleet.vehicle import OURS, PILOT, Vector, Vehicle
+from airflock.fleet.vehicle import OURS, PILOT, Vehicle
 from airflock.mavlink import orders
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do, Order
@@ -48,6 +49,7 @@ class Fleet:
         self._every = max(1, round(card.period / self._dt))
         self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.log = 0, [], []  # type: ignore[var-annotated]
+        self._noise = OuterNoise(seed, len(card.members), not card.flat)
         self.vehicles = [self._vehicle(i) for i in range(len(card.members))]
         self.nodes = [
             Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
@@ -69,24 +71,11 @@ class Fleet:
         card, b = self.card, self.scenario.body
         side = max(1, round(len(card.members) ** 0.5))
         at = (4.0 * (i % side) - 2.0 * (side - 1), 4.0 * (i // side) - 2.0 * (side - 1), 0.0)
-        draw = self._draws(i) if "noise" in number_names(b) and b.noise > 0.0 else lambda step: (0.0, 0.0, 0.0)
+        noisy = "noise" in number_names(b) and b.noise > 0.0
+        draw = partial(self._noise, drone=i) if noisy else lambda step: (0.0, 0.0, 0.0)
         made = Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
         made.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
         return made
-
-    def _draws(self, i: int) -> Callable[[int], Vector]:
-        """Outer noise of a drone at a motion step: the numbers that the simulated agent draws."""
-        three = not self.card.flat
-
-        def draw(step: int) -> Vector:
-            words = random.words(self.seed, random.OUTER, 0, step if three else step // 2, i)
-            four = (*random.normal_pair(words[0], words[1]), *random.normal_pair(words[2], words[3]))
-            if three:
-                return four[0], four[1], four[2]
-            x, y = four[:2] if step % 2 == 0 else four[2:]
-            return x, y, 0.0
-
-        return draw
 
     def _begin(self, start: Sequence[State]) -> None:
         """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""

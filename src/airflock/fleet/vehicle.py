@@ -9,6 +9,7 @@ and brakes GUID_TIMEOUT after the last setpoint.
 import math
 import struct
 from collections.abc import Callable
+from operator import itemgetter
 from typing import Any
 
 from airflock.core.agent import State
@@ -42,6 +43,7 @@ GIVEN = (*(letter + axis for letter in "vmcgw" for axis in "xyz"), "dt", "b", "m
 SINK = 1.0  # m/s, of a landing
 
 Vector = tuple[float, float, float]
+STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Vehicle:
@@ -71,7 +73,9 @@ class Vehicle:
         for name in asks(body.move, "move", body.name):
             if name not in GIVEN:
                 raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
-        self._asked = tuple(GIVEN.index(name) for name in asks(body.move, "move", body.name))
+        asked = asks(body.move, "move", body.name)
+        self._take = itemgetter(*map(GIVEN.index, asked))
+        self._measures = not {"mx", "my", "mz"}.isdisjoint(asked)
         self._old = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
         self.frozen: State | None = None  # a navigation that stands still, if it does
@@ -85,7 +89,8 @@ class Vehicle:
         """Own state with the error of its navigation."""
         if self.frozen is not None:
             return self.frozen
-        return State(*(a + e for a, e in zip(self.state, self.error, strict=True)))
+        (x, y, z, vx, vy, vz), (ex, ey, ez, eu, ev, ew) = self.state, self.error
+        return State(x + ex, y + ey, z + ez, vx + eu, vy + ev, vz + ew)
 
     def frame_origin(self) -> bytes:
         """GPS_GLOBAL_ORIGIN, as it is told when it is asked for."""
@@ -264,13 +269,14 @@ class Vehicle:
             self.state = State(*self.state[:3], 0.0, 0.0, 0.0)
             self.memory = type(self.memory)() if self.memory is not None else None
             return
-        s, c = self.state, self.wish()
-        command = c if self.motor else (s.vx, s.vy, s.vz - 5.0)
-        known = (*s[3:], *self.measured[3:], *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
-        moved = self.body.move(*(known[k] for k in self._asked))
+        (x, y, z, vx, vy, vz), c = self.state, self.wish()
+        command = c if self.motor else (vx, vy, vz - 5.0)
+        measured = self.measured[3:] if self._measures else STILL
+        known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
+        moved = self.body.move(*self._take(known))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
-        vx, vy, vz = s[3:] if self._old else velocity
-        self.state = State(s.x + vx * dt, s.y + vy * dt, s.z + vz * dt, *velocity)
+        ux, uy, uz = (vx, vy, vz) if self._old else velocity
+        self.state = State(x + ux * dt, y + uy * dt, z + uz * dt, *velocity)
         if self.state.z <= 0.0 and c[2] <= 0.0:
-            self.state = State(self.state.x, self.state.y, 0.0, 0.0, 0.0, 0.0)
+            self.state = State(self.state.x, self.state.y, 0.0, *STILL)
             self.armed = self.armed and self.mode not in (LAND, RTL)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from airflock.identify.logs import Logs
 from airflock.recordings.flights import simulate
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -16,7 +16,8 @@ from airflock.identify import body, packets, periods, sensors
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
-from airflock.scenarios.files import loaded, make
+from airflock.scenarios.files import loaded
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors import langevin
 

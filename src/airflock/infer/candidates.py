@@ -18,7 +18,9 @@ from airflock.engine.state import State
 from airflock.engine.tables import tables
 from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
-from airflock.scenarios.files import MODELS, load, make, presets
+from airflock.scenarios.files import load, presets
+from airflock.scenarios.laws import MODELS
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.world.place import half_sizes
 

@@ -22,7 +22,7 @@ from airflock.infer.predictive import Check, posterior
 from airflock.infer.tracks import Scale, Tracks, scale_of, tracks_of
 from airflock.recordings.files import load_recording
 from airflock.recordings.imports.load import load_tracks
-from airflock.scenarios.files import make
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
 Array = NDArray[np.float64]

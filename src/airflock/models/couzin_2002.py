@@ -20,6 +20,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
 
 COMMAND = "heading"
+TERMS = {"r": ("repulsion", ""), "o": ("orientation", ""), "a": ("attraction", "")}
 USUAL = {"fov_deg": 360.0}
 TABLE = "Couzin et al. 2002, Table 1"
 

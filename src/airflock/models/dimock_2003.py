@@ -33,6 +33,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
+TERMS = {"c": ("cohesion", "m"), "a": ("avoidance", "m; pairwise: m/s")}
 VIOLATES = {
     "rotation": "forward is along x, in a frame that flies along (wing.frame)",
     "units": "Eq. 4 takes the direction of a weighted offset, be it ever so short; below 1e-6 m its guard shows",

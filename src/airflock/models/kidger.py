@@ -30,6 +30,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
+TERMS = {"s": ("separation", ""), "a": ("alignment", "m/s"), "c": ("cohesion", "m")}
 VIOLATES = {
     "rotation": "the spiral of rays that looks for a way out begins on a fixed side",
     "mirror": "the spiral of rays turns one way",

@@ -28,6 +28,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 COMMAND = "acceleration"
+TERMS = {"c": ("cohesion", "m"), "s": ("separation", "1/m; printed: m"), "a": ("alignment", "m/s")}
 VIOLATES = {
     "units": "the program smooths by clip(9 dt, 0.15, 0.4), 9 per second; as printed, weights turn metres into newtons",
 }

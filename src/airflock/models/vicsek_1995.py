@@ -19,6 +19,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
 
 COMMAND = "heading"
+TERMS = {"": ("heading of the neighbour", "")}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -95,13 +95,14 @@ class Card:
         found = self.fence.sides(own.x, own.y)
         return found + [(s.distance, s.nx, s.ny, s.nz) for s in self.place.solids(*self.law_state(own)[:3])]
 
-    def outside(self, own: State) -> float:
-        """Distance beyond the fence or its heights, m; negative inside."""
-        return max(self.fence.outside(own.x, own.y), own.z - self.high)
+    def outside(self, x: float, y: float, z: float) -> float:
+        """Distance of a local position beyond the fence or its heights, m; negative inside."""
+        return max(self.fence.outside(x, y), z - self.high)
 
     def law_state(self, own: State) -> State:
         """A local state as the law counts heights: from the arena's centre, or from the ground of a scene."""
-        return own if self.document["shapes"].get("shapes") else own._replace(z=own.z - self.height)
+        x, y, z, vx, vy, vz = own
+        return own if self.document["shapes"].get("shapes") else State(x, y, z - self.height, vx, vy, vz)
 
 
 def hash_of(document: Mapping[str, Any]) -> str:
@@ -218,7 +219,7 @@ def _geometry_faults(card: Card) -> list[str]:
             f"m and fence.high = {card.high:g} m"
         )
     for x, y in _outline(world):
-        if card.outside(State(x, y, card.height, 0.0, 0.0, 0.0)) > 1e-6:
+        if card.outside(x, y, card.height) > 1e-6:
             faults.append(f"fence: does not hold the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
     if world.edges != "open":

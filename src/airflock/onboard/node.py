@@ -174,7 +174,7 @@ class Node:
 
     def _goal_outside(self) -> bool:
         goal = self.operator.goal
-        return goal is None or self.card.outside(State(*goal, 0.0, 0.0, 0.0)) > 0.0 or goal[2] < self.card.low
+        return goal is None or self.card.outside(*goal) > 0.0 or goal[2] < self.card.low
 
     def _enter(self, to: Phase, event: str, now: float, out: Out) -> None:
         """Change the phase, and do what belongs to it once."""
@@ -271,7 +271,7 @@ class Node:
         at = self.card.law_state(own)
         try:
             told = None if goal is None else self.card.law_state(State(*goal, 0.0, 0.0, 0.0))[:3]
-            x, y, z = self.pilot.decide(at, now, goal=told).command
+            x, y, z = self.pilot.steer(at, now, told)
         except (AirflockError, ArithmeticError, ValueError, TypeError, IndexError) as fault:
             self._failed = True
             self._notes.append(f"the law failed: {type(fault).__name__}: {fault}")

@@ -11,6 +11,7 @@ from airflock.onboard.mission import AIR, FLOCKING, Phase
 FRESH = 2.0  # s; a peer whose last status is younger is heard
 AGES = 10  # packets whose ages tell of a clock
 BEYOND = 100.0  # m; a member may be this far beyond the fence and still be believed
+PHASES = frozenset(map(int, Phase))
 REASONS = ("mission", "card", "phase", "fast", "far", "jump", "time")
 
 
@@ -23,16 +24,8 @@ class Peer:
         self.heard_at = -1e9
         self.ages: deque[float] = deque(maxlen=AGES)
         self.other_card = False
-
-    @property
-    def phase(self) -> Phase:
-        """Phase of its mission as it told it."""
-        return Phase.BOOT if self.status is None else Phase(self.status.phase)
-
-    @property
-    def state(self) -> State | None:
-        """Its state as told."""
-        return None if self.status is None else State(*self.status.position, *self.status.velocity)
+        self.phase = Phase.BOOT  # of its mission as it told it
+        self.state: State | None = None  # as it told it
 
     def flies(self) -> bool:
         """Whether it is in the air, by its last word."""
@@ -46,6 +39,7 @@ class Peers:
         self._card = card
         self.all = {who: Peer() for who in card.members if who != member}
         self.refused = dict.fromkeys(REASONS, 0)
+        self._hash = bytes.fromhex(card.hash)[:4]
         self.joined = False
 
     def take(self, who: int, status: Status, at: float, now: float) -> bool:
@@ -58,6 +52,7 @@ class Peers:
             return False
         was = peer.phase
         peer.status, peer.at, peer.heard_at, peer.other_card = status, at, now, False
+        peer.phase, peer.state = Phase(status.phase), State(*status.position, *status.velocity)
         peer.ages.append(now - at)
         self.joined = self.joined or (was not in FLOCKING and peer.phase in FLOCKING)
         return True
@@ -67,20 +62,22 @@ class Peers:
         card, s = self._card, self._card.safety
         if status.mission != card.mission:
             return "mission"
-        if status.card != bytes.fromhex(card.hash)[:4]:
+        if status.card != self._hash:
             return "card"
-        if status.phase not in Phase.__members__.values():
+        if status.phase not in PHASES:
             return "phase"
-        if sqrt(sum(v * v for v in status.velocity)) > 2.0 * s.speed_max + s.climb_max:
+        x, y, z = status.position
+        vx, vy, vz = status.velocity
+        if sqrt(vx * vx + vy * vy + vz * vz) > 2.0 * s.speed_max + s.climb_max:
             return "fast"
-        own = State(*status.position, *status.velocity)
-        if card.outside(own) > BEYOND or own.z < -BEYOND:
+        if card.outside(x, y, z) > BEYOND or z < -BEYOND:
             return "far"
         last = self.all[who]
         if not -s.clock_spread <= now - at <= card.delay + s.clock_spread:
             return "time"
         if last.status is not None and at - last.at < 2.0:
-            step = max(abs(a - b) for a, b in zip(last.status.position, status.position, strict=True))
+            px, py, pz = last.status.position
+            step = max(abs(px - x), abs(py - y), abs(pz - z))
             if step > 2.0 * s.speed_max * max(at - last.at, 0.0) + s.jump + 3.0 * status.accuracy:
                 return "jump"
         return ""

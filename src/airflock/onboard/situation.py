@@ -58,8 +58,8 @@ def _own_misses(card: Card, wire: Wire, now: float) -> list[str]:
     s, found, own = card.safety, [], wire.state
     if own is None or now - wire.state_at > s.stale:
         found.append("no own position from the autopilot")
-    elif card.outside(own) > 0.0:
-        found.append(f"the drone is {card.outside(own):.0f} m outside the fence: is the card's site right?")
+    elif card.outside(*own[:3]) > 0.0:
+        found.append(f"the drone is {card.outside(*own[:3]):.0f} m outside the fence: is the card's site right?")
     elif wire.disagreement(now) > s.jump:
         found.append(f"local and global position of the autopilot differ by {wire.disagreement(now):.0f} m")
     if wire.origin is None:
@@ -137,7 +137,7 @@ def facts(
     few_for = timers("few", peers.heard(now) < expected, now)
     deaf_for = timers("deaf", bool(flying) and not fresh, now)
     clock_for = timers("clock", clock_bad, now)
-    out = own is not None and phase in FLY and card.outside(own) > 0.0
+    out = own is not None and phase in FLY and card.outside(*own[:3]) > 0.0
     near = [p.state for p in fresh.values() if p.state is not None]
     neighbour_near = own is not None and any(apart(own, other) < s.near for other in near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time

@@ -8,11 +8,11 @@ from typing import Any
 import pandas as pd
 
 from airflock.engine.simulate import score_flights
-from airflock.engine.threads import in_threads
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.change import remade
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_threads
 
 Progress = Callable[[str, int, int], None]  # title, flights done, flights in all
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.engine.store import cache_folder
+from airflock.cache import cache_folder
 from airflock.evolve.after import Result
 from airflock.evolve.folder import STUDY, open_folder
 from airflock.evolve.run import executor_for, run

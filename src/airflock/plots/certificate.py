@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from airflock.certify.certificate import Certificate
 
 
-def certificate(found: "Certificate") -> Figure:
+def certificate(found: "Certificate", *, ax: Axes | None = None) -> Figure:
     """Upper bounds by flights, smallest distances, tolerances of the environment, and a map of two of its numbers.
 
     Panels without data are left out.
@@ -27,13 +27,14 @@ def certificate(found: "Certificate") -> Figure:
         draws.append(_tolerances)
     if found.over:
         draws.append(_map)
-    figure = style.Picture(3.6 * len(draws) + 0.4, 3.2)
-    for axes, draw, name in zip(figure.subplots(1, len(draws), squeeze=False)[0], draws, "ABCD", strict=False):
+    figure, panels = style.panels(ax, 1, len(draws), 3.6 * len(draws) + 0.4, 3.2, layout="")
+    for axes, draw, name in zip(panels[0], draws, "ABCD", strict=False):
         draw(axes, found)
         style.letter(axes, name)
     said = "shown" if found.shown else "not shown"
-    style.overall(figure, found.campaign.scenario.name, f"{said}, {100.0 * found.campaign.confidence:g} % confidence")
-    return figure
+    details = f"{said}, {100.0 * found.campaign.confidence:g} % confidence"
+    style.overall(figure, found.campaign.scenario.name, details)
+    return style.root(figure)
 
 
 def _bounds(axes: Axes, found: "Certificate") -> None:

@@ -1,22 +1,21 @@
 """A display as the audience sees it: each shape at the instant it is left."""
 
-import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.display.show import Show
 from airflock.plots import style
 
 
-def stood(show: Show, titles: list[str]) -> Figure:
+def stood(show: Show, titles: list[str], *, ax: Axes | None = None) -> Figure:
     """Every shape from the south, at the end of its leg; drones that failed are not shown."""
     count = len(show.formed)
-    figure = style.Picture(2.6 * count, 2.8, style.NIGHT)
-    panels = np.atleast_1d(np.asarray(figure.subplots(1, count)))
-    for axes, title, formed, frame in zip(panels, titles, show.formed, show.ends, strict=True):
+    figure, panels = style.panels(ax, 1, count, 2.6 * count, 2.8, background=style.NIGHT, layout="")
+    for axes, title, formed, frame in zip(panels[0], titles, show.formed, show.ends, strict=True):
         x, z = show.frames[frame, 0], show.frames[frame, 2]
         axes.scatter(x, z, s=6.0, color=style.ORANGE, linewidths=0.0)
         axes.set_facecolor(style.NIGHT)
         axes.set_aspect("equal")
         axes.axis("off")
         axes.set_title(f"{title}\n{formed.drones} drones, {formed.time:.0f} s", fontsize=style.SMALL, color="white")
-    return figure
+    return style.root(figure)

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.plots import style
@@ -18,16 +18,19 @@ def fitness_scatter(
     best: Mapping[str, float] | None = None,
     *,
     what: str = "",
+    ax: Axes | None = None,
 ) -> Figure:
     """One panel a parameter.
 
     table     : one row a candidate: generation, a column for each key of `units`, and `objective`
     units     : key of a parameter → its unit
     best      : the chosen parameters, a line in each panel
+    ax        : axes of a grid, whose place the panels take, instead of a new figure
     """
     rows = -(-len(units) // COLUMNS)
-    figure = style.Picture(10.0, 2.3 * rows + 0.4)
-    panels = np.atleast_1d(figure.subplots(rows, min(COLUMNS, len(units)), sharey=True, squeeze=False)).ravel()
+    columns = min(COLUMNS, len(units))
+    figure, grid = style.panels(ax, rows, columns, 10.0, 2.3 * rows + 0.4, layout="", sharey=True)
+    panels = grid.ravel()
     shown = table.sort_values("generation", kind="stable")
     for axes, (key, unit) in zip(panels, units.items(), strict=False):
         dots = axes.scatter(
@@ -40,4 +43,4 @@ def fitness_scatter(
         axes.set_visible(False)
     style.colour_bar(figure, dots, panels.tolist(), "generation")
     style.overall(figure, what or "Fitness against parameters", f"{len(table)} candidates; line: chosen")
-    return figure
+    return style.root(figure)

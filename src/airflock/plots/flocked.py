@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.errors import RecordingError
@@ -22,20 +23,21 @@ def flocked(
     stop: float | None = None,
     smooth: float | None = None,
     settings: Mapping[str, Any] | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Share of agents flocked and their polarisation, sub-swarms and collisions at every instant; lines mark goals.
 
     start, stop : window of time, s; settings : keys that replace those the recording was flown with
     smooth      : window of the means of shares, s, as in `series`
+    ax          : axes of a grid, whose place the panels take, instead of a new figure
     """
     values, course = measure(recording, settings)
     if "flocked" not in course:
         raise RecordingError("recording: the share flocked is measured by metrics.kind = 'kidger'; --set it")
     begin, end = window(course.index.to_numpy(), start, stop)
     course = course.loc[begin - 1e-9 : end + 1e-9]
-    figure = style.Picture(7.0, 4.2)
-    figure.set_layout_engine("constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    figure, panels = style.panels(ax, 2, 1, 7.0, 4.2, sharex=True, height_ratios=(2.0, 1.0))
+    upper, lower = panels[:, 0]
     pen = Pen(course, smooth)
     handles = pen.draw(upper, course["flocked"], style.BLUE, "flocked")
     handles += pen.draw(upper, course["polarisation"], style.GREEN, "polarisation")
@@ -54,4 +56,4 @@ def flocked(
     style.dress(lower, "time (s)", "number")
     style.legend(lower, lower.get_lines(), columns=2)
     style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
-    return figure
+    return style.root(figure)

@@ -16,11 +16,10 @@ SHOWN = 20.0  # s of one drone in the first panel
 MOST = 4000  # points in the second
 
 
-def identified(found: Identified, check: Check | None = None) -> Figure:
+def identified(found: Identified, check: Check | None = None, *, ax: Axes | None = None) -> Figure:
     """Commanded, flown and computed velocity; limit of acceleration; noise by lag; standing error; reception; order."""
-    figure = style.Picture(10.0, 5.6)
-    figure.set_layout_engine("constrained")
-    axes = figure.subplots(2, 3).reshape(-1)
+    figure, panels = style.panels(ax, 2, 3, 10.0, 5.6)
+    axes = panels.reshape(-1)
     flying = found.logs.flying()
     for panel, draw in zip(axes, (_steps, _corner, _noise), strict=False):
         if "tau" in found.body.value and np.isfinite(found.body.value["tau"]) and len(flying.time) > 50:
@@ -33,7 +32,7 @@ def identified(found: Identified, check: Check | None = None) -> Figure:
     for panel, name in zip(axes, "ABCDEF", strict=True):
         style.letter(panel, name)
     style.overall(figure, "identified", f"{found.logs.drones} drones, like {found.like.name}")
-    return figure
+    return style.root(figure)
 
 
 def _empty(panel: Axes, text: str) -> None:

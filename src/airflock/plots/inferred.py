@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.infer.run import Inferred
@@ -11,16 +12,14 @@ from airflock.plots import style
 MOST = 5  # laws that are drawn
 
 
-def inferred(found: Inferred) -> Figure:
+def inferred(found: Inferred, *, ax: Axes | None = None) -> Figure:
     """Force maps, the tracks' first and then each law's, best first: along the heading above, to the left below.
 
     Katz et al., PNAS 108, 18720 (2011). A law that acts by velocities alone, such as alignment, shows no map.
     """
     laws = found.laws[:MOST]
     columns = [("tracks", laws[0].maps.seen, laws[0].maps.edges)] + [(w.name, w.maps.law, w.maps.edges) for w in laws]
-    figure = style.Picture(1.0 + 2.2 * len(columns), 4.8)
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(2, len(columns), sharex=True, sharey=True, squeeze=False)
+    figure, panels = style.panels(ax, 2, len(columns), 1.0 + 2.2 * len(columns), 4.8, sharex=True, sharey=True)
     for part, what in enumerate(("forwards", "to the left")):
         sizes = np.abs(np.concatenate([table[part].ravel() for _, table, _ in columns[:2]]))
         most = float(np.nanquantile(sizes, 0.98)) if np.isfinite(sizes).any() else 1.0
@@ -41,4 +40,4 @@ def inferred(found: Inferred) -> Figure:
         bar.set_label(f"acceleration {what}, m/s²", fontsize=style.SMALL)
         bar.ax.tick_params(labelsize=style.SMALL)
     style.overall(figure, "inferred", found.verdict)
-    return figure
+    return style.root(figure)

@@ -3,25 +3,27 @@
 from collections.abc import Sequence
 from itertools import combinations
 
-import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.plots import style
 
 
-def pareto(table: pd.DataFrame, front: Sequence[int], objectives: Sequence[str], *, what: str = "") -> Figure:
+def pareto(
+    table: pd.DataFrame, front: Sequence[int], objectives: Sequence[str], *, what: str = "", ax: Axes | None = None
+) -> Figure:
     """One panel for each pair of objectives.
 
     table : one row a candidate, a column for each objective; front : rows of the front, by position
+    ax    : axes of a grid, whose place the panels take, instead of a new figure
     """
     pairs = list(combinations(objectives, 2))
-    figure = style.Picture(3.6 * len(pairs) + 0.4, 3.4)
-    panels = np.atleast_1d(figure.subplots(1, len(pairs)))
+    figure, panels = style.panels(ax, 1, len(pairs), 3.6 * len(pairs) + 0.4, 3.4, layout="")
     best = table.iloc[list(front)]
-    for axes, (x, y) in zip(panels, pairs, strict=True):
+    for axes, (x, y) in zip(panels[0], pairs, strict=True):
         axes.plot(table[x], table[y], ".", color=style.GREY, markersize=1.5, alpha=0.4, rasterized=True)
         axes.plot(best[x], best[y], "o", color=style.BLUE, markersize=4.0, markeredgewidth=0.0, label="front")
         style.dress(axes, x, y)
     style.overall(figure, what or "Pareto front", f"{len(best)} of {len(table)} candidates")
-    return figure
+    return style.root(figure)

@@ -25,7 +25,6 @@ from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
 KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash")
-ONE_PANEL = ("trajectories", "exposure", "scene", "space", "rays", "wash")  # pictures that can be drawn into axes
 OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
 What = Scenario | xr.Dataset | str | os.PathLike[str]
 
@@ -62,8 +61,8 @@ def plot(
     trust : bool
         Whether code that the scenario file names may run.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw into, instead of a new figure; for pictures of one panel. Trajectories in space need axes with
-        projection="3d".
+        Axes to draw into, instead of a new figure. A picture of several panels divides their place, which must be one
+        of a grid (`figure.subplots`). Trajectories in space need axes with projection="3d".
 
     Returns
     -------
@@ -84,11 +83,9 @@ def plot(
     """
     if kind not in KINDS:
         raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}")
-    if ax is not None and kind not in ONE_PANEL:
-        raise AirflockError(f"ax: kind = {kind!r} has panels of its own; only {', '.join(ONE_PANEL)} take axes")
     if kind in OF_A_SCENARIO:
         scenario = _scenario(what, settings, law, trust)
-        return rules(scenario) if kind == "rules" else transfer(scenario)
+        return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop, ax)
 
 
@@ -100,9 +97,9 @@ def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: f
     if kind == "wash":
         return wash(recording, start=start, ax=ax)
     if kind == "flocked":
-        return flocked(recording, start=start, stop=stop)
+        return flocked(recording, start=start, stop=stop, ax=ax)
     if kind == "series":
-        return series(recording, start=start, stop=stop)
+        return series(recording, start=start, stop=stop, ax=ax)
     if kind == "exposure":
         return exposure(recording, start=start, stop=stop, ax=ax)
     return trajectories(recording, start=start, stop=stop, ax=ax)

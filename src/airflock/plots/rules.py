@@ -1,48 +1,41 @@
-"""A model's own rules drawn against distance, by calling the rules themselves (Vásárhelyi et al. 2018, Fig. 6).
+"""A model's own rules drawn against distance (Vásárhelyi et al. 2018, Fig. 6), in the words of the law.
 
-One neighbour is put straight ahead (east) of an agent at rest. The push away from it is the radial component of what
-`neighbour` returns; the response to a velocity difference is its component along that difference, here sideways, so
-that the two do not mix.
+A law whose neighbours act through several terms (TERMS, or several vectors among its Sums) gets a panel for each.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from airflock.core.contract import Model
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.plots import style
+from airflock.plots.responses import FASTEST, Array, alignment, allowed_difference, repulsion, wall_response
 from airflock.plots.save import positive
 from airflock.plots.scene import name_of
 from airflock.scenarios.scenario import Scenario
-from airflock.stage.arrows import vectors
+from airflock.stage.arrows import vectors, word_of
 
-Array = NDArray[Any]
 POINTS = 400
-FASTEST = 1e3  # m/s; a larger allowed difference is drawn as none
 SHARES = (0.5, 1.0, 2.0)  # of the velocity difference, in the panel of alignment
 UNITS = {"velocity": "m/s", "acceleration": "m/s²", "heading": "1"}
 
 
-class Response(NamedTuple):
-    """Answer of a pair rule along one axis: to each vector among its sums."""
-
-    name: str
-    values: Array
-
-
 def rules(
-    scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None
-) -> Figure:
-    """Repulsion, largest allowed velocity difference, alignment, and walls where the model has them.
+    scenario: Scenario, *, difference: float | None = None, speed: float | None = None, farthest: float | None = None,
+    ax: Axes | None = None,
+) -> Figure:  # fmt: skip
+    """Repulsion, largest allowed velocity difference and alignment, or each term of the law by its own word; walls.
 
     difference : velocity difference of the pair, m/s; by default the model's preferred speed
     speed      : at which an agent flies towards a wall, m/s; by default the same
     farthest   : largest distance drawn, m; by default a quarter beyond the interaction range
+    ax         : axes of a grid, whose place the panels take, instead of a new figure
     """
     model, p = scenario.model, scenario.parameters
     if model.neighbour is None and model.boundary is None:
@@ -53,18 +46,22 @@ def rules(
     reach = float(farthest if farthest is not None else _farthest(scenario))
     positive(difference=dv, speed=v, farthest=reach)
     r = np.linspace(reach / POINTS, reach, POINTS)
-    count = 2 * (model.neighbour is not None) + (model.boundary is not None)
-    figure = style.Picture(3.4 * count + 0.4, 3.1)
-    figure.set_layout_engine("constrained")
-    panels = list(np.atleast_1d(figure.subplots(1, count)))
     unit = UNITS[model.command]
-    if model.neighbour is not None:
-        _pair_panel(panels.pop(0), model, p, r, dv, unit)
-        _alignment_panel(panels.pop(0), model, p, r, dv, unit)
+    draws: list[tuple[str, Callable[[Axes], None]]] = []
+    if model.neighbour is not None and (model.terms or len(vectors(model.Sums)) > 1):
+        for stem in vectors(model.Sums):
+            draws.append((word_of(model, stem)[0], partial(_term_panel, model=model, p=p, r=r, dv=dv, stem=stem)))
+    elif model.neighbour is not None:
+        draws.append(("one neighbour", partial(_pair_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
+        draws.append(("alignment", partial(_alignment_panel, model=model, p=p, r=r, dv=dv, unit=unit)))
     if model.boundary is not None:
-        _wall_panel(panels[0], model, p, r, v, unit)
+        draws.append(("one wall", partial(_wall_panel, model=model, p=p, r=r, v=v, unit=unit)))
+    figure, panels = style.panels(ax, 1, len(draws), 3.4 * len(draws) + 0.4, 3.1)
+    for axes, (title, draw), name in zip(panels[0], draws, "ABCDEFGH", strict=False):
+        draw(axes)
+        style.letter(axes, f"{name}  {title}")
     style.overall(figure, name_of(scenario), f"rules of {model.name} against distance")
-    return figure
+    return style.root(figure)
 
 
 def _farthest(scenario: Scenario) -> float:
@@ -73,82 +70,30 @@ def _farthest(scenario: Scenario) -> float:
     return 1.25 * (span if span < 1e4 else min(scenario.radio.range, 100.0))
 
 
-def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
-    """What `neighbour` returns for a neighbour r (m) ahead of an agent at rest that moves sideways at dv (m/s)."""
-    side = 1.0 if dv > 0.0 else 0.0
-    given = {
-        "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
-        "vx": 0.0, "vy": 0.0, "vz": 0.0, "hx": 0.0, "hy": 0.0, "hz": 0.0,
-        "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "p": p,
-    }  # fmt: skip
-    if model.neighbour is None:
-        raise RuleError(f"model {model.name} has no rule neighbour")
-    names = asks(model.neighbour, "neighbour", model.name)
-    if "dv" in names and dv == 0.0:
-        given["dv"] = 1e-6  # as a driver guards it: the length of nothing divides safely
-    return model.neighbour(*(given[name] for name in names))
+def _term_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, stem: str) -> None:
+    """One term of a law: what a neighbour at rest adds to it, and what its motion adds, up to the law's own reach."""
+    word, unit = word_of(model, stem)
+    assert model.neighbour is not None
+    by_velocity = bool({"dvx", "dvy", "dv"} & set(asks(model.neighbour, "neighbour", model.name)))
+    inside = r < float(model.reach(p)) if model.reach else np.full(len(r), True)
+    place = list(vectors(model.Sums)).index(stem)
+    away = np.where(inside, repulsion(model, p, r)[place].values, 0.0)
+    if away.any():
+        towards = away.max() <= 0.0
+        label = "towards it" if towards else "away from it"
+        axes.plot(r, -away if towards else away, color=style.BLUE, linewidth=1.8, label=label)
+    for share, color in zip(SHARES if by_velocity else (1.0,), (style.ORANGE, style.RED, style.PURPLE), strict=False):
+        along = np.where(inside, alignment(model, p, r, share * dv)[place].values, 0.0)
+        if along.any():
+            label = f"$\\Delta v$ = {share * dv:.3g} m/s" if by_velocity else "along its heading"
+            axes.plot(r, along, color=color, linewidth=1.8, label=label)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.6, zorder=0)
+    style.dress(axes, "distance (m)", f"{word} ({unit})" if unit else word)
+    axes.set_xlim(0.0, float(r[-1]))
+    style.legend(axes)
 
 
-def repulsion(model: Model, p: Any, r: Array) -> list[Response]:
-    """Push away from a neighbour at rest at distances r (m), positive outwards; one Response per vector."""
-    sums = [pair_sums(model, p, float(d)) for d in r]
-    return [
-        Response(name, np.array([-getattr(s, x) for s in sums], dtype=float))
-        for name, (x, _) in vectors(model.Sums).items()
-    ]
-
-
-def alignment(model: Model, p: Any, r: Array, dv: float) -> list[Response]:
-    """Response along a velocity difference dv (m/s) at distances r (m), beyond what a neighbour at rest causes."""
-    rest = [pair_sums(model, p, float(d)) for d in r]
-    moved = [pair_sums(model, p, float(d), dv) for d in r]
-    return [
-        Response(name, np.array([getattr(b, y) - getattr(a, y) for a, b in zip(rest, moved, strict=True)], dtype=float))
-        for name, (_, y) in vectors(model.Sums).items()
-    ]
-
-
-def allowed_difference(model: Model, p: Any, r: Array) -> Array:
-    """Largest velocity difference (m/s) at distances r (m) that causes no alignment; nan where none does.
-
-    Found by halving an interval, from the rule alone: any difference above it must cause some.
-    """
-    return np.array([_allowed(model, p, float(d)) for d in r])
-
-
-def _allowed(model: Model, p: Any, r: float) -> float:
-    fields = [y for _, y in vectors(model.Sums).values()]
-    rest = pair_sums(model, p, r)
-
-    def aligns(dv: float) -> bool:
-        moved = pair_sums(model, p, r, dv)
-        return any(abs(getattr(moved, y) - getattr(rest, y)) > 1e-12 * dv for y in fields)
-
-    low, high = 0.0, FASTEST
-    if not aligns(high):
-        return float("nan")
-    if aligns(1e-6):
-        return 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if aligns(middle) else (middle, high)
-    return high
-
-
-def wall_response(model: Model, p: Any, distance: Array, v: float) -> list[Response]:
-    """What one wall adds to the command of an agent that flies straight at it at v (m/s), positive inwards."""
-    if model.boundary is None:
-        raise RuleError(f"model {model.name} has no rule boundary")
-    names = asks(model.boundary, "boundary", model.name)
-    given = {"nx": 1.0, "ny": 0.0, "nz": 0.0, "vx": -v, "vy": 0.0, "vz": 0.0, "p": p}
-    answers = [model.boundary(*({**given, "distance": float(d)}[name] for name in names)) for d in distance]
-    return [
-        Response(name, np.array([getattr(a, x) for a in answers], dtype=float))
-        for name, (x, _) in vectors(model.Walls).items()
-    ]
-
-
-def _pair_panel(axes: Axes, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+def _pair_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
     """Fig. 6 itself: repulsion, largest allowed difference, and the difference at hand."""
     pushes = repulsion(model, p, r)
     allowed = allowed_difference(model, p, r)
@@ -165,11 +110,10 @@ def _pair_panel(axes: Axes, model: Model, p: Any, r: Array, dv: float, unit: str
     highest = max([2.0 * dv] + ([float(push.values.max()) for push in pushes] if shared else []))
     other.set_ylim(min(0.0, axes.get_ylim()[0] if shared else 0.0), 1.25 * highest)
     axes.set_xlim(0.0, float(r[-1]))
-    style.letter(axes, "A  one neighbour")
     style.legend(axes, lines)
 
 
-def _alignment_panel(axes: Axes, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
+def _alignment_panel(axes: Axes, *, model: Model, p: Any, r: Array, dv: float, unit: str) -> None:
     for share, color in zip(SHARES, (style.ORANGE, style.RED, style.PURPLE), strict=True):
         for number, term in enumerate(alignment(model, p, r, share * dv)):
             dashes = ("-", "--", ":")[number % 3]
@@ -179,11 +123,10 @@ def _alignment_panel(axes: Axes, model: Model, p: Any, r: Array, dv: float, unit
     axes.set_xlim(0.0, float(r[-1]))
     low, high = axes.get_ylim()
     axes.set_ylim(min(0.0, low), 1.4 * high)  # room for the legend
-    style.letter(axes, "B  alignment")
     style.legend(axes)
 
 
-def _wall_panel(axes: Axes, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
+def _wall_panel(axes: Axes, *, model: Model, p: Any, r: Array, v: float, unit: str) -> None:
     reach = float(r[-1])
     distance = np.linspace(-0.1 * reach, reach, POINTS)
     colors = (style.ORANGE, style.RED, style.PURPLE)
@@ -195,7 +138,6 @@ def _wall_panel(axes: Axes, model: Model, p: Any, r: Array, v: float, unit: str)
     axes.axvspan(float(distance[0]), 0.0, color=style.PALE, alpha=0.6, linewidth=0.0)
     style.dress(axes, "distance to the wall (m)", f"wall term ({unit})")
     axes.set_xlim(float(distance[0]), reach)
-    style.letter(axes, "C  one wall")
     style.legend(axes)
 
 

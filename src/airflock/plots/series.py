@@ -29,6 +29,7 @@ def series(
     stop: float | None = None,
     smooth: float | None = None,
     settings: Mapping[str, Any] | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Correlation, speed in units of v_flock, nearest neighbours (m) and rotation at every instant.
 
@@ -36,18 +37,18 @@ def series(
     smooth      : means over so many seconds (of the nearest pair the least value), told in the title; 0 draws instants
     alone, by default a two-hundredth of what is shown
     settings    : keys such as {"metrics.r_cluster": 60.0} that replace those the recording was flown with
+    ax          : axes of a grid, whose place the panels take, instead of a new figure
     """
     course = _window(over_time(recording, settings), start, stop)
     if "flocked" in course:
         from airflock.plots.flocked import flocked
 
-        return flocked(recording, start=start, stop=stop, smooth=smooth, settings=settings)
+        return flocked(recording, start=start, stop=stop, smooth=smooth, settings=settings, ax=ax)
     if not {"phi_corr", "phi_vel", "phi_lap"} <= set(course):
-        return _each(recording, course, smooth)
+        return _each(recording, course, smooth, ax)
     v_flock = scenario_of(recording, settings).measured_by().v_flock or 1.0
-    figure = style.Picture(7.0, 4.2)
-    figure.set_layout_engine("constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    figure, panels = style.panels(ax, 2, 1, 7.0, 4.2, sharex=True, height_ratios=(2.0, 1.0))
+    upper, lower = panels[:, 0]
     pen = Pen(course, smooth)
     handles = pen.draw(upper, course["phi_corr"], style.BLUE, CORR)
     handles += pen.draw(upper, course["phi_vel"] / v_flock, style.GREEN, VEL)
@@ -64,7 +65,7 @@ def series(
     _mark_faults(recording, course, upper, lower)
     lower.set_xlim(float(course.index[0]), float(course.index[-1]) if len(course) > 1 else None)
     style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
-    return figure
+    return style.root(figure)
 
 
 def _mark_faults(recording: xr.Dataset, course: pd.DataFrame, upper: Axes, lower: Axes) -> None:
@@ -112,11 +113,10 @@ class Pen:
         )
 
 
-def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None) -> Figure:
+def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None, ax: Axes | None) -> Figure:
     """Every value of a metric set that has no picture of its own, one below the other."""
-    figure = style.Picture(7.0, 0.6 + 1.1 * len(course.columns))
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(len(course.columns), 1, sharex=True, squeeze=False)[:, 0]
+    figure, grid = style.panels(ax, len(course.columns), 1, 7.0, 0.6 + 1.1 * len(course.columns), sharex=True)
+    panels = grid[:, 0]
     pen = Pen(course, smooth)
     for number, (name, axes) in enumerate(zip(course.columns, panels, strict=True)):
         values = course[name].dropna()  # values of the collision clock stand at its instants only
@@ -127,17 +127,17 @@ def _each(recording: xr.Dataset, course: pd.DataFrame, smooth: float | None) -> 
         if spread < STEADY * abs(middle):  # rounding is no course
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
     style.overall(figure, name_of(recording), f"{details_of(recording)}{pen.told}")
-    return figure
+    return style.root(figure)
 
 
-def rotations(flights: Mapping[str, xr.Dataset], *, start: float | None = None, stop: float | None = None) -> Figure:
+def rotations(
+    flights: Mapping[str, xr.Dataset], *, start: float | None = None, stop: float | None = None, ax: Axes | None = None
+) -> Figure:
     """phi_LAP of several flights on one axis (Fig. 4 D): circling is near ±1, diagonal flight near 0.
 
     flights : label → recording
     """
-    figure = style.Picture(7.0, 2.6)
-    figure.set_layout_engine("constrained")
-    axes = figure.subplots()
+    figure, axes = style.place(ax, 7.0, 2.6, layout="constrained")
     for number, (label, recording) in enumerate(flights.items()):
         course = _window(over_time(recording), start, stop)
         _rotation(axes, course, style.LINES[number % len(style.LINES)], label, Pen(course, 0.0))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.plots import style
@@ -19,17 +20,18 @@ def slices(
     *,
     maximise: bool = True,
     what: str = "",
+    ax: Axes | None = None,
 ) -> Figure:
     """A triangle of maps, one for each pair of parameters.
 
     table  : one row a candidate: a column for each key of `bounds`, and `objective`
     bounds : key of a parameter → range that is drawn
     best   : the chosen parameters, a cross in each map
+    ax     : axes of a grid, whose place the panels take, instead of a new figure
     """
     keys = list(bounds)
     n = max(len(keys) - 1, 1)
-    figure = style.Picture(1.2 * n + 1.6, 1.2 * n + 1.0)
-    grid = figure.subplots(n, n, squeeze=False)
+    figure, grid = style.panels(ax, n, n, 1.2 * n + 1.6, 1.2 * n + 1.0, layout="")
     values = table[objective].to_numpy(float)
     sound = np.isfinite(values)
     low, high = (float(values[sound].min()), float(values[sound].max())) if sound.any() else (0.0, 1.0)
@@ -53,7 +55,7 @@ def slices(
     if mesh is not None:
         style.colour_bar(figure, mesh, grid.ravel().tolist(), f"best {objective} in a cell")
     style.overall(figure, what or "Pairwise slices", "grey: nobody was there; cross: chosen")
-    return figure
+    return style.root(figure)
 
 
 def _best_in_cells(

@@ -14,6 +14,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from airflock.errors import AirflockError
 from airflock.stage.colours import WHEEL
 
 # Okabe & Ito, "Color universal design" (2008)
@@ -53,6 +54,35 @@ def place(ax: Axes | None, width: float, height: float, layout: str = "") -> tup
     if layout:
         figure.set_layout_engine(layout)  # type: ignore[arg-type]
     return figure, figure.add_subplot()
+
+
+def panels(
+    ax: Axes | None, rows: int, columns: int, width: float, height: float, *, background: str = "white",
+    layout: str = "constrained", **shared: Any,
+) -> tuple[Figure, Any]:  # fmt: skip
+    """A figure of several panels and its axes (row, column): a new one of a size in inches, or one in the place of ax.
+
+    The latter is a SubFigure, which draws like any; `root` gives the figure that it is a part of.
+    shared : sharex, sharey, height_ratios, as `Figure.subplots` takes them
+    Raises AirflockError for axes that stand in no grid, so that nothing says where their place is.
+    """
+    if ax is None:
+        figure: Any = Picture(width, height, background)
+        if layout:
+            figure.set_layout_engine(layout)
+    else:
+        spot = ax.get_subplotspec()
+        if spot is None:
+            raise AirflockError("ax: this picture has panels of its own; give axes of a grid, as figure.subplots makes")
+        ax.axis("off")
+        figure = ax.get_figure().add_subfigure(spot)  # type: ignore[union-attr]
+        figure.set_facecolor(background)
+    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+
+
+def root(figure: Figure) -> Figure:
+    """The whole figure that a picture is drawn in."""
+    return figure.get_figure(root=True)  # type: ignore[return-value]
 
 
 def dress(axes: Axes, x: str = "", y: str = "", *, grid: bool = True) -> None:
@@ -104,7 +134,7 @@ def letter(axes: Axes, name: str) -> None:
 
 
 def overall(figure: Figure, what: str, details: str = "") -> None:
-    """Title of a figure of several panels."""
+    """Title of a picture of several panels."""
     text = what.replace("_", r"\_").replace(" ", r"\ ")
     figure.suptitle(
         rf"$\bf{{{text}}}$" + (f"   {details}" if details else ""), x=0.01, ha="left", fontsize=TEXT + 0.5, color=INK

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.core.maths import bell, peak, rising
@@ -11,14 +12,14 @@ from airflock.plots.scene import name_of
 from airflock.scenarios.scenario import Scenario
 
 
-def transfer(scenario: Scenario | None = None) -> Figure:
+def transfer(scenario: Scenario | None = None, *, ax: Axes | None = None) -> Figure:
     """F1, F2 and F3 (Eqs 17-20), each over the order parameter that it judges.
 
     scenario : draws them with its v_flock, tolerances and units; without it, in units of their own parameters
+    ax       : axes of a grid, whose place the panels take, instead of a new figure
     """
-    figure = style.Picture(7.4, 2.5)
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(1, 3, sharey=True)
+    figure, grid = style.panels(ax, 1, 3, 7.4, 2.5, sharey=True)
+    panels = grid[0]
     if scenario is None:
         v0, d, s, a = 1.0, 0.375, 1.0, 1.0
         labels = (r"$\phi/\phi_0$   ($d = 0.375\,\phi_0$)", r"$\phi/s$", r"$\phi/a$")
@@ -54,4 +55,4 @@ def transfer(scenario: Scenario | None = None) -> Figure:
         axes.xaxis.get_offset_text().set_fontsize(style.SMALL)
         axes.set_ylim(-0.03, 1.12)
     panels[0].set_ylabel("partial fitness (1)", fontsize=style.TEXT, color=style.INK)
-    return figure
+    return style.root(figure)

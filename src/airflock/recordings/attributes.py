@@ -15,7 +15,7 @@ import xarray as xr
 from airflock.doors import from_outside, json_object
 from airflock.errors import RecordingError, bounded
 from airflock.faults.registry import KINDS
-from airflock.scenarios.files import MODELS
+from airflock.scenarios.laws import MODELS
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"

@@ -18,7 +18,8 @@ from airflock.recordings import attributes
 from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
 from airflock.recordings.opened import Opening
-from airflock.scenarios.files import given_law, make
+from airflock.scenarios.laws import given_law
+from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
 from airflock.sensors.registry import SENSORS
 

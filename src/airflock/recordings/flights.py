@@ -17,15 +17,16 @@ from airflock.engine.flight import DEVICES, Flight
 from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
-from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
-from airflock.scenarios.files import MODELS, loaded
+from airflock.scenarios.files import loaded
+from airflock.scenarios.laws import MODELS
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
+from airflock.scenarios.timing import clock
 
 
 def simulate(

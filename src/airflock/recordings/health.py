@@ -7,13 +7,13 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from airflock import __version__
+from airflock.cache import cache_folder, cache_trouble, drivers, usual_folder
 from airflock.engine.cuda import device as gpu
 from airflock.engine.simulate import score_flight, score_flights
-from airflock.engine.store import cache_folder, cache_trouble, drivers, usual_folder
-from airflock.engine.threads import cores
 from airflock.recordings.flights import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import cores
 
 PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
 EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...

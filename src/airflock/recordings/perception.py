@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from airflock.body import radio
 from airflock.core import random
 from airflock.engine.flight import Flight
-from airflock.engine.tables import clock
 from airflock.errors import FlightError
 from airflock.recordings.layout import DIMENSIONS, UNITS
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from airflock.world.place import half_sizes
 
 Array = NDArray[Any]

@@ -26,7 +26,8 @@ from airflock.metrics import nearest
 from airflock.metrics.registry import POWER, SETS, reports
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
-from airflock.scenarios.files import loaded, make
+from airflock.scenarios.files import loaded
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds

@@ -24,12 +24,14 @@ from airflock.metrics.registry import numbers_of
 from airflock.recordings import attributes
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
+from airflock.replays.layers import layers
 from airflock.replays.pack import pack
-from airflock.stage import colours
+from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
+SCRIPTS = ("data", "colours", "replay")  # in the order in which they need each other
 COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
 
 
@@ -56,13 +58,16 @@ class Replay:
         )
 
 
-def replay(recording: xr.Dataset, *, rate: float = RATE) -> Replay:
+def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") -> Replay:
     """Page that plays a recording; it opens from disk without network and displays itself in a notebook.
 
     recording : a Dataset with position (m) and velocity (m/s), simulated or flown
     rate      : frames per second that are kept at most
+    colour    : what the colours stand for when it opens, as the page's menu names it: speed, heading, height, agent,
+                cluster, group, fault, a number that differs among agents, or a variable of the recording with one
+                number for each individual (at each time, or for good)
 
-    Raises RecordingError for a recording with gaps.
+    Individuals that are absent are not drawn. Raises RecordingError for a colour that the recording does not know.
 
     Returns
     -------
@@ -76,30 +81,34 @@ def replay(recording: xr.Dataset, *, rate: float = RATE) -> Replay:
     'vasarhelyi_2018/4ms'
     """
     frames, period, present = frames_of(recording)
-    if not present.all():
-        time, agent = np.argwhere(~present)[0]
-        raise RecordingError(
-            f"recording: {1.0 - present.mean():.1%} of the positions are missing, first "
-            f"{recording['individual'].values[agent]} at t = {recording['time'].values[time]:g} s; a replay needs all"
-        )
     axes = frames.shape[1] // 2
     stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))
-    kept, every = frames[::stride], period * stride
-    packed = pack(kept[:, :axes])
+    there, every = present[::stride], period * stride
+    kept = _held(frames, present)[::stride]
     scenario = scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
+    rows = layers(recording, scenario, kept[:, :axes], there, stride)
+    whole = there.all()
+    packed = pack(kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)]))
+    own = [layer.shade.name for layer in rows]
+    ways = ["speed", "heading", *(["height"] if axes == 3 else []), "agent", *own]
+    if colour not in ways:
+        raise RecordingError(f"colour = {colour!r} is none that this recording knows: {', '.join(ways)}")
     flat = np.zeros((kept.shape[2], 3))
     flat[:, :axes] = kept[0, :axes].T
     first = float(recording["time"].values[0])
     name = attributes.name_of(recording)
-    speed = np.sqrt((kept[:, axes:] ** 2).sum(1))
-    nearest, collisions = _near(frames[:, :axes], period, scenario)
+    speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
+    nearest, collisions = _near(frames[:, :axes], present, period, scenario)
     about = {
         "name": name, "seed": int(recording.attrs["airflock_seed"]) if "airflock_seed" in recording.attrs else None,
         "first": first, "period": every, "shape": packed.shape, "low": packed.low, "quantum": packed.quantum,
-        "top": _nice(float(np.quantile(speed, 0.995))), "ramp": colours.RAMP.astype(int).tolist(),
+        "top": _nice(float(np.nanquantile(speed, 0.995))), "ramp": colours.RAMP.astype(int).tolist(),
+        "wheel": colours.WHEEL.astype(int).tolist(), "blank": shades.BLANK, "way": colour, "ways": ways,
+        "layers": [_told_layer(layer.shade) for layer in rows], "whole": bool(whole),
+        "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
         "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
         "events": _events(recording, scenario), "stage": _stage(scenario, kept[:, :axes], flat),
-        "charts": [["mean speed (m/s)", _short(speed.mean(1))], ["nearest pair (m)", _short(nearest[::stride])]],
+        "charts": [["mean speed (m/s)", _short(_mean(speed))], ["nearest pair (m)", _short(nearest[::stride])]],
     }  # fmt: skip
     return Replay(_page(name, about, packed.data), name)
 
@@ -113,19 +122,52 @@ def _page(name: str, about: dict[str, Any], data: bytes) -> str:
         "ABOUT": json.dumps(about, allow_nan=False).replace("<", "\\u003c"),
         "DATA": base64.b64encode(data).decode(),
         "THREE": (root / "three.min.js").read_text(encoding="utf-8"),
-        "SCRIPT": (root / "replay.js").read_text(encoding="utf-8"),
+        "SCRIPT": "\n".join((root / f"{part}.js").read_text(encoding="utf-8") for part in SCRIPTS),
     }
     return re.sub("@([A-Z]+)@", lambda place: parts[place[1]], text)
 
 
-def _near(position: NDArray[Any], period: float, scenario: Any) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
+def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
+    """Frames in which whoever is absent stays where it was last, or where it will be first."""
+    if present.all():
+        return frames
+    times = np.arange(len(frames))[:, None]
+    last = np.maximum.accumulate(np.where(present, times, -1), axis=0)
+    source = np.where(last >= 0, last, present.argmax(axis=0))
+    found = np.take_along_axis(frames, source[:, None, :], axis=0)
+    ever = present.any(axis=0)
+    found[:, :, ~ever] = found[:, :, [int(ever.argmax())]]
+    return found
+
+
+def _mean(speed: NDArray[Any]) -> NDArray[Any]:
+    """Mean (time,) over those present; nan where nobody is."""
+    known = np.isfinite(speed)
+    total = np.where(known, speed, 0.0).sum(axis=1)
+    return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
+
+
+def _told_layer(shade: shades.Shade) -> dict[str, Any]:
+    """What the page needs to know of a layer."""
+    words = f"{shades.WORDS.get(shade.name, shade.name)}; {shade.told}" if shade.kind == shades.MARKS else shade.told
+    return {
+        "name": shade.name, "kind": shade.kind, "ends": [f"{shade.low:.3g}", f"{shade.high:.3g} {shade.unit}".strip()],
+        "names": list(shade.names), "tones": shades.palette(len(shade.names)).tolist(),
+        "told": words,
+    }  # fmt: skip
+
+
+def _near(
+    position: NDArray[Any], present: NDArray[np.bool_], period: float, scenario: Any
+) -> tuple[NDArray[Any], list[tuple[float, int, int]]]:
     """Smallest distance at each frame (m; nan of one agent), and when which pair came nearer than a collision."""
     measured = scenario.measured_by() if scenario else None
     limit = float(measured.r_coll) if measured and COUNTED & set(numbers_of(scenario.measures, measured)) else 0.0
     nearest, found = np.full(len(position), np.nan), []
     touching: set[tuple[int, int]] = set()
     for number, frame in enumerate(position):
-        points = frame.T.astype(float)
+        who = np.flatnonzero(present[number])
+        points = frame.T[who].astype(float)
         if len(points) < 2:
             continue
         box = None
@@ -135,8 +177,9 @@ def _near(position: NDArray[Any], period: float, scenario: Any) -> tuple[NDArray
             points = np.mod(points + 0.5 * box, box)
         tree = cKDTree(points, boxsize=box)
         nearest[number] = tree.query(points, k=2)[0][:, 1].min()
-        now = set(tree.query_pairs(limit)) if limit > 0.0 and nearest[number] < limit else set()
-        found += [(number * period, int(i), int(j)) for i, j in sorted(now - touching)]
+        near = tree.query_pairs(limit) if limit > 0.0 and nearest[number] < limit else set()
+        now = {(int(who[i]), int(who[j])) for i, j in near}
+        found += [(number * period, i, j) for i, j in sorted(now - touching)]
         touching = now
     return nearest, found[:MOST_EVENTS]
 

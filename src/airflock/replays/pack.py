@@ -1,6 +1,10 @@
-"""Packing of positions: whole numbers of 16 bits, as differences in time, deflated. `unpack` is what the page does."""
+"""Packing: positions as whole numbers of 16 bits, rows of bytes beside them, as differences in time, deflated.
+
+`unpack` is what the page does.
+"""
 
 import zlib
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +20,7 @@ class Packed(NamedTuple):
     quantum : of each axis, m; positions are kept to half of it
     shape   : frames, axes, agents
     data    : zlib stream of the low bytes of all differences and then of the high ones; in both, each axis after the
-              other, each agent after the other, frame by frame
+              other, each agent after the other, frame by frame; then the differences of each row of bytes
     """
 
     low: list[float]
@@ -25,8 +29,8 @@ class Packed(NamedTuple):
     data: bytes
 
 
-def pack(position: NDArray[Any]) -> Packed:
-    """Pack positions (time, axis, agent), m, all finite."""
+def pack(position: NDArray[Any], rows: Sequence[NDArray[np.uint8]] = ()) -> Packed:
+    """Pack positions (time, axis, agent), m, all finite, and rows of bytes (time, agent) beside them."""
     given = np.asarray(position, float)
     low, high = given.min(axis=(0, 2)), given.max(axis=(0, 2))
     quantum = np.maximum((high - low) / STEPS, 1e-12)
@@ -35,15 +39,19 @@ def pack(position: NDArray[Any]) -> Packed:
     steps[1:] -= whole[:-1]  # modulo 2^16, which adding up undoes
     series = np.ascontiguousarray(steps.transpose(1, 2, 0)).ravel()
     data = (series & 0xFF).astype(np.uint8).tobytes() + (series >> 8).astype(np.uint8).tobytes()
+    data += b"".join(np.diff(row, axis=0, prepend=row[:1] * 0).T.tobytes() for row in rows)  # modulo 2^8
     frames, axes, agents = given.shape
     return Packed(low.tolist(), quantum.tolist(), (frames, axes, agents), zlib.compress(data, 9))
 
 
-def unpack(packed: Packed) -> NDArray[np.float64]:
-    """Positions (time, axis, agent), m, within half a quantum of those packed."""
+def unpack(packed: Packed) -> tuple[NDArray[np.float64], list[NDArray[np.uint8]]]:
+    """Positions (time, axis, agent), m, within half a quantum of those packed, and the rows of bytes."""
     frames, axes, agents = packed.shape
-    halves = np.frombuffer(zlib.decompress(packed.data), np.uint8).reshape(2, -1).astype(np.uint16)
+    data = np.frombuffer(zlib.decompress(packed.data), np.uint8)
+    halves = data[: 2 * frames * axes * agents].reshape(2, -1).astype(np.uint16)
     series = (halves[0] | halves[1] << 8).reshape(axes, agents, frames)
     whole = np.add.accumulate(series, axis=2, dtype=np.uint16)
     scaled = whole * np.array(packed.quantum)[:, None, None] + np.array(packed.low)[:, None, None]
-    return np.asarray(scaled.transpose(2, 0, 1))
+    rest = data[2 * frames * axes * agents :].reshape(-1, agents, frames)
+    rows = [np.add.accumulate(row, axis=1, dtype=np.uint8).T for row in rest]
+    return np.asarray(scaled.transpose(2, 0, 1)), rows

@@ -1,55 +1,5 @@
 "use strict";
-// Plays one recording. What it needs stands in the page: #about (JSON) and #data (deflated positions, base64).
-
-const about = JSON.parse(document.getElementById("about").textContent);
-const [frames, axes, agents] = about.shape;
-const { stage, period, first } = about;
-const last = first + (frames - 1) * period;
-const $ = id => document.getElementById(id);
-
-// ---------------------------------------------------------------------------------------------------- positions
-
-/** Inflate the data and add the differences up: one Uint16Array, axis by axis, agent by agent, frame by frame. */
-async function unpack() {
-  const bytes = Uint8Array.from(atob($("data").textContent), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const halves = new Uint8Array(await new Response(stream).arrayBuffer());
-  const count = halves.length / 2, whole = new Uint16Array(count);
-  for (let row = 0; row < count; row += frames)
-    for (let f = 0, sum = 0; f < frames; f++)
-      whole[row + f] = sum = (sum + halves[row + f] + (halves[count + row + f] << 8)) & 0xffff;
-  return whole;
-}
-
-/** Position of an agent along an axis at a frame, m; 0 along the third axis of a plane. */
-function at(whole, axis, agent, frame) {
-  if (axis >= axes) return 0;
-  return about.low[axis] + about.quantum[axis] * whole[(axis * agents + agent) * frames + frame];
-}
-
-/** Whether an agent went through a periodic face between a frame and the next. */
-function leaps(whole, agent, frame) {
-  if (about.leap === null) return false;
-  for (let axis = 0; axis < axes; axis++)
-    if (Math.abs(at(whole, axis, agent, frame + 1) - at(whole, axis, agent, frame)) > about.leap) return true;
-  return false;
-}
-
-// ------------------------------------------------------------------------------------------------------ colours
-
-/** Colour of a share from 0 to 1, written into `out` from `place` on, each part from 0 to 1. */
-function ramp(share, out, place, pale = 0) {
-  const x = Math.min(Math.max(share, 0), 1) * (about.ramp.length - 1);
-  const i = Math.min(Math.floor(x), about.ramp.length - 2), part = x - i;
-  for (let c = 0; c < 3; c++) {
-    const tone = (about.ramp[i][c] * (1 - part) + about.ramp[i + 1][c] * part) / 255;
-    out[place + c] = linear(tone + (0.92 - tone) * pale);
-  }
-}
-
-/** sRGB decoded to light, which three.js computes with. */
-const linear = c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-const CHOSEN = [1.0, 0.26, 0.0], ALERT = [0.67, 0.0, 0.03];
+// Plays one recording, which `data.js` unpacked and `colours.js` colours.
 
 // -------------------------------------------------------------------------------------------------------- scene
 
@@ -140,6 +90,7 @@ scene.add(darts);
 // ------------------------------------------------------------------------------------------------------- trails
 
 const MOST = 400000;  // pieces of all trails
+const step = [0, 0, 0];
 let trail, trailSpan = 15, trailPieces = 0;
 
 function layTrails() {
@@ -155,23 +106,24 @@ function layTrails() {
   scene.add(trail);
 }
 
-/** Trails up to a frame; a piece through a periodic face, or before the start, has no length. */
+/** Trails up to a frame; a piece through a periodic face, before the start, or of who is absent, has no length. */
 function drawTrails(whole, frame) {
   if (!trailPieces) return;
   const points = trail.geometry.attributes.position, colours = trail.geometry.attributes.color;
   let k = 0;
   for (let a = 0; a < agents; a++)
     for (let p = 0; p < trailPieces; p++, k += 6) {
-      const end = frame - p, none = end < 1 || leaps(whole, a, end - 1), from = none ? Math.max(end, 0) : end - 1;
-      let way = 0;
+      const end = frame - p, last = Math.max(end, 0);
+      const none = end < 1 || leaps(whole, a, end - 1) || !there(a, end) || !there(a, end - 1);
+      const from = none ? last : end - 1;
       for (let c = 0; c < 3; c++) {
-        const x = at(whole, c, a, from), y = at(whole, c, a, Math.max(end, 0));
+        const x = at(whole, c, a, from), y = at(whole, c, a, last);
         points.array[k + c] = x;
         points.array[k + 3 + c] = y;
-        way += (y - x) ** 2;
+        step[c] = y - x;
       }
       const pale = 0.35 + 0.6 * p / trailPieces;
-      ramp(Math.sqrt(way) / period / about.top, colours.array, k, pale);
+      tone(whole, a, last, step[0], step[1], step[2], colours.array, k, pale);
       for (let c = 0; c < 3; c++) colours.array[k + 3 + c] = colours.array[k + c];
     }
   points.needsUpdate = colours.needsUpdate = true;
@@ -180,30 +132,31 @@ function drawTrails(whole, frame) {
 // ----------------------------------------------------------------------------------------------------- one frame
 
 const place = new Float32Array(3 * agents), matrix = new THREE.Matrix4(), turn = new THREE.Quaternion();
-const ahead = new THREE.Vector3(1, 0, 0), way = new THREE.Vector3(), where = new THREE.Vector3();
-const large = new THREE.Vector3(size, size, size);
-let chosen = -1, drawnFrame = -1;
+const ahead = new THREE.Vector3(1, 0, 0), flown = new THREE.Vector3(), where = new THREE.Vector3();
+const large = new THREE.Vector3(size, size, size), gone = new THREE.Vector3(0, 0, 0);
+let chosen = -1, drawnFrame = -1, shownFrame = 0;
 
 function draw(whole, time) {
   const exact = Math.min(Math.max((time - first) / period, 0), frames - 1);
   const f = Math.min(Math.floor(exact), Math.max(frames - 2, 0)), part = frames > 1 ? exact - f : 0;
+  shownFrame = f;
   const hit = new Set(about.collisions.filter(c => time >= c[0] && time < c[0] + 1).flatMap(c => [c[1], c[2]]));
   for (let a = 0; a < agents; a++) {
     const jump = frames > 1 && leaps(whole, a, f), next = Math.min(f + 1, frames - 1);
     const b = jump && part < 0.5 ? Math.max(f - 1, 0) : f, e = jump && part < 0.5 ? f : next;
-    way.set(at(whole, 0, a, e) - at(whole, 0, a, b), at(whole, 1, a, e) - at(whole, 1, a, b),
+    flown.set(at(whole, 0, a, e) - at(whole, 0, a, b), at(whole, 1, a, e) - at(whole, 1, a, b),
       at(whole, 2, a, e) - at(whole, 2, a, b));
     for (let c = 0; c < 3; c++) {
       const x = at(whole, c, a, f), y = at(whole, c, a, next);
       place[3 * a + c] = jump ? (part < 0.5 ? x : y) : x + part * (y - x);
     }
-    const far = way.length();
-    ramp(jump ? 0.5 : far / period / about.top, tones, 3 * a);
+    const far = flown.length();
+    tone(whole, a, f, flown.x, flown.y, flown.z, tones, 3 * a);
     if (a === chosen) tones.set(CHOSEN, 3 * a);
     if (hit.has(a)) tones.set(ALERT, 3 * a);
-    if (far > 1e-9) turn.setFromUnitVectors(ahead, way.divideScalar(far)); else turn.identity();
+    if (far > 1e-9) turn.setFromUnitVectors(ahead, flown.divideScalar(far)); else turn.identity();
     where.fromArray(place, 3 * a);
-    darts.setMatrixAt(a, matrix.compose(where, turn, large));
+    darts.setMatrixAt(a, matrix.compose(where, turn, there(a, f) ? large : gone));
   }
   darts.instanceMatrix.needsUpdate = darts.instanceColor.needsUpdate = true;
   const frame = Math.floor(exact + 1e-6);
@@ -282,6 +235,7 @@ function choose(event) {
   let best = 18;
   chosen = -1;
   for (let a = 0; a < agents; a++) {
+    if (!there(a, shownFrame)) continue;
     where.fromArray(place, 3 * a).project(camera);
     const x = box.left + (where.x + 1) / 2 * box.width, y = box.top + (1 - where.y) / 2 * box.height;
     const far = Math.hypot(x - event.clientX, y - event.clientY);
@@ -323,8 +277,9 @@ async function main() {
     ...about.events.map(([t, what]) => [t, "#0072B2", what]),
   ];
   happened.sort((a, b) => a[0] - b[0]).forEach(entry => mark(...entry));
-  $("bar").style.background = `linear-gradient(to right, ${about.ramp.map(c => `rgb(${c})`)})`;
-  $("top").textContent = `${about.top} m/s`;
+  for (const name of about.ways) $("way").append(new Option(name, name, false, name === way));
+  $("way").addEventListener("change", e => { way = e.target.value; tell(); drawnFrame = -1; });
+  tell();
   layTrails();
   useCamera(camera);
   let then = performance.now(), charted = -1e9;
@@ -346,6 +301,7 @@ async function main() {
   };
   window.replay = {  // for tests
     position: (agent, frame) => Array.from({ length: axes }, (_, axis) => at(whole, axis, agent, frame)),
+    colour: agent => Array.from(tones.slice(3 * agent, 3 * agent + 3)),
     get time() { return now; }, get playing() { return playing; }, get busy() { return busy; }, seek, play,
   };
   requestAnimationFrame(tick);

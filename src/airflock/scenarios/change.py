@@ -7,7 +7,9 @@ from typing import Any
 from airflock.body.registry import BODIES
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import SETS
-from airflock.scenarios.files import MODELS, load, make
+from airflock.scenarios.files import load
+from airflock.scenarios.laws import MODELS
+from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors.registry import SENSORS
 

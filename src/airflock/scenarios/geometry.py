@@ -1,9 +1,10 @@
 """Checks of a world that need more than one number: simple polygons, containment, room for all agents."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
-from shapely.geometry import Point, Polygon, box
+from shapely.geometry import MultiPoint, Point, Polygon, box
 from shapely.validation import explain_validity
 
 from airflock.scenarios.wings import FORMATIONS
@@ -45,11 +46,33 @@ def largest_extension(world: arena.Parameters) -> float:
     if world.arena == "none":
         return 0.0
     if world.arena == "polygon":
-        corners = [(float(c[0]), float(c[1])) for c in world.corners]
-        ground = 0.5 * max((math.dist(a, b) for a in corners for b in corners), default=0.0)
+        ground = 0.5 * diameter([(float(c[0]), float(c[1])) for c in world.corners])
     else:
         ground = x if world.arena == "circle" else math.hypot(x, y)
     return math.hypot(ground, up)
+
+
+def diameter(points: Sequence[tuple[float, float]]) -> float:
+    """Largest distance between two of the points, m: by the calipers that turn around their convex hull."""
+    hull = MultiPoint(points).convex_hull
+    if hull.is_empty or isinstance(hull, Point):
+        return 0.0
+    ends: list[tuple[float, ...]] = [*hull.exterior.coords][:-1] if isinstance(hull, Polygon) else [*hull.coords]
+    count, far, largest = len(ends), 1, 0.0
+    for k, (x, y) in enumerate(ends):
+        nx, ny = ends[(k + 1) % count]
+
+        def beyond(i: int, x: float = x, y: float = y, nx: float = nx, ny: float = ny) -> float:
+            """Twice the area that point i spans with the side, so how far it lies from it."""
+            return abs((nx - x) * (ends[i][1] - y) - (ny - y) * (ends[i][0] - x))
+
+        for _ in range(count):
+            after = (far + 1) % count
+            largest = max(largest, math.dist((x, y), ends[far]), math.dist((nx, ny), ends[far]))
+            if beyond(after) < beyond(far) or after == k:
+                break
+            far = after
+    return largest
 
 
 def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:

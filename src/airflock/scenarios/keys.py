@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from airflock.body.registry import BODIES
 from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
 from airflock.errors import ScenarioError
-from airflock.scenarios.files import MODELS, find_model
+from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.sensors.registry import SENSORS
 

@@ -120,7 +120,7 @@ def _share(scene: scenery.Parameters, begin: start.Parameters, dims: int) -> flo
         if begin.kind == "ball":
             spot *= min(1.0, 1.0 / max(float(np.linalg.norm(spot)), 1e-9))
         spot *= reach
-        shut += clearance(place, spot) < begin.clearance or in_mesh(place, spot)
+        shut += clearance(place, spot, begin.clearance) < begin.clearance or in_mesh(place, spot)
         if number >= DRAWN and shut < number:  # only a region that looks shut is looked at for longer
             break
     return shut / number

@@ -22,7 +22,8 @@ Polygons = tuple[tuple[tuple[float, ...], ...], ...]
 MARGIN = 100.0  # m; the ground reaches beyond the scene, so that no flock slips under it
 DEPTH = 1000.0  # m; thickness of the ground: nothing starts below it
 MANY = 50_000  # shapes; of more no lists are made, which would take longer than they save
-ATTEMPTS = 100_000  # draws of a free point
+ATTEMPTS = 100_000  # draws of all free points
+IN_VAIN = 10_000  # of them without finding one: hardly any of the scene is free
 
 
 @lru_cache(maxsize=32)
@@ -76,10 +77,10 @@ def appearances(p: scenery.Parameters, count: int) -> NDArray[np.float64]:
     return np.tile(np.where(late < p.later, np.maximum(when * p.later_until, 1e-6), 0.0), parts)
 
 
-def clearance(found: Scene, position: Any) -> float:
-    """Distance (m) from a position to what stands in a scene; negative inside a solid, 1e30 if nothing stands there."""
+def clearance(found: Scene, position: Any, within: float = 1e6) -> float:
+    """Distance (m) to what stands in a scene; negative inside a solid, 1e30 if nothing is within (m)."""
     x, y, z = (float(c) for c in position)
-    return float(bvh.nearest(x, y, z, 1e6, *_tables(found)).distance)
+    return float(bvh.nearest(x, y, z, within, *_tables(found)).distance)
 
 
 def in_mesh(found: Scene, position: Any) -> bool:
@@ -114,14 +115,18 @@ def waypoints(g: goals.Parameters, p: scenery.Parameters, dimensions: int) -> ND
     rng = np.random.default_rng([int(p.seed), 1])
     chosen: list[NDArray[np.float64]] = []
     last = np.zeros(3)
+    vain = 0
     for _ in range(ATTEMPTS):
+        if vain == IN_VAIN:
+            break
+        vain += 1
         spot = np.array(
             [*rng.uniform(-half, half, 2), rng.uniform(g.low, max(g.high, g.low)) if dimensions == 3 else 0.0]
         )
-        free = np.linalg.norm(spot - last) >= g.apart and clearance(place, spot) >= g.clearance
+        free = np.linalg.norm(spot - last) >= g.apart and clearance(place, spot, g.clearance) >= g.clearance
         if free and not in_mesh(place, spot):
             chosen.append(spot)
-            last = spot
+            last, vain = spot, 0
             if len(chosen) == int(g.count):
                 return np.array(chosen)
     raise SceneError(

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.core.contract import Model
+
 
 def vectors(record: Any) -> dict[str, tuple[str, str]]:
     """Vectors among the fields of a NamedTuple: name → fields of its x and y component.
@@ -18,6 +20,11 @@ def vectors(record: Any) -> dict[str, tuple[str, str]]:
         if field.endswith("x") and f"{stem}y" in fields:
             found[stem.strip("_")] = (field, f"{stem}y")
     return found
+
+
+def word_of(model: Model, stem: str) -> tuple[str, str]:
+    """What a law calls a vector among its Sums, and its unit; by default the field's stem."""
+    return model.terms.get(stem, (stem or "neighbours", ""))
 
 
 def values(record: Any) -> dict[str, NDArray[np.float64]]:

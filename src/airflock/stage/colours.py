@@ -1,4 +1,4 @@
-"""Colours of agents by what they do: safe for colour-blind readers, even in lightness."""
+"""Colours: scales, a wheel and names, safe for colour-blind readers, scales even in lightness."""
 
 from typing import Any
 
@@ -17,6 +17,7 @@ CHOSEN = (255, 140, 0)
 INK = "#555555"
 BLUE, RED, GREEN = (0, 114, 178), (213, 94, 0), (0, 158, 115)
 ORANGE, PURPLE, SKY = (230, 159, 0), (204, 121, 167), (86, 180, 233)  # Okabe and Ito 2008
+KINDS = (BLUE, GREEN, PURPLE, SKY, (120, 94, 240), RED, ORANGE)  # of names, in this order
 TERMS = (GREEN, SKY, PURPLE, BLUE, (120, 94, 240), (120, 120, 120))
 LINES = {
     "links": ((170, 180, 195), 1.0),
@@ -28,8 +29,6 @@ LINES = {
     "rays": ((150, 150, 150), 1.0),
     "wake": (SKY, 1.5),
 }  # kinds of lines about agents: colour, width in pixels
-
-WAYS = ("speed", "heading", "height", "agent")
 
 
 def ramp(share: NDArray[Any]) -> NDArray[np.uint8]:
@@ -47,37 +46,3 @@ def _between(table: NDArray[Any], place: NDArray[Any]) -> NDArray[np.uint8]:
     first = np.minimum(place.astype(int), len(table) - 2)
     part = (place - first)[:, None]
     return np.asarray(np.round(table[first] * (1.0 - part) + table[first + 1] * part), np.uint8)
-
-
-def colours(
-    way: str, position: NDArray[Any], velocity: NDArray[Any], top: float, height: tuple[float, float]
-) -> NDArray[np.uint8]:
-    """Colours (agent, 3) by speed (0 to `top` m/s), heading, height (between two, m) or number."""
-    if way == "heading":
-        return wheel(np.arctan2(velocity[:, 1], velocity[:, 0]) / (2.0 * np.pi))
-    if way == "height":
-        low, high = height
-        return ramp((position[:, 2] - low) / max(high - low, 1e-9))
-    if way == "agent":
-        return wheel(np.arange(len(position)) * 0.6180339887)
-    return ramp(np.sqrt((velocity**2).sum(1)) / max(top, 1e-9))
-
-
-def key(way: str, top: float, height: tuple[float, float]) -> str:
-    """The key to the colours, as HTML."""
-    if way == "agent":
-        return "<small>each agent has a colour of its own</small>"
-    if way == "heading":
-        sample, left, right = wheel(np.linspace(0.0, 1.0, 25)), "east", "north, west, south, east"
-    else:
-        sample = ramp(np.linspace(0.0, 1.0, 17))
-        low, high = (0.0, top) if way == "speed" else height
-        unit = "m/s" if way == "speed" else "m"
-        left, right = f"{low:.3g}", f"{high:.3g} {unit}"
-    bands = ", ".join("#{:02x}{:02x}{:02x}".format(*c) for c in sample.tolist())
-    return (
-        f'<div style="padding:0 0.75em"><div style="height:0.7em;border-radius:3px;'
-        f'background:linear-gradient(to right, {bands})"></div><div '
-        'style="display:flex;justify-content:space-between;font-size:0.75em">'
-        f"<span>{left}</span><span>{way}</span><span>{right}</span></div></div>"
-    )

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from airflock.core.agent import Heard, State, decide
-from airflock.engine.place import Course, Place, Senses
-from airflock.engine.tables import clock
+from airflock.core.pilot import Senses
+from airflock.engine.place import Course, Place
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 
 
 class Ray(NamedTuple):
@@ -38,8 +39,7 @@ def cast_rays(
 
     place, course : the world and its goals as they are at this time, s; own, heard : states of the agent and of others
     """
-    senses = Watched.of(place, course, own, time, 0, 0, agent)
-    assert isinstance(senses, Watched)
+    senses = Watched.of(place, own, time, course.of(agent), (0, 0, agent))
     senses.cast_rays = []
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     made = decide(

@@ -14,6 +14,7 @@ from airflock.stage import colours
 from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
 from airflock.studio import measures
 from airflock.studio.player import Player
+from airflock.studio.shading import Shading
 from airflock.studio.side import BELOW, Side
 from airflock.studio.view import View
 
@@ -89,7 +90,7 @@ class Drawing:
 
     def __init__(self, player: Player, view: View):
         self.player, self.view = player, view
-        self.way, self.trails, self.links, self.follow = "speed", True, LINKS[0], False
+        self.shading, self.trails, self.links, self.follow = Shading(), True, LINKS[0], False
         self.collisions: deque[Collision] = deque(maxlen=LISTED)
         self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
         self.stand()
@@ -178,8 +179,7 @@ class Drawing:
             return
         usual = float(np.quantile(np.sqrt((velocity**2).sum(1)), 0.95))
         self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
-        own = np.vstack([flock.position for flock in flocks])
-        tone = colours.colours(self.way, own, velocity, self.top, self.stages[0].height)
+        tone = self.shading.of(flocks, velocity, self.top, self.stages[0].height).tones
         self._flash(tone)
         trail, anew = tone.copy(), False
         if chosen is not None:

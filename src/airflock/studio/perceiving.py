@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.core.contract import Model
 from airflock.engine.look import View as Seen
 from airflock.engine.place import Course, Place
 from airflock.engine.state import State as Memory
 from airflock.scenarios.scenario import Scenario
 from airflock.stage import colours
-from airflock.stage.arrows import arrow, values
+from airflock.stage.arrows import arrow, values, word_of
 from airflock.stage.rays import cast_rays
 from airflock.studio.side import Side
 
@@ -50,7 +51,7 @@ class Perceiving:
         wish = np.zeros(3)
         wish[: len(seen.command)] = seen.command
         lines["command"] = arrow(own, own + wish * (REACH * size / max(top, 1e-9))), None
-        points, tones, named = self._terms(seen, own, size)
+        points, tones, named = self._terms(seen, own, size, scenario.model)
         lines["terms"] = points, tones
         words = [*_about(seen, scenario), *named]
         memory = side.flight.snapshot().state
@@ -63,7 +64,9 @@ class Perceiving:
             words.append(_wash(memory, agent))
         return Drawn(lines, "<br>".join(words))
 
-    def _terms(self, seen: Seen, own: NDArray[Any], size: float) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
+    def _terms(
+        self, seen: Seen, own: NDArray[Any], size: float, model: Model
+    ) -> tuple[NDArray[Any], NDArray[Any], list[str]]:
         """Arrows of what the law was given: of all neighbours, of each, and of all surfaces.
 
         Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
@@ -80,7 +83,8 @@ class Perceiving:
             shafts = np.vstack([arrow(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)])
             pieces.append(shafts)
             tones.append(np.tile(tone, (len(shafts), 1)))
-            words.append(f"{_dash(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
+            word = word_of(model, name.replace("neighbours", ""))[0] if name in given else name
+            words.append(f"{_dash(tone)} {html.escape(word)} {strength:.3g}, at most {most:.3g}")
         if not pieces:
             return NONE, np.zeros((0, 3)), []
         return np.vstack(pieces), np.vstack(tones), words
@@ -91,7 +95,7 @@ class Perceiving:
             self._place = scenario, Place(scenario)
         place, course = self._place[1], Course(scenario)
         if len(memory.arrays["later"]):
-            place.scene[0][:] = memory.arrays["shapes"].astype(float).tolist()
+            place.shapes[:] = memory.arrays["shapes"].astype(float).tolist()
         if course.points and scenario.goals.kind != "own":
             x, y, z = memory.arrays["aim"][:3].astype(float).tolist()
             course.at = x, y, z

@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from airflock.stage import colours
 from airflock.studio.drawing import LINKS, NAMES, Collision
 from airflock.studio.room import Room, note
+from airflock.studio.shading import ways
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page
@@ -30,7 +30,9 @@ class Playing(Room):
             "agents", player.flight.agents, 1, most, lambda n: player.ask(lambda: self.reset(agents=n)),
             "another number begins another flight",
         )  # fmt: skip
-        panel.menu("colour by", colours.WAYS, drawing.way, lambda way: setattr(drawing, "way", way))
+        self.way = panel.menu(
+            "colour by", ways(drawing.flocks), drawing.shading.way, lambda way: setattr(drawing.shading, "way", way)
+        )
         self.key = panel.text()
         panel.checkbox("trails", drawing.trails, told=lambda on: setattr(drawing, "trails", on))
         panel.menu(
@@ -47,6 +49,14 @@ class Playing(Room):
             ("B", "Back", self.back),
         ):  # fmt: skip
             panel.command(label, key, self.ask(action))
+
+    def stand(self) -> None:
+        """What may colour the agents of these flights."""
+        known = ways(self.drawing.flocks)
+        if tuple(self.way.options) != known:
+            self.way.options = known
+            self.drawing.shading.way = self.drawing.shading.way if self.drawing.shading.way in known else known[0]
+            self.way.value = self.drawing.shading.way
 
     def _speed(self, speed: float) -> None:
         self.player.pace.speed = speed
@@ -77,7 +87,9 @@ class Playing(Room):
         if self.pause.label != label:
             self.pause.label = label
         drawing = self.drawing
-        self.key.content = colours.key(drawing.way, drawing.top, drawing.stages[0].height)
+        self.key.content = drawing.shading.shown.key
+        if self.way.value != drawing.shading.way:
+            self.way.value = drawing.shading.way
         found = list(drawing.collisions)
         if found != self._told:
             self._told = found

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from airflock.core.agent import State
 from airflock.core.maths import FAR
-from airflock.world import arena, bvh, excursion, polygon, rays
+from airflock.world import arena, bvh, edges, excursion, polygon, rays
 from airflock.world.arena import Surface
 
 Corners = Sequence[Sequence[float]]
@@ -188,12 +189,26 @@ class Place:
     ):
         found = shapes or Shapes()
         self._dims, self._look, self._casts = int(world.dimensions), look, casts
-        self._walls, self._half = walls(world), half_sizes(world)
+        self._walls, self._half, self._periodic = walls(world), half_sizes(world), world.edges == "periodic"
         self._scene = found.shapes, found.nodes, found.links
         kind = "none" if world.edges == "periodic" else world.arena
         self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
         self._edges, self._corners, self._obstacles = edge_rows(world)
         self._obstacle, self._middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
+
+    def image(self, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
+        """Offset (m) to the nearest image in a periodic box; elsewhere the offset itself."""
+        if not self._periodic:
+            return dx, dy, dz
+        x, y, z = (edges.nearest_image(d, half) for d, half in zip((dx, dy, dz), self._half, strict=True))
+        return x, y, z
+
+    def beside(self, own: State, other: State) -> State:
+        """State of another agent at the image that is nearest to own."""
+        if not self._periodic:
+            return other
+        dx, dy, dz = self.image(other.x - own.x, other.y - own.y, other.z - own.z)
+        return other._replace(x=own.x + dx, y=own.y + dy, z=own.z + dz)
 
     def surfaces(self, x: float, y: float, z: float) -> Iterator[Surface]:
         """Distance (m) and unit normal of every wall, every obstacle, and the nearest of the ground and the scene."""

@@ -17,10 +17,11 @@ from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
-from airflock.engine.tables import Tables, clock, tables
+from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined
 from airflock.errors import DeviceError
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from airflock.scenarios.wings import FORMATIONS
 
 CELLS = 4  # at most so many cells per agent, as on the CPU

@@ -196,7 +196,7 @@ class Task:
 @lru_cache(maxsize=8)
 def rebuild(text: str, where: str) -> Any:
     """Scenario from its document; made once in a worker process."""
-    from airflock.scenarios.files import make
+    from airflock.scenarios.making import make
 
     # its law has run where the study began: whoever began it has consented
     return make(json.loads(text), where, folder=Path(where).parent, trust=True)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from airflock.engine import cpu
 from airflock.engine.simulate import fly, plan_of
-from airflock.engine.threads import in_threads
 from airflock.papers.dimock_2003.units import FOOT, Gains
 from airflock.papers.flights import Progress
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_threads
 
 V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
 

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 from xarray import Dataset
 
-from airflock.engine.threads import in_threads
 from airflock.papers import statistics
 from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_threads
 
 SEEDS = 20
 OPEN = {"scene.density": 0.0}

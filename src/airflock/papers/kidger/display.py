@@ -6,10 +6,10 @@ from typing import Any
 import pandas as pd
 
 from airflock.display import fly_show, points_of
-from airflock.engine.threads import in_threads
 from airflock.papers import statistics
 from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
+from airflock.threads import in_threads
 
 DRONES = 200
 SHAPES = ("AIR", "2026", "<3", "FLOCK", "OK")

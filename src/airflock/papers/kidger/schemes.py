@@ -8,8 +8,9 @@ import pandas as pd
 
 from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.maths import norm
+from airflock.core.pilot import Senses
 from airflock.core.vocabulary import Own
-from airflock.engine.place import Course, Place, Senses
+from airflock.engine.place import Course, Place
 from airflock.models import kidger
 from airflock.papers import statistics
 from airflock.papers.claims import Measured
@@ -85,7 +86,7 @@ def looked_into(scenario: Scenario, place: Place, course: Course, flock: list[St
     """Decide once more for agent i, oracle by oracle."""
     p, own, dt = scenario.parameters, flock[i], scenario.flight.dt
     heard = [Heard(j, state, 0.0) for j, state in enumerate(flock) if j != i]
-    senses = Senses.of(place, course, own, 0.0, 0, 0, i)
+    senses = Senses.of(place, own, 0.0, course.of(i), (0, 0, i))
     flown = decide(scenario.model, p, own, heard, (), None, time=0.0, period=dt, index=i, percept=senses).command
     speed = norm(*own[3:])
     me = Own(*own[3:], *(v / speed for v in own[3:]))
@@ -101,7 +102,8 @@ def looked_into(scenario: Scenario, place: Place, course: Course, flock: list[St
     way = kidger.way_out(senses, ux, uy, uz, free, p)
     pace = norm(*flown)
     along = sum(a * b for a, b in zip(way[:3], flown, strict=True)) / pace
-    met = place.cast(own, (flown[0] / pace, flown[1] / pace, flown[2] / pace), pace * dt + 0.01, width)
+    x, y, z = (v / pace for v in flown)
+    met = place.cast(*own[:3], x, y, z, pace * dt + 0.01, width)
     return Overruled(1.0, math.degrees(math.acos(max(-1.0, min(1.0, along)))), 1.0 if met < pace * dt else 0.0)
 
 

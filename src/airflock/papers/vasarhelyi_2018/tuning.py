@@ -14,15 +14,15 @@ import pandas as pd
 from xarray import Dataset
 
 from airflock import atomic
+from airflock.cache import cache_folder
 from airflock.engine.simulate import score_flights
-from airflock.engine.store import cache_folder
-from airflock.engine.threads import in_threads
 from airflock.papers import statistics
 from airflock.papers.claims import Measured
 from airflock.papers.flights import Flights
 from airflock.recordings.flights import provenance, simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_threads
 
 SPEEDS = (4, 6, 8)
 SEEDS, RECORDED = 40, 10  # flights scored, and of these recorded for the measures below

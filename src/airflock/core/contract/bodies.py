@@ -1,0 +1,99 @@
+"""The contract of a body: what turns a command into a motion."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.core.contract.namespaces import names_of
+from airflock.core.vocabulary import COMMANDS, asks
+from airflock.errors import RuleError
+
+
+@dataclass(frozen=True)
+class Body:
+    """What turns a command into a motion, gathered from its module.
+
+    accepts     : the COMMAND of the models that it can carry
+    integration : "old" if a position moves by the velocity before `move`, "new" if by the one after it
+    Memory      : NamedTuple of what a body keeps from step to step, each field with its value at the start; `move` asks
+                  for it as `memory` and returns it behind the velocity
+    limits      : `limits` of any of b, dt, speed, start, wing → what of a scenario the body cannot fly, one line each
+    violates    : truths of `airflock.check_body` that do not hold for it, and why (VIOLATES)
+    """
+
+    name: str
+    Parameters: type
+    accepts: str
+    integration: str
+    move: Callable[..., Any]
+    violates: Mapping[str, str] = field(default_factory=dict)
+    Memory: type | None = None
+    limits: Callable[..., list[str]] | None = None
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.move))
+
+    @property
+    def beginnings(self) -> tuple[float, ...]:
+        """What each field of its Memory is at the start of a flight."""
+        return tuple(getattr(self.Memory, "_field_defaults", {}).values())
+
+    def lacks(self, **given: Any) -> list[str]:
+        """What this body cannot fly, by what `limits` may ask for."""
+        if self.limits is None:
+            return []
+        return self.limits(**{name: given[name] for name in asks(self.limits, "limits", self.name)})
+
+
+def body(namespace: Any, name: str = "") -> Body:
+    """Gather a body from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds Parameters, ACCEPTS (the command that it takes: velocity, acceleration or heading), INTEGRATION (whether
+        positions move with the "old" or the "new" velocity) and the rule move; if it likes, Memory (a NamedTuple whose
+        fields have the values of the start), which move asks for as `memory` and returns as x, y, z, Memory(...).
+    name : str, optional
+        How the body is called; by default the namespace's.
+
+    Returns
+    -------
+    Body
+        To be given to `airflock.load(..., body=...)`.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or the rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Obedient:
+    ...     ACCEPTS, INTEGRATION = "velocity", "new"
+    ...     class Parameters(airflock.Parameters):
+    ...         pass
+    ...     def move(cx, cy, cz):
+    ...         return cx, cy, cz
+    >>> airflock.body(Obedient).accepts
+    'velocity'
+    """
+    found, name = names_of(namespace, name)
+    for needed in ("Parameters", "ACCEPTS", "INTEGRATION", "move"):
+        if needed not in found:
+            raise RuleError(f"body {name} lacks {needed}")
+    asks(found["move"], "move", name)
+    if found["ACCEPTS"] not in COMMANDS or found["INTEGRATION"] not in ("old", "new"):
+        raise RuleError(f"body {name}: ACCEPTS is one of {', '.join(COMMANDS)}; INTEGRATION is old or new")
+    memory = found.get("Memory")
+    if ("memory" in asks(found["move"], "move", name)) is (memory is None):
+        raise RuleError(f"body {name}: a rule move that asks for memory and a NamedTuple Memory come together")
+    if memory is not None and set(getattr(memory, "_field_defaults", {})) != set(getattr(memory, "_fields", "-")):
+        raise RuleError(f"body {name}: Memory is a NamedTuple whose fields all have a value for the start")
+    if found.get("limits") is not None:
+        asks(found["limits"], "limits", name)
+    return Body(
+        name, found["Parameters"], found["ACCEPTS"], found["INTEGRATION"], found["move"],
+        dict(found.get("VIOLATES", {})), memory, found.get("limits"),
+    )  # fmt: skip

@@ -1,0 +1,127 @@
+"""The contract of an order parameter: rules that measure a flock at one instant, and how instants combine."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.core.contract.namespaces import names_of
+from airflock.core.vocabulary import CLOCKS, OVER_TIME, REDUCTIONS, asks
+from airflock.errors import RuleError
+
+
+@dataclass(frozen=True)
+class Metric:
+    """An order parameter: rules that measure a flock at one instant, and how instants combine.
+
+    within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
+              while no two agents are nearer than that. A driver may then skip the pair loop.
+    clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
+    survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
+              `workspace` of any of n, q, wing gives its scratch
+    reports : of every order parameter that comes out: its unit and what it means
+    total   : from the combined values of a whole flight to named order parameters; by default they are these
+    violates : truths of `airflock.check_metric` that do not hold for it, and why (VIOLATES)
+    """
+
+    name: str
+    sample: Callable[..., Any]
+    Sample: type
+    pair: Callable[..., Any] | None = None
+    Pair: type | None = None
+    agent: Callable[..., Any] | None = None
+    Agent: type | None = None
+    linked: Callable[..., Any] | None = None
+    member: Callable[..., Any] | None = None
+    Member: type | None = None
+    cluster: Callable[..., Any] | None = None
+    Cluster: type | None = None
+    Memory: type | None = None
+    within: Callable[..., float] | None = None
+    survey: Callable[..., None] | None = None
+    Shared: type | None = None
+    workspace: Callable[..., Any] | None = None
+    reduce: Mapping[str, str] = field(default_factory=dict)
+    over_time: Mapping[str, str] = field(default_factory=dict)
+    clock: str = "sample"
+    total: Callable[..., dict[str, float]] | None = None
+    reports: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    violates: Mapping[str, str] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
+
+
+RULES_AND_RECORDS = (
+    ("sample", "Sample"), ("pair", "Pair"), ("agent", "Agent"), ("member", "Member"), ("cluster", "Cluster"),
+    ("cluster", "linked"), ("survey", "Shared"), ("survey", "workspace"),
+)  # fmt: skip
+
+
+def metric(namespace: Any, name: str = "") -> Metric:
+    """Gather an order parameter from a module, a class or a mapping; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds sample and Sample, and any of pair, agent, linked, member, cluster, survey, their records and REPORTS, as
+        `Metric` lists them. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+    name : str, optional
+        How it is called; by default the namespace's.
+
+    Returns
+    -------
+    Metric
+        To be given to `airflock.load(..., metrics=...)`, alone or in a list.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> from typing import NamedTuple
+    >>> class Height:
+    ...     REPORTS = {"height": ("m", "mean height of the flock")}
+    ...     Agent = NamedTuple("Agent", [("z", float)])
+    ...     Sample = NamedTuple("Sample", [("height", float)])
+    ...     def agent(z):
+    ...         return Agent(z)
+    ...     def sample(agents, n):
+    ...         return Sample(agents.z / n)
+    >>> airflock.metric(Height).reports["height"]
+    ('m', 'mean height of the flock')
+    """
+    found, name = names_of(namespace, name)
+    if "sample" not in found:
+        raise RuleError(f"metric {name} lacks sample")
+    for rule, record in RULES_AND_RECORDS:
+        if rule in found and record not in found:
+            raise RuleError(f"metric {name} has a rule {rule} but no {record}")
+    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
+        if kind in found:
+            asks(found[kind], kind, name)
+    fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
+    for key, how in found.get("REDUCE", {}).items():
+        if key not in fields or how not in REDUCTIONS:
+            raise RuleError(f"metric {name}: REDUCE[{key!r}] = {how!r}; give a field of a record, one of {REDUCTIONS}")
+    for key, how in found.get("OVER_TIME", {}).items():
+        if key not in found["Sample"]._fields or how not in OVER_TIME:
+            raise RuleError(f"metric {name}: OVER_TIME[{key!r}] = {how!r}; give a field of Sample, one of {OVER_TIME}")
+    clock = found.get("CLOCK", "sample")
+    if clock not in CLOCKS:
+        raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
+    records = (
+        "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
+        "Memory", "within", "total", "survey", "Shared", "workspace",
+    )  # fmt: skip
+    return Metric(
+        name=name,
+        reduce=dict(found.get("REDUCE", {})),
+        over_time=dict(found.get("OVER_TIME", {})),
+        reports=dict(found.get("REPORTS", {})),
+        violates=dict(found.get("VIOLATES", {})),
+        clock=clock,
+        **{key: found[key] for key in records if key in found},
+    )

@@ -1,0 +1,143 @@
+"""The contract of a model: a published flocking law, gathered from a module or any namespace."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.core.contract.namespaces import names_of
+from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
+from airflock.errors import RuleError
+
+
+@dataclass(frozen=True)
+class Model:
+    """A published flocking law: parameters and rules, gathered from a module or any namespace.
+
+    name         : how scenarios refer to it
+    Parameters   : record of parameters (`core.parameters.Parameters`)
+    command      : "velocity" (m/s), "acceleration" (m/s²) or "heading" (unit vector)
+    reach        : `reach(p)`, largest interaction radius, m; without it the radio alone decides who is heard
+    sight        : `sight(p)`, how far percept.cast looks, m
+    neighbour    : pair rule → Sums; Sums its NamedTuple; reduce: how fields combine where not by a sum
+    boundary     : surface rule → Walls
+    flock        : the one rule of the whole flock: fills the columns of Shared, which `decide` may read as `shared`
+    workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
+    wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
+    decide       : → command x, y, z and a Memory if the model declares one
+    usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
+    preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
+    violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
+    terms    : vectors among its Sums (their fields without x, y, z) → what the law calls them, and their unit (TERMS)
+    """
+
+    name: str
+    Parameters: type
+    command: str
+    decide: Callable[..., Any]
+    reach: Callable[..., float] | None = None
+    sight: Callable[..., float] | None = None
+    neighbour: Callable[..., Any] | None = None
+    Sums: type | None = None
+    boundary: Callable[..., Any] | None = None
+    Walls: type | None = None
+    wall_reach: Callable[..., float] | None = None
+    Memory: type | None = None
+    flock: Callable[..., None] | None = None
+    Shared: type | None = None
+    workspace: Callable[..., Any] | None = None
+    reduce: Mapping[str, str] = field(default_factory=dict)
+    usual: Mapping[str, float] = field(default_factory=dict)
+    preferred_speed: Callable[..., float] | None = None
+    interaction_range: Callable[..., float] | None = None
+    doc: str = ""
+    violates: Mapping[str, str] = field(default_factory=dict)
+    terms: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
+
+
+def model(namespace: Any, name: str = "") -> Model:
+    """Gather a model from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds COMMAND, Parameters, decide, and any of neighbour, Sums, boundary, Walls, reach and the others that
+        `Model` lists. The argument names of a rule say what it asks for (`airflock.core.vocabulary`).
+    name : str, optional
+        How the model is called; by default the namespace's.
+
+    Returns
+    -------
+    Model
+        To be given to `airflock.load(..., law=...)`.
+
+    Raises
+    ------
+    RuleError
+        If something is missing, or a rule asks for what there is not; names the nearest word.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Straight:
+    ...     COMMAND = "velocity"
+    ...     class Parameters(airflock.Parameters):
+    ...         pass
+    ...     def decide(own):
+    ...         return own.vx, own.vy, own.vz
+    >>> airflock.model(Straight).command
+    'velocity'
+    """
+    found, name = names_of(namespace, name)
+    for needed in ("Parameters", "COMMAND", "decide"):
+        if needed not in found:
+            raise RuleError(f"model {name} lacks {needed}")
+    if found["COMMAND"] not in COMMANDS:
+        raise RuleError(f"model {name}: COMMAND = {found['COMMAND']!r} is none of {', '.join(COMMANDS)}")
+    for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):
+        if rule in found and record not in found:
+            raise RuleError(f"model {name} has a rule {rule} but no {record}")
+    for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide"):
+        if kind in found:
+            asks(found[kind], kind, name)
+    reduce = dict(found.get("REDUCE", {}))
+    for key, how in reduce.items():
+        if key not in getattr(found.get("Sums"), "_fields", ()) or how not in REDUCTIONS:
+            raise RuleError(f"model {name}: REDUCE[{key!r}] = {how!r}; give a field of Sums and one of {REDUCTIONS}")
+    return Model(
+        name=name,
+        Parameters=found["Parameters"],
+        command=found["COMMAND"],
+        decide=found["decide"],
+        reach=found.get("reach"),
+        sight=found.get("sight"),
+        neighbour=found.get("neighbour"),
+        Sums=found.get("Sums"),
+        boundary=found.get("boundary"),
+        Walls=found.get("Walls"),
+        wall_reach=found.get("wall_reach"),
+        Memory=found.get("Memory"),
+        flock=found.get("flock"),
+        Shared=found.get("Shared"),
+        workspace=found.get("workspace"),
+        reduce=reduce,
+        usual=dict(found.get("USUAL", {})),
+        preferred_speed=found.get("preferred_speed"),
+        interaction_range=found.get("interaction_range"),
+        doc=str(found.get("__doc__") or ""),
+        violates=dict(found.get("VIOLATES", {})),
+        terms=_terms(found.get("TERMS", {}), found.get("Sums"), name),
+    )
+
+
+def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:
+    """Words of a law for its vectors; each stands for fields that there are."""
+    fields = getattr(sums, "_fields", ())
+    for stem, words in dict(given).items():
+        if not any(f"{stem}{joint}x" in fields for joint in ("", "_")):
+            raise RuleError(f"model {name}: TERMS[{stem!r}]: Sums has no field {stem}x")
+        if not (isinstance(words, tuple) and len(words) == 2 and all(isinstance(word, str) for word in words)):
+            raise RuleError(f"model {name}: TERMS[{stem!r}] = {words!r}; give a word and a unit")
+    return dict(given)

@@ -1,0 +1,10 @@
+"""Namespaces: where rules are gathered from."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def names_of(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
+    """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's."""
+    found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
+    return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")

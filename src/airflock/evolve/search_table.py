@@ -1,0 +1,133 @@
+"""The table [search] of a study file: which algorithm, how many flights, how long, from where; and what cannot be."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import choice, quantity
+from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
+from airflock.evolve.space import Space
+
+S6 = "Vásárhelyi et al. 2018, Table S6"
+SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
+FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search(Record):
+    """How a study searches: the table [search]."""
+
+    algorithm: str = choice(
+        "cmaes",
+        ALGORITHMS,
+        source=S6,
+        meaning="CMA-ES; a binary genetic algorithm; NSGA-II or NSGA-III (Pareto fronts)",
+    )
+    population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates of a generation")
+    generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations of a run")
+    seeds: float = quantity(
+        1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights of a candidate"
+    )
+    random_numbers: str = choice(
+        "fresh",
+        ("fresh", "generation", "study"),
+        source="our choice",
+        meaning="flights' seeds: new for each candidate, common to a generation, or common to the whole study",
+    )
+    restarts: float = quantity(
+        0, "1", low=0, high=1000, source="our choice", meaning="independent further runs after the first"
+    )
+    growth: float = quantity(
+        1.0,
+        "1",
+        low=1.0,
+        high=16.0,
+        source="our choice; Auger & Hansen 2005 take 2",
+        meaning="factor by which each restart enlarges the population",
+    )
+    flights: str = choice(
+        "whole",
+        ("whole", "growing"),
+        source="our choice; docs/decisions/0072",
+        meaning="length of the search's flights: that of the scenario, or from an eighth of it up to it",
+    )
+    start: str = choice(
+        "middle",
+        ("middle", "scenario"),
+        source="Methods, last paragraph of 'Fitness function': the middle",
+        meaning="where CMA-ES starts: in the middle of all ranges, or at the scenario's own numbers (warm)",
+    )
+    spread: float = quantity(
+        1.0 / 6.0,
+        "1",
+        low=0.001,
+        high=1.0,
+        source="Methods, last paragraph of 'Fitness function'",
+        meaning="first standard deviation of CMA-ES as a share of each range",
+    )
+    averages: float = quantity(
+        0,
+        "1",
+        low=0,
+        high=20,
+        source="our choice; docs/decisions/0072",
+        meaning="further finalists: means of CMA-ES averaged over its last half, quarter, eighth, ... of generations",
+    )
+    seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
+    precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
+    top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
+    pool: float = quantity(
+        200, "1", low=0, high=1e6, source="our choice", meaning="candidates that race for the top; 0: the luckiest win"
+    )
+    final_seeds: float = quantity(
+        100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"
+    )
+
+
+def search_faults(search: Search, objectives: int, space: Space | None) -> list[str]:
+    """What of a search cannot be, one line each; `space` as far as it could be read."""
+    faults = [
+        f"search.{name} = {value:g} is not a whole number"
+        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds", "averages")
+        if (value := getattr(search, name)) != int(value)
+    ]
+    if search.algorithm in SEVERAL and objectives < 2:
+        faults.append(
+            f"search.algorithm = '{search.algorithm}' is for several objectives, but there is one; "
+            "give objective.maximise a list"
+        )
+    if search.algorithm not in SEVERAL and objectives > 1:
+        faults.append(
+            f"search.algorithm = '{search.algorithm}' takes one objective, but there are {objectives}; "
+            f"give one, or search.algorithm = 'nsga2'"
+        )
+    faults += _only_cmaes(search)
+    if search.flights == "growing":
+        if search.generations < FEWEST:
+            faults.append(
+                f"search.flights = 'growing' needs at least {FEWEST} generations, but search.generations = "
+                f"{search.generations:g}"
+            )
+        if space is not None and "duration" in {*space.keys, *space.fixed, *space.tied}:
+            faults.append("search.flights = 'growing' sets the duration, which the space does, too; leave out one")
+    populations = [round(search.population * search.growth**run) for run in range(min(int(search.restarts), 20) + 1)]
+    odd = [population for population in populations if population % 2]
+    if search.algorithm == "ga" and odd:
+        grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
+        faults.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
+    flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
+    if flights * search.seeds >= 2 ** (SEED_BITS - 4):
+        faults.append(f"search: {flights * search.seeds:g} flights are more than a study can number")
+    return faults
+
+
+def _only_cmaes(search: Search) -> list[str]:
+    """Faults of keys that mean something for CMA-ES alone, where another algorithm searches."""
+    if search.algorithm == "cmaes":
+        return []
+    usual, found = Search(), []
+    for name in ("flights", "start", "spread", "averages"):
+        value = getattr(search, name)
+        if value != getattr(usual, name):
+            shown = repr(value) if isinstance(value, str) else f"{value:g}"
+            found.append(f"search.{name} = {shown} is for algorithm cmaes, but search.algorithm = '{search.algorithm}'")
+    return found

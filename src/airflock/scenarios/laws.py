@@ -1,0 +1,43 @@
+"""Laws: the model that a scenario names, one of ours or of a file that may run, or one that the caller gives."""
+
+import os
+from collections.abc import Mapping
+from difflib import get_close_matches
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from airflock.core.contract import Model, model
+from airflock.errors import ScenarioError
+from airflock.scenarios.own_code import own_code
+
+MODELS = (
+    "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
+    "dimock_2003",
+)  # fmt: skip
+
+
+def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
+    """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
+    if not isinstance(kind, str):
+        raise ScenarioError([f"{told} = {kind!r} is missing or not a name; known: {', '.join(MODELS)}"])
+    if kind in MODELS:
+        return model(import_module(f"airflock.models.{kind}"), kind)
+    if kind.endswith(".py"):
+        return model(own_code(told, kind, folder, trust=trust), Path(kind).stem)
+    near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
+    raise ScenarioError([f"{told} = {kind!r}: unknown model; {hint}"])
+
+
+def given_law(law: Any) -> Model:
+    """Model of a law that the caller gives: which is consent to run it."""
+    if isinstance(law, Model):
+        return law
+    if isinstance(law, (str, os.PathLike)):
+        return find_model(str(law), told="law", trust=True)
+    if isinstance(law, Mapping) or hasattr(law, "__dict__"):
+        return model(law)
+    raise ScenarioError(
+        [f"law = {law!r} is not a law; give a module, a class, a mapping, or one of {', '.join(MODELS)}"]
+    )
