@@ -8,7 +8,6 @@ from airflock.core.parameters import quantity
 from airflock.core.sensor import Sampled
 
 OURS = "our choice"
-SHEET = "u-blox, data sheet of the NEO-M9N: 0.05 m/s"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +32,7 @@ class Parameters(Sampled):
         0.0, "m", low=0.0, high=1000.0, source=OURS, meaning="SD of an error that an agent keeps all flight long"
     )
     sd_velocity: float = quantity(
-        0.05, "m/s", low=0.0, high=100.0, source=SHEET, meaning="SD of the velocity, from Doppler shifts"
+        0.05, "m/s", low=0.0, high=100.0, source=OURS, meaning="SD of the velocity, from Doppler shifts"
     )
     jump_rate: float = quantity(
         0.0, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often a sound receiver falls into multipath"
