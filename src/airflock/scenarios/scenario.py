@@ -31,8 +31,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
     flight    : number of agents, duration (s), motion step (s)
-    vehicle   : the body that `body` holds the numbers of; sensor: the sensor that `sensors` does; measures: the metric
-                set that `metrics` does
+    vehicle, sensor, measures : body, sensor and metric set that `body`, `sensors` and `metrics` hold the numbers of
     groups    : agents that share numbers; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
