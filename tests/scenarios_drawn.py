@@ -76,6 +76,7 @@ def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
     begin(keys, rng, length, speed)
     perception(keys, rng, length, dt)
     metrics(keys, rng, length, speed, dt)
+    topology(keys, rng, length, three)
     if kind == "dimock_2003" or "aero.k_d" in keys or keys["metrics.kind"] == "dimock":
         keys |= {"agents": min(keys["agents"], 3), "duration": 6 * dt}  # a lifting line for each agent and step
         if keys.get("goals.kind") == "own":
@@ -301,6 +302,16 @@ def sensors(keys: dict[str, Any], rng: Random, length: float, dt: float) -> None
         keys["sensors.outage_rate"] = rng.choice((0.0, 2.0))
 
 
+def topology(keys: dict[str, Any], rng: Random, length: float, three: bool) -> None:
+    """Whom agents meet of those whom they hear."""
+    if rng.random() < 0.5:
+        return
+    kinds = [kind for kind in OPTIONS["topology"]["kind"] if not (three and kind == "voronoi")]
+    keys |= {"topology.kind": rng.choice(kinds), "topology.k": rng.randint(1, 3)}
+    keys |= {"topology.radius": length * rng.choice((0.0, 0.25, 0.5)), "topology.fading": rng.choice((0.0, 4.0))}
+    keys |= {"topology.wall": rng.choice((0.0, 20.0)), "topology.exponent": rng.choice((2.0, 3.5))}
+
+
 def metrics(keys: dict[str, Any], rng: Random, length: float, speed: float, dt: float) -> None:
     """What is measured."""
     kind = rng.choice(("vasarhelyi", "zapotecatl", "groups", "order", "kidger", "dimock"))
@@ -373,7 +384,7 @@ def notions(draw: Draw) -> set[str]:
     names = kinds | {f"{name} {'on' if on else 'off'}" for name, on in switches.items()}
     records = {
         "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio,
-        "world": found.world, "scene": found.scene,
+        "world": found.world, "scene": found.scene, "topology": found.topology,
         "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
         "flight": found.flight,
     } | ({"aero": found.aero} if found.descends else {})  # fmt: skip

@@ -43,6 +43,11 @@ FLIGHTS = {
     }),
     "forest": ("kidger/forest", {"agents": 3, "body.noise": None, "duration": 0.7, "goals.kind": "none"}),
     "boids": ("zapotecatl_2016/best", {"agents": 8, "body.noise": None, "duration": 0.5, "update": "synchronous"}),
+    "nearest": ("vasarhelyi_2018/4ms", {"agents": 8, "topology.kind": "nearest", "topology.k": 2, "duration": 4.0}),
+    "seen": ("vasarhelyi_2018/4ms", {
+        "agents": 8, "world.obstacles": ISLANDS, "topology.kind": "visible", "topology.radius": 3.0,
+        "duration": 4.0,
+    }),
     "swarm": ("couzin_2002/torus", {"agents": 10, "body.noise": None, "duration": 3.0}),
 }  # fmt: skip
 
@@ -73,7 +78,8 @@ def fly(scenario, start, seed):
     pilots = [
         Pilot(
             scenario.model, scenario.parameters, place_of(scenario), index=i, period=period, hearing=hearing,
-            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed,
+            body=scenario.vehicle, b=scenario.body, flat=dims == 2, seed=seed, topology=scenario.meets,
+            t=scenario.topology,
         )
         for i in range(n)
     ]  # fmt: skip

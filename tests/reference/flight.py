@@ -134,7 +134,7 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
         scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
         hearing=Hearing.simulated(links=scenario.radio.kind == "links"), body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
-        told=scenario.model.flock is not None,
+        told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
     )  # fmt: skip
     kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
     return Agent(state, pilot, b, kept, sensed)
@@ -206,7 +206,7 @@ def decisions(
         near = hear(scenario, seed, number, i, flock, said, time, place)
         made = pilot.decide(
             own, time + ahead(agent, time), goal=course.of(i), time=time, only=near,
-            shared=shared[i] if shared else None,
+            shared=shared[i] if shared else None, fades=fading(scenario, seed, number, i, len(flock)),
         )  # fmt: skip
         agent.rays = float(pilot.senses.rays)
         x, y, z = made.command
@@ -214,6 +214,15 @@ def decisions(
             stuck = suffering.asked("overrule", time, cx=x, cy=y, cz=z)
             x, y, z = (x, y, z) if stuck is None else stuck
         agent.command = (x, y, z if scenario.dimensions == 3 else 0.0)
+
+
+def fading(scenario: Scenario, seed: int, number: int, i: int, n: int) -> dict[int, float]:
+    """Normal numbers of the signals between agent i and each other one, the same both ways."""
+    if scenario.meets is None or not scenario.meets.asks("fade"):
+        return {}
+    pairs = {j: min(i, j) * n + max(i, j) for j in range(n) if j != i}
+    words = {j: random.words(seed, random.FADE, 0, number, pair) for j, pair in pairs.items()}
+    return {j: random.normal_pair(*found[:2])[0] for j, found in words.items()}
 
 
 def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> None:

@@ -15,7 +15,7 @@ from airflock.engine.passes import decide, move, perceive
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import plan_of
-from airflock.engine.stages import gusts, neighbours, noise, receive, surfaces, words
+from airflock.engine.stages import gusts, meet, neighbours, noise, receive, surfaces, words
 from airflock.engine.stages import move as motion
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages.state import Flock
@@ -62,6 +62,13 @@ CASES = {
     "loss, gusts, obstacles": ("viragh_2014", {"radio__loss": 0.5, "wind__gust": 2.0, "world__obstacles": ISLANDS}),
     "links, 3-D": ("vasarhelyi_2018", {"world__dimensions": "3", "radio__kind": "links", "radio__near": 5.0}),
     "periodic, late": ("vasarhelyi_2018", SILENT | {"world__edges": "periodic"}),
+    "nearest": ("vasarhelyi_2018", {"topology__kind": "nearest", "topology__k": 2}),
+    "voronoi, periodic": ("vasarhelyi_2018", {"topology__kind": "voronoi", "world__edges": "periodic"}),
+    "visible, obstacles": (
+        "vasarhelyi_2018",
+        {"topology__kind": "visible", "topology__radius": 3.0, "world__obstacles": ISLANDS},
+    ),
+    "strongest, links": ("viragh_2014", {"topology__kind": "strongest", "topology__k": 2, "radio__kind": "links"}),
     "at once": ("vasarhelyi_2018", SILENT | {"radio__delay": 0.0, "world__walls": "nearest_per_axis"}),
 }
 
@@ -75,7 +82,14 @@ class World:
         self.plan = plan_of(found, precision=64)
         self.tables = tables(found, self.plan, seed)
         self.build = Builder(self.plan)
-        for make in (perceive.snapshot, perceive.perceive, perceive.receive, decide.neighbours, decide.boundaries):
+        for make in (
+            perceive.snapshot,
+            perceive.perceive,
+            perceive.receive,
+            perceive.meet,
+            decide.neighbours,
+            decide.boundaries,
+        ):
             make(self.build)
         move.move(self.build)
         rng, n = np.random.default_rng(seed), 6
@@ -107,7 +121,8 @@ class World:
         common = self.row, self.tables.whole.tolist(), state["work"]
         made["snapshot"](1, n, state["work"], state["ring"])
         made["perceive"](step, 0, n, *common, state["ring"], state["words"])
-        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"])
+        around = (self.rest[name] for name in perceive.around(self.plan))
+        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], *around)
         made["boundaries"](n, *common, *self.rest.values())
         state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
         return state
@@ -141,9 +156,15 @@ class World:
 
         fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
+        around = [self.rest[name] for name in ("edges", "spans", "scene")]
+
+        def pick(i):
+            meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan, images=plan.periodic)
+
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, 0.2, hear, plan=plan, model=model, sums=sums, images=plan.periodic
-        )
+            range(n), range(n), flock, numbers, 0.2, hear, pick, plan=plan, model=model, sums=sums,
+            images=plan.periodic,
+        )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step,

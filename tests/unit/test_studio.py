@@ -399,6 +399,13 @@ def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in():
     assert len(player.scenario.world.obstacles) == before
 
 
+def test_a_goal_of_a_flat_world_is_moved():
+    goals = {"goals.kind": "points", "goals.points": [[40.0, 0.0, 0.0], [-60.0, 50.0, 0.0]]}
+    player = Player(PRESET, {**FEW, **goals}, 1)
+    player.move_goal(0, [10.0, -20.0, 0.0])
+    np.testing.assert_allclose(player.scenario.waypoints(), [[10.0, -20.0, 0.0], [-60.0, 50.0, 0.0]])
+
+
 def test_a_goal_is_moved_and_the_others_stay():
     player = Player("kidger/city", {"agents": 4}, 1)
     before = player.scenario.waypoints()

@@ -100,7 +100,7 @@ def test_every_word_of_the_vocabulary_has_a_type():
         text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
         beside = {"limits": ["move"], "exact": ["measure"], "bounds": ["measure"]}
-        beside |= dict.fromkeys(("decide", "move", "sample", "measure", "error", *FAULT), [])
+        beside |= dict.fromkeys(("decide", "meet", "move", "sample", "measure", "error", *FAULT), [])
         text += "".join(f"def {name}(): pass\n" for name in beside.get(kind, ["decide", "sample"]))
         (rule,) = [
             node

@@ -15,6 +15,7 @@ KNOWN = {
     "Wing": ("airflock.aero.wing", "Parameters"),
     "Descent": ("airflock.aero.descent", "Parameters"),
     "Measured": ("airflock.metrics.parameters", "Parameters"),
+    "Topology": ("airflock.topology.parameters", "Parameters"),
     "Any": ("typing", "Any"),
     "Literal": ("typing", "Literal"),
     "Mapping": ("collections.abc", "Mapping"),
@@ -29,8 +30,10 @@ RECORDS = {
 OF_FLOCK = {
     **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
 }  # fmt: skip
+ROWS = ("dx", "dy", "dz", "r2", "hidden", "fade", "met", "heap", "weak")
 # where a word means something else than in the other kinds
 SPECIAL = {
+    "meet": {**dict.fromkeys(ROWS, COLUMNS), "n": "int", "t": "Topology"},
     "flock": OF_FLOCK,
     "survey": OF_FLOCK,
     "workspace": {"n": "int"},
@@ -44,6 +47,7 @@ VECTOR = "tuple[float, float, float]"
 RESULTS = {
     **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
+    "meet": "None",
     "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
@@ -61,6 +65,8 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
         kinds |= {"move": "move", "limits": "limits"}
     if "sample" in functions or "fitness" in functions:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
+    if "meet" in functions:
+        kinds |= {"meet": "meet"}
     if not kinds and functions & {"measure", "error"}:
         kinds = {name: name for name in SENSOR}
     if not kinds:  # elsewhere these are names of helpers

@@ -117,6 +117,8 @@ def _print(result: Any) -> None:
         f"{result.above} of {result.candidates} candidates reach the mean; {result.failed} failed",
         highlight=False,
     )
+    for name, (mean, low, high) in result.scenarios.items():
+        console.print(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})", highlight=False, markup=False)
     if result.dead:
         return
     console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False)

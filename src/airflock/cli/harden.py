@@ -37,22 +37,29 @@ def harden(
 ) -> None:
     """Make an optimum safer: steps of Table S4 stay if they gain, cost little, and break nothing that held.
 
-    Exit status 1 where no step could be kept.
+    Of a study of several scenarios a step must keep what held in each; further files end in _2 and so on. Exit status 1
+    where no step could be kept.
 
     Example: airflock harden study --out flyable.toml
     """
-    from airflock.evolve.after import BEST
+    from airflock.evolve.after import BEST, further_best
     from airflock.evolve.again import cautious, evolved_again, stricter
     from airflock.evolve.folder import write
     from airflock.evolve.harden import document, harden
     from airflock.scenarios.files import load
 
     path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
-    found = load(path, options.settings(changes, None, duration), trust=trust)
-    options.writable((out, SCENARIOS))
+    settings = options.settings(changes, None, duration)
+    found = load(path, settings, trust=trust)
+    others = [load(each, settings, trust=trust) for each in further_best(Path(scenario))]
+    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(others) + 2))]
+    for place in places:
+        options.writable((place, SCENARIOS))
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:
             raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])
+    if others and (r_coll is not None or delay is not None):
+        raise ScenarioError([f"{scenario}: is a study of {1 + len(others)} scenarios; --r-coll and --delay take one"])
     numbers = range(first_seed, first_seed + seeds)
     if r_coll is not None or delay is not None:
         settings = cautious(found, r_coll or 1.0, delay or 1.0)
@@ -61,16 +68,17 @@ def harden(
         with options.searching(study, quiet=as_json) as (watch, note):
             steps = evolved_again(found, study, settings, folder, numbers, threads, watch, note)
     else:
-        with options.progress(f"{scenario}: flights", 15 * seeds, quiet=as_json) as done:  # at most
-            steps = harden(found, numbers, cost=cost, threads=threads, done=done)
-    write(out, document(found, steps[-1]), "Hardened; see airflock harden --help.")
+        with options.progress(f"{scenario}: flights", 15 * seeds * (1 + len(others)), quiet=as_json) as done:  # at most
+            steps = harden([found, *others], numbers, cost=cost, threads=threads, done=done)
+    for each, place in zip((found, *others), places, strict=True):
+        write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
         tables.emit_json(
             {"scenario": found.name, "seeds": seeds, "out": str(out), "steps": [s.as_dict() for s in steps]}
         )
     else:
         _print(found.name, steps, seeds)
-        tables.say(f"saved {out}")
+        tables.say(f"saved {', '.join(map(str, places))}")
     if not steps[-1].kept:
         raise typer.Exit(1)
 

@@ -28,11 +28,15 @@ class State(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s."""
+    """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s.
+
+    fade : normal number by which its signal is weaker than its distance says; 0 where nothing is drawn
+    """
 
     who: int
     state: State
     age: float
+    fade: float = 0.0
 
 
 class Decision(NamedTuple):

@@ -27,6 +27,7 @@ class Quantity(NamedTuple):
     meaning: str
     source: str
     optional: bool  # None is allowed and means "derived from the rest of the scenario"
+    whole: bool = False  # only whole numbers make sense
 
     @property
     def span(self) -> str:
@@ -62,7 +63,9 @@ class Text(NamedTuple):
 Declaration = Quantity | Choice | Points | Text
 
 
-def quantity(default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "") -> Any:
+def quantity(
+    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False
+) -> Any:
     """Declare a number of a record of parameters.
 
     Parameters
@@ -77,6 +80,8 @@ def quantity(default: float | None, unit: str, *, low: float, high: float, meani
         What it is, for help texts and error messages.
     source : str
         Where the default comes from.
+    whole : bool
+        Only whole numbers make sense; searches take no others.
 
     Returns
     -------
@@ -96,7 +101,7 @@ def quantity(default: float | None, unit: str, *, low: float, high: float, meani
     Traceback (most recent call last):
     airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
     """
-    record = Quantity(unit, float(low), float(high), meaning, source, default is None)
+    record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole)
     return field(default=default, metadata={"airflock": record})
 
 
@@ -209,7 +214,7 @@ def quantity_fault(value: Any, declared: Quantity) -> str:
         return f"= {value!r} is not a number; give {declared.span}"
     if not declared.low <= value <= declared.high:
         return f"= {with_unit(f'{value:g}', declared.unit)} lies outside {declared.span}"
-    return ""
+    return f"= {value:g} is not a whole number" if declared.whole and value != int(value) else ""
 
 
 def choice_fault(value: Any, declared: Choice) -> str:

@@ -3,7 +3,7 @@
 Checked once, when it is made: a law that asks for what a drone does not have is refused then, never in flight.
 """
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Protocol, Self
@@ -14,6 +14,7 @@ from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import could_be_near
+from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
 
@@ -40,6 +41,9 @@ class World(Protocol):
         self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float, /
     ) -> float:  # fmt: skip
         """Free distance of a sphere, m."""
+
+    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
+        """Whether an obstacle or the scene stands between two places, m."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,7 @@ class Pilot:
     seed     : of the random numbers that a law may ask for
     wing, aero : parameters of the wing and of drag descent, for laws that ask for them
     told     : the law decides for the whole flock; somebody who knows all states tells `decide` what it found
+    topology, t : whom of those whom it hears it meets, and the numbers of that; None: all
 
     Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
     """
@@ -144,11 +149,12 @@ class Pilot:
     def __init__(
         self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
         body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
-        wing: Any = None, aero: Any = None, told: bool = False,
+        wing: Any = None, aero: Any = None, told: bool = False, topology: Topology | None = None, t: Any = None,
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
         self.hearing, self.silence, self.flat, self.seed = hearing or Hearing(), silence, flat, seed
         self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
+        self.topology, self.t = topology, t
         self.memory = first_memory(model)
         self.packets: dict[int, Packet] = {}
         self.decisions = 0
@@ -215,6 +221,7 @@ class Pilot:
     def decide(
         self, own: State, now: float, percept: Percept | None = None, goal: Vector | None = None, *,
         time: float | None = None, only: Container[int] | None = None, shared: Any = None,
+        fades: Mapping[int, float] | None = None,
     ) -> Decision:  # fmt: skip
         """The law's command from the own state as measured, and its new memory; zero where `silence` stops a velocity.
 
@@ -224,16 +231,18 @@ class Pilot:
         time    : of the flight (s), if that is not the own clock's
         only    : neighbours that count, by their number, where somebody knows who is in sight; None: all that are heard
         shared  : what a law for the whole flock found for this agent
+        fades   : normal numbers by which signals are weaker, by who sends them, where somebody draws them
         """
         if self.flat:
             own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
         time = now if time is None else time
         self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
         near = [
-            Heard(heard.who, self.place.beside(own, heard.state), heard.age)
+            Heard(heard.who, self.place.beside(own, heard.state), heard.age, (fades or {}).get(heard.who, 0.0))
             for heard in self.heard(now)
             if only is None or heard.who in only
         ]
+        near = met_of(self.topology, self.t, own, near, self.place)
         made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
         self.memory = made.memory

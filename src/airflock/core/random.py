@@ -20,6 +20,7 @@ SCENE = 8  # the scene of a flight, where each flight has its own
 SHOW = 9  # seeds of the parts of a show: step is the leg, agent the segment
 FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent the entry or the one who may be hit
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
+FADE = 16  # strength of the signal between one pair, the same both ways
 
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
 

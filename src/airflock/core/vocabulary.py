@@ -140,6 +140,18 @@ AXIS_ERROR = {
     "g": "normal random number of this axis",
     "period": "time between two measurements, s",
 }
+MEET = {
+    "n": "number of others",
+    "dx": "offsets to the others as believed, east, m; dx[j] is that to number j",
+    "dy": "the same, north, m",
+    "dz": "the same, up, m",
+    "r2": "squares of their lengths, m²; 1e30 of whom is not heard",
+    "hidden": "1.0 of whom something hides that stands in the world, else 0.0",
+    "fade": "normal random numbers of the signals",
+    "met": "to fill: 1.0 for whom the agent meets, else 0.0",
+    "heap": "scratch of n numbers",
+    "weak": "the same",
+}
 COMMAND = {
     "cx": "command, east; m/s or m/s² as the model's COMMAND says",
     "cy": "the same, north",
@@ -203,6 +215,7 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "f": "the fault's parameters",
     },
     "leaves": {"f": "the fault's parameters"},
+    "meet": {**MEET, "t": "the topology's parameters"},
     "fitness": {
         "values": "order parameters of one flight, by name",
         "agents": "number of agents",

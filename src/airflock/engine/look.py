@@ -10,7 +10,9 @@ from airflock.core import agent as one
 from airflock.core import random
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
+from airflock.core.topology import met_of
 from airflock.engine.beginnings import NEVER
+from airflock.engine.place import Place
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
@@ -24,7 +26,8 @@ class View:
     agent, time : its number; time of the decision, s
     true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
     heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
-    terms       : of each of them, in the same order, what the neighbour rule made of it; 0 beyond the law's reach
+    met         : of each of them, in the same order, whether the topology lets it meet that one
+    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command
@@ -35,6 +38,7 @@ class View:
     true: Motion
     own: Motion
     heard: tuple[Heard, ...]
+    met: tuple[bool, ...]
     terms: tuple[Any, ...]
     sums: Any
     walls: Any
@@ -52,21 +56,34 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     own = measured[agent]
     heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
     p = _parameters(scenario, state, agent)
+    met = _met(scenario, state, own, heard)
     near = one.answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
     terms = []
-    for other in heard:
+    for other, meets in zip(heard, met, strict=True):
         if model.neighbour is None:
             break
         given = one.pair_percept(own, Heard(other.who, _beside(scenario, own, other.state), other.age), agent)
-        far = given["r"] > near
+        far = not meets or given["r"] > near
         rule = one.answer(model.neighbour, "neighbour", given | {"p": p}, model.name)
         terms.append(type(rule)(*(0.0 for _ in rule)) if far else rule)
     memory = model.Memory(*(float(x) for x in state.arrays["mem"][:, _slot(state, agent)])) if model.Memory else None
     command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
     return View(
-        agent, number * every * scenario.flight.dt, truth[agent], own, heard, tuple(terms),
+        agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
     )  # fmt: skip
+
+
+def _met(scenario: Scenario, state: State, own: Motion, heard: tuple[Heard, ...]) -> tuple[bool, ...]:
+    """Of each that is heard whether the agent meets it."""
+    if state.plan.topology is None:
+        return (True,) * len(heard)
+    place = Place(scenario)
+    if len(state.arrays["later"]):
+        place.shapes[:] = state.arrays["shapes"].astype(float).tolist()
+    beside = [other._replace(state=_beside(scenario, own, other.state)) for other in heard]
+    found = {other.who for other in met_of(state.plan.topology, scenario.topology, own, beside, place)}
+    return tuple(other.who in found for other in heard)
 
 
 def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
@@ -99,6 +116,7 @@ def _heard(
 ) -> Iterator[Heard]:
     """Everybody in range whose packet agent i has: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
+    fades = plan.topology is not None and plan.topology.asks("fade")
     clocks, reach = _clocks(state), _reach(state, i)
     late = clock(scenario)["delay"] * scenario.flight.dt
     now = number * state.whole("decide_every") * scenario.flight.dt
@@ -109,6 +127,8 @@ def _heard(
         distance = math.dist(true[:3], truth[i][:3])
         if j == i or distance > min(k.range, 1e8):
             continue
+        pair = min(i, j) * n + max(i, j)
+        fade = random.normal_pair(*random.words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
         if plan.links:
             packet = state.arrays["store"][_slot(state, i), :, _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
@@ -116,13 +136,13 @@ def _heard(
                 continue
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
             at, v = packet[:axes], packet[axes : 2 * axes]
-            yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age)
+            yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age, fade)
         elif distance * distance > reach[j]:
             continue
         elif not plan.lossy or random.uniform(
             random.words(seed, random.LOSS, world, number, i * n + j)[0]
         ) >= radio.lost(distance, k):
-            yield Heard(j, said[j], late + clocks[i] - clocks[j])
+            yield Heard(j, said[j], late + clocks[i] - clocks[j], fade)
 
 
 def _reach(state: State, i: int) -> list[float]:

@@ -9,6 +9,7 @@ from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import choices
 from airflock.core.sensor import Sensor
+from airflock.core.topology import Topology
 from airflock.sensors.registry import SENSORS, USUAL
 from airflock.world import arena, edges, excursion, rays
 from airflock.world.place import obstacle_rule, raised
@@ -65,6 +66,7 @@ class Plan:
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
+    topology  : which of those whom an agent hears it meets; None: all. fading: signals differ by chance
     """
 
     model: Model
@@ -102,6 +104,8 @@ class Plan:
     raised: bool = False
     faults: tuple[Fault, ...] = ()
     varied: tuple[tuple[str, str], ...] = ()
+    topology: Topology | None = None
+    fading: bool = False
     build: Build = Build()
 
     def built(self, **changes: Any) -> "Plan":
@@ -156,6 +160,25 @@ class Plan:
     def perturbed(self) -> bool:
         """Whether distances as perceived are not the true ones, which decide who is in range."""
         return self.told or self.believes or self.links or bool(self.suffers("radio"))
+
+    @property
+    def hides(self) -> bool:
+        """Whether agents are asked whether something stands between them and others."""
+        return self.meeting("hidden") and (self.obstacles or self.scene)
+
+    @property
+    def fades(self) -> bool:
+        """Whether the strength of a signal is drawn."""
+        return self.meeting("fade") and self.fading
+
+    @property
+    def meets(self) -> Callable[..., None] | None:
+        """The rule of the topology."""
+        return None if self.topology is None else self.topology.meet
+
+    def meeting(self, name: str) -> bool:
+        """Whether the rule of the topology asks for something by this name."""
+        return self.topology is not None and self.topology.asks(name)
 
     def varies(self, letter: str) -> bool:
         """Whether a number of this record differs among agents."""

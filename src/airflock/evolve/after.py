@@ -6,8 +6,9 @@ seeds for an unbiased score; working ranges are those of Table S1: where candida
 winner's mean.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,7 @@ class Result:
     ranges     : key → (low, high) over the `above` candidates of the search that reach the winner's fitness
     finalists  : one row each: origin, parameters, fitness on fresh seeds
     failed     : candidates of the search that failed
+    scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
     dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
     """
 
@@ -65,6 +67,7 @@ class Result:
     failed: int
     finalists: pd.DataFrame
     dead: str = ""
+    scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """The result as plain values, for result.toml and --json."""
@@ -81,6 +84,7 @@ class Result:
             "origin": self.origin,
             **({"dead": self.dead} if self.dead else {}),
             "parameters": self.parameters,
+            **({"scenarios": [_told(name, *span) for name, span in self.scenarios.items()]} if self.scenarios else {}),
             "working_ranges": {
                 "candidates": self.candidates,
                 "failed": self.failed,
@@ -116,7 +120,7 @@ def conclude(
     others = [[study.seed(2, j) for j in range(n)]]
     evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
     flown = store.flown(SCORE)
-    values = [first.of_flight(scores) for scores in flown.values() if scores is not None]
+    values, each = _scored(study, flown)
     mean, sd, low, high = interval(values)
     good = sound[sound[first.name] >= mean] if first.maximise else sound[sound[first.name] <= mean]
     shown = pd.DataFrame(
@@ -129,13 +133,60 @@ def conclude(
         folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
         float(sound[first.name].iloc[0]), origins[i],
         {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
-        len(good), len(table), int(table[first.name].isna().sum()), shown, dead(study, list(flown.values())),
+        len(good), len(table), int(table[first.name].isna().sum()), shown, _dead(study, flown), each,
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead:
-        write(folder / BEST, scenario_document(study, winner, result, folder), "The winner of a study, ready to fly.")
-    tables.export(store, folder)
+        for place, name in enumerate(best_files(study)):
+            document = scenario_document(study, winner, result, folder, place)
+            write(folder / name, document, "The winner of a study, ready to fly.")
+    tables.export(store, folder, study.labels)
     return result
+
+
+def best_files(study: Study) -> list[str]:
+    """Files that hold the winner: best.toml, and best_2.toml and so on for further scenarios."""
+    return [BEST, *(f"best_{place}.toml" for place in range(2, len(study.scenarios) + 1))]
+
+
+def further_best(folder: Path) -> list[Path]:
+    """Files of the winner in the further scenarios of a study's folder, in their order."""
+    found = (folder / f"best_{place}.toml" for place in itertools.count(2))
+    return list(itertools.takewhile(Path.is_file, found))
+
+
+def _scored(
+    study: Study, flown: Mapping[tuple[int, int], Mapping[str, Any] | None]
+) -> tuple[list[float], dict[str, tuple[float, float, float]]]:
+    """Fitness of the winner's flights, one number a seed, and of several scenarios the interval in each.
+
+    Over scenarios it is the mean in all of them on one seed, or that in the scenario whose mean is the worst.
+    """
+    first, n = study.objectives[0], len(study.scenarios)
+    sound = [j for j in range(len(flown) // n) if all(flown[0, j * n + place] is not None for place in range(n))]
+    table = np.array([[first.of_flight(flown[0, j * n + place] or {}) for place in range(n)] for j in sound]).reshape(
+        -1, n
+    )
+    if n == 1:
+        return table[:, 0].tolist(), {}
+    each = {label: interval(table[:, place].tolist()) for place, label in enumerate(study.labels)}
+    means = table.mean(axis=0) * (1.0 if first.maximise else -1.0)
+    values = table[:, int(np.argmin(means))] if study.over_scenarios == "worst" else table.mean(axis=1)
+    return values.tolist(), {label: (mean, low, high) for label, (mean, _, low, high) in each.items()}
+
+
+def _dead(study: Study, flown: Mapping[tuple[int, int], Mapping[str, Any] | None]) -> str:
+    """Why the winner does not fly, in the first scenario in which it does not; else empty."""
+    n = len(study.scenarios)
+    for place, label in enumerate(study.labels):
+        rows = [scores for (_, repeat), scores in flown.items() if repeat % n == place]
+        if found := dead(study, rows):
+            return found if n == 1 else f"{label}: {found}"
+    return ""
+
+
+def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
+    return {"scenario": name, "mean": mean, "low": low, "high": high}
 
 
 def finalists(
@@ -194,11 +245,17 @@ def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
     return mean, sd, mean - half, mean + half
 
 
-def scenario_document(study: Study, parameters: dict[str, float], result: Result, folder: Path) -> dict[str, Any]:
-    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along."""
-    document = {formats.KEY: formats.FORMAT, **plain(study.scenario.document)}
+def scenario_document(
+    study: Study, parameters: dict[str, float], result: Result, folder: Path, place: int = 0
+) -> dict[str, Any]:
+    """A scenario file with the winner's parameters, each with its source; a law in a file of its own comes along.
+
+    place : which of the study's scenarios
+    """
+    scenario = study.scenarios[place]
+    document = {formats.KEY: formats.FORMAT, **plain(scenario.document)}
     document.pop("published", None)
-    law = Path(study.scenario.name).parent / str(document.get("model", {}).get("kind", ""))
+    law = Path(scenario.name).parent / str(document.get("model", {}).get("kind", ""))
     if law.suffix == ".py" and law.is_file():
         atomic.write(folder / law.name, law.read_bytes())
         document["model"]["kind"] = law.name
@@ -210,5 +267,5 @@ def scenario_document(study: Study, parameters: dict[str, float], result: Result
         if key in units:
             entry = {"value": value, "unit": units[key], "source": source}
         (document.setdefault(section, {}) if section else document)[name] = entry
-    document["title"] = f"evolved from {study.scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
+    document["title"] = f"evolved from {scenario.name}: {study.objectives[0].name} {result.fitness:.4f}"
     return dict(document)

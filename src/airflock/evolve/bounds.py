@@ -80,6 +80,8 @@ def _studies() -> list[tuple[str, str, float, tuple[Axis, ...]]]:
     found = []
     for name, path in shipped().items():
         document = read_toml(path)
+        if "scenario" not in document:  # one set for several scenarios: no speed of its own
+            continue
         scenario = load(str(document["scenario"]), document.get("set"))
         space, _ = read_space(document["space"], scenario) if "space" in document else (None, [])
         found.append((name, scenario.model.name, _speed(scenario), space.axes if space else ()))

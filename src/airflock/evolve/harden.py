@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from airflock.errors import ScenarioError
 from airflock.evolve.after import interval
 from airflock.evolve.folder import plain
@@ -31,7 +33,7 @@ COST = 0.05  # of fitness, at most
 
 
 def harden(
-    scenario: Scenario | str | os.PathLike[str],
+    scenario: Scenario | str | os.PathLike[str] | Sequence[Scenario | str | os.PathLike[str]],
     seeds: Sequence[int] = range(100),
     *,
     steps: Sequence[Step] = RECIPE,
@@ -44,7 +46,8 @@ def harden(
     Parameters
     ----------
     scenario : Scenario, str or path
-        An optimum: a scenario, or its name or file, such as best.toml of a study.
+        An optimum: a scenario, or its name or file, such as best.toml of a study. Of several, which hold the same
+        numbers of the law, a step must keep what held in each; means are over all of them.
     seeds : sequence of int
         Seeds of the flights of each step; the result is judged on as many seeds after the largest of them.
     steps : sequence of Step
@@ -76,10 +79,11 @@ def harden(
     >>> steps[0].name, steps[-1].name
     ('optimum', 'on fresh seeds')
     """
-    scenario = loaded(scenario)
-    trial = _Trial(scenario, recipe(scenario, steps)[0], seeds, cost, threads, done)
+    single = isinstance(scenario, (Scenario, str, os.PathLike))
+    scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
+    trial = _Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, cost, threads, done)
     found = [trial.first]
-    hit = float((trial.optimum["n_coll"] > 0.0).mean())
+    hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
     order = [*steps, *ROOM] if touched else list(steps)
     if trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0):
@@ -93,49 +97,55 @@ def harden(
 
 
 class _Trial:
-    """Parameters that were kept so far, and their flights; each step is judged against them and the optimum."""
+    """Parameters that were kept so far, and their flights; each step is judged against them and the optimum.
+
+    Flights are one table for each scenario.
+    """
 
     def __init__(
         self,
-        scenario: Scenario,
+        scenarios: Sequence[Scenario],
         optimum: tuple[Step, dict[str, float]],
         seeds: Sequence[int],
         cost: float,
         threads: int | None,
         done: Callable[[], None] | None,
     ):
-        self.scenario, self.cost, self.threads, self.done = scenario, cost, threads, done
+        self.scenarios, self.cost, self.threads, self.done = scenarios, cost, threads, done
         self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
         self.kept, self.seen = [optimum], [optimum[1]]
-        self.first = against(self.optimum, self.optimum, *optimum)
-        if float(self.optimum["fitness"].max()) < ZERO:
-            told = {name: values.tolist() for name, values in self.optimum.items()}
-            rows = [dict(zip(told, row, strict=True)) for row in zip(*told.values(), strict=True)]
-            raise ScenarioError([f"{scenario.name}: does not fly, so there is nothing to harden{why_zero(rows)}"])
+        self.first = against(together(self.optimum), together(self.optimum), *optimum)
+        for scenario, table in zip(scenarios, self.optimum, strict=True):
+            if float(table["fitness"].max()) < ZERO:
+                told = {name: values.tolist() for name, values in table.items()}
+                rows = [dict(zip(told, row, strict=True)) for row in zip(*told.values(), strict=True)]
+                raise ScenarioError([f"{scenario.name}: does not fly, so there is nothing to harden{why_zero(rows)}"])
 
-    def _fly(self, parameters: Mapping[str, float], seeds: Sequence[int]) -> Table:
-        return flown(self.scenario, [parameters], seeds, self.threads, self.done)[0]
+    def _fly(self, parameters: Mapping[str, float], seeds: Sequence[int]) -> list[Table]:
+        return [flown(each, [parameters], seeds, self.threads, self.done)[0] for each in self.scenarios]
 
     def touches(self) -> bool:
         """Whether agents touch walls or obstacles in some flight of what was kept so far."""
-        return "phi_wall" in self.table and float(self.table["phi_wall"].max()) > 0.0
+        return any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
 
     def tried(self, step: Step) -> list[Measured]:
         """The step and, where it breaks something or costs too much, half of it."""
         found = []
         for part, name in ((1.0, step.name), (0.5, f"half of: {step.name}")):
-            parameters = moved(self.scenario, self.kept[-1][1], step, part)
+            parameters = moved(self.scenarios[0], self.kept[-1][1], step, part)
             if parameters in self.seen:  # nothing changes, or it was undone before
                 break
             self.seen.append(parameters)
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
-            gains = _gains(self.table, table)
+            gains = _gains(together(self.table), together(table))
             verdict = broken or ("kept" if gains else "undone: gains neither distance nor room at walls")
             kept = verdict == "kept"
             named = replace(step, name=name)
-            found.append(replace(against(self.optimum, table, named, parameters), kept=kept, verdict=verdict))
+            found.append(
+                replace(against(together(self.optimum), together(table), named, parameters), kept=kept, verdict=verdict)
+            )
             if kept:
                 self.kept.append((named, parameters))
                 self.table = table
@@ -156,23 +166,41 @@ class _Trial:
         left = [step.name for step, _ in self.kept[1:]]
         said = f"kept: {', '.join(left)}" if left else "nothing was kept: the optimum as it was"
         return replace(
-            against(before, after, Step("on fresh seeds", {}, said), parameters), verdict=said, kept=bool(left)
+            against(together(before), together(after), Step("on fresh seeds", {}, said), parameters),
+            verdict=said,
+            kept=bool(left),
         )
 
-    def _broken(self, before: Table, after: Table) -> str:
-        """What a step breaks or costs too much, in words; empty if nothing."""
-        for name in SAFETY:
-            if name in before:
-                drop, _, low, _ = interval((before[name] - after[name]).tolist())
-                if drop > SLACK and low > 0.0:
-                    return f"undone: {name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
-        for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
-            if name in before:
-                was, now = float((before[name] > 0.0).mean()), float((after[name] > 0.0).mean())
-                if now - was > SLACK:
-                    return f"undone: {100.0 * now:.0f} % of flights {what}, before {100.0 * was:.0f} %"
-        price = float((before["fitness"] - after["fitness"]).mean())
+    def _broken(self, before: Sequence[Table], after: Sequence[Table]) -> str:
+        """What a step breaks in one of the scenarios or costs too much, in words; empty if nothing."""
+        for scenario, was, now in zip(self.scenarios, before, after, strict=True):
+            if found := _broken(was, now):
+                return f"{found}, in {scenario.name}" if len(self.scenarios) > 1 else found
+        price = float((together(before)["fitness"] - together(after)["fitness"]).mean())
         return f"undone: costs {price:.3g} of fitness, more than {self.cost:g}" if price > self.cost else ""
+
+
+def together(tables: Sequence[Table]) -> Table:
+    """One table of the flights in all scenarios, of what is measured in each of them."""
+    if len(tables) == 1:
+        return tables[0]
+    names = [name for name in tables[0] if all(name in table for table in tables)]
+    return {name: np.concatenate([table[name] for table in tables]) for name in names}
+
+
+def _broken(before: Table, after: Table) -> str:
+    """Which constraint that held a step breaks in one scenario, in words; empty if none."""
+    for name in SAFETY:
+        if name in before:
+            drop, _, low, _ = interval((before[name] - after[name]).tolist())
+            if drop > SLACK and low > 0.0:
+                return f"undone: {name} falls from {before[name].mean():.3g} to {after[name].mean():.3g}"
+    for name, what in (("phi_wall", "leave the arena or enter obstacles"), ("n_coll", "have collisions")):
+        if name in before:
+            was, now = float((before[name] > 0.0).mean()), float((after[name] > 0.0).mean())
+            if now - was > SLACK:
+                return f"undone: {100.0 * now:.0f} % of flights {what}, before {100.0 * was:.0f} %"
+    return ""
 
 
 def _gains(before: Table, after: Table) -> bool:

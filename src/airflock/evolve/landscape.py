@@ -43,7 +43,7 @@ def refuse_flat(study: Study, store: Store, generation: int, values: Sequence[fl
 def dead(study: Study, rows: Sequence[Mapping[str, Any] | None]) -> str:
     """Why a winner does not fly, if its fitness, a product, is zero in all flights on fresh seeds; else empty."""
     sound = [row for row in rows if row is not None]
-    if study.objectives[0].name != "fitness" or not _parts(sound):
+    if study.objectives[0].name != "fitness" or not sound or not _parts(sound):
         return ""
     if max(float(row["fitness"]) for row in sound) >= ZERO:
         return ""

@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study
+from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
 
@@ -29,7 +30,7 @@ class Interrupted(StudyError):
 
 
 def evolve(
-    what: str | os.PathLike[str] | Scenario | Study,
+    what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
     out: str | os.PathLike[str],
     *,
     resume: bool = False,
@@ -37,6 +38,7 @@ def evolve(
     space: Mapping[str, Any] | None = None,
     objective: Mapping[str, Any] | None = None,
     fitness: Own | None = None,
+    over_scenarios: str | None = None,
     scheduler: str | None = None,
     threads: int | None = None,
     device: str = "cpu",
@@ -50,8 +52,9 @@ def evolve(
 
     Parameters
     ----------
-    what : str, path, Scenario or Study
-        A preset, a scenario or study file, a Scenario, or a Study.
+    what : str, path, Scenario or Study, or several scenarios
+        A preset, a scenario or study file, a Scenario, or a Study. Of a list of presets, files and Scenarios one set
+        of numbers is searched that flies in all of them.
     out : str or path
         The study's folder.
     resume : bool
@@ -64,6 +67,8 @@ def evolve(
         {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters.
     fitness : callable, optional
         Instead of it, a function of your own: order parameters of one flight → number, more is better.
+    over_scenarios : str, optional
+        "mean" or "worst": what counts of the fitness in several scenarios; by default the mean.
     scheduler : str, optional
         Address of a dask scheduler; by default flights fly in this process.
     threads : int, optional
@@ -106,7 +111,7 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    study = study_of(what, settings, space, objective, fitness, search_keys, trust=trust)
+    study = study_of(what, settings, space, objective, fitness, search_keys, over_scenarios, trust=trust)
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
@@ -118,21 +123,28 @@ def evolve(
 
 
 def study_of(
-    what: str | os.PathLike[str] | Scenario | Study,
+    what: str | os.PathLike[str] | Scenario | Study | Sequence[str | os.PathLike[str] | Scenario],
     settings: Mapping[str, Any] | None = None,
     space: Mapping[str, Any] | None = None,
     objective: Mapping[str, Any] | None = None,
     fitness: Own | None = None,
     search_keys: Mapping[str, Any] | None = None,
+    over_scenarios: str | None = None,
     *,
     trust: bool = False,
 ) -> Study:
     """The study that `evolve` is asked for."""
     if isinstance(what, Study):
         return what
-    tables = {key: value for key, value in (("space", space), ("objective", objective)) if value is not None}
-    if isinstance(what, Scenario):
-        study = make_study(tables, what.name, search=search_keys, scenario=what, trust=trust)
+    given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}
+    tables = {key: value for key, value in given.items() if value is not None}
+    if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
+        several = [what] if isinstance(what, Scenario) else list(what)
+        scenarios = [variant(each, settings, trust=trust) for each in several]
+        if not scenarios:
+            raise StudyError("evolve is given an empty list of scenarios")
+        where = ", ".join(scenario.name for scenario in scenarios)
+        study = make_study(tables, where, search=search_keys, scenario=scenarios, trust=trust)
     else:
         study = load_study(what, settings=settings, search=search_keys, tables=tables, trust=trust)
     if fitness is not None:
@@ -149,14 +161,14 @@ def _text_of(code: Any) -> str:
     return hashlib.sha256(code.co_code + repr((code.co_names, constants)).encode()).hexdigest()[:12]
 
 
-def score_of(study: Study) -> Score:
-    """Parameters and a seed → order parameters, for the study's scenario."""
+def score_of(study: Study, place: int = 0) -> Score:
+    """Parameters and a seed → order parameters, for one of the study's scenarios."""
     from airflock.engine.simulate import score_flight
 
     precision = int(study.search.precision)
 
     def score(parameters: Mapping[str, float], seed: int) -> Mapping[str, Any]:
-        return score_flight(with_parameters(study.scenario, parameters), seed, precision=precision)
+        return score_flight(with_parameters(study.scenarios[place], parameters), seed, precision=precision)
 
     return score
 
@@ -197,9 +209,11 @@ def executor_for(
     from airflock.threads import cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then
-    compile_for(study.scenario, precision=int(study.search.precision))
-    alone = takes_all_cores(study.scenario)
-    return Here(score_of(study), 1 if alone else threads or cores())
+    for scenario in study.scenarios:
+        compile_for(scenario, precision=int(study.search.precision))
+    alone = any(takes_all_cores(scenario) for scenario in study.scenarios)
+    scores = [score_of(study, place) for place in range(len(study.scenarios))]
+    return Here(scores[0], 1 if alone else threads or cores(), scores[1:])
 
 
 def run(

@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 
 from airflock.errors import StudyError
 from airflock.evolve.executors import Executor, Flight
-from airflock.evolve.fitness import losses
+from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
+from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
 from airflock.evolve.tables import DURATION
+from airflock.scenarios.scenario import Scenario
 
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
 
@@ -77,7 +79,8 @@ class Tally:
 def total_flights(study: Study) -> int:
     """Flights of the whole search."""
     runs = range(study.whole("restarts") + 1)
-    return sum(study.population(run) for run in runs) * study.whole("generations") * study.whole("seeds")
+    flights = sum(study.population(run) for run in runs) * study.whole("generations") * study.whole("seeds")
+    return flights * len(study.scenarios)
 
 
 def search(study: Study, store: Store, executor: Executor, watch: Watch | None = None) -> list[NDArray[np.float64]]:
@@ -108,8 +111,7 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
         tally.run, tally.generation = run, generation
         batch = Batch("search", run, generation)
         points = _asked(store, batch, state.ask())
-        given = [{**study.space.parameters(point), **shortened(study, length)} for point in points]
-        rows = evaluate(study, store, executor, batch, points, tally.note, parameters=given)
+        rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share)
         state.tell(points, losses(rows, study.objectives))
         values = [row[0] for row in rows]
         centre = state.centre()
@@ -122,11 +124,6 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
             means += [] if centre is None else [np.clip(centre, 0.0, 1.0)]
         length.generation_over(values)
     return means
-
-
-def shortened(study: Study, length: Length) -> dict[str, float]:
-    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
-    return {} if length.whole else {DURATION: length.share * study.scenario.flight.duration}
 
 
 def averaged(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
@@ -170,25 +167,30 @@ def evaluate(
     *,
     seeds: Sequence[Sequence[int]] | None = None,
     parameters: Sequence[Mapping[str, float]] | None = None,
+    share: float = 1.0,
 ) -> list[list[float | None]]:
     """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
 
     note  : called after each flight, with whether it is a new one
     seeds : (candidate, repeat); by default those of the search
     parameters : of each candidate; by default those of its point
+    share : of the scenarios' duration that is flown
     """
     given = [study.space.parameters(point) for point in points] if parameters is None else parameters
     numbers = _seeds(study, batch, len(points)) if seeds is None else seeds
-    store.ask(batch, points.tolist(), given)
+    places = [_shortened(scenario, share) for scenario in study.scenarios]
+    store.ask(batch, points.tolist(), [{**each, **places[0]} for each in given])
     flown: dict[tuple[int, int], Mapping[str, Any] | None] = store.flown(batch)
     if note:
         for _ in flown:
             note(False)
+    n = len(places)
     missing = [
-        Flight(i, j, given[i], seed)
+        Flight(i, j * n + k, {**given[i], **shorter}, seed, k)
         for i, row in enumerate(numbers)
         for j, seed in enumerate(row)
-        if (i, j) not in flown
+        for k, shorter in enumerate(places)
+        if (i, j * n + k) not in flown
     ]
     for landed in executor.fly(missing):
         store.land(batch, landed)
@@ -199,11 +201,23 @@ def evaluate(
         if note:
             note(True)
     rows = [
-        [o.of_candidate([flown[i, j] for j in range(len(row))]) for o in study.objectives]
+        [fitness_of(study, o, [flown[i, j] for j in range(len(row) * n)]) for o in study.objectives]
         for i, row in enumerate(numbers)
     ]
     store.tell(batch, rows)
     return rows
+
+
+def fitness_of(study: Study, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
+    """Fitness of a candidate from its flights, in their order: over the seeds of each scenario, then over scenarios."""
+    n = len(study.scenarios)
+    each = [objective.of_candidate(flights[place::n]) for place in range(n)]
+    return of_scenarios(each, study.over_scenarios, objective.maximise)
+
+
+def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
+    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
+    return {} if share == 1.0 else {DURATION: share * scenario.flight.duration}
 
 
 def _seeds(study: Study, batch: Batch, candidates: int) -> list[list[int]]:

@@ -165,7 +165,7 @@ def full_space(scenario: Scenario) -> Space:
     axes = []
     for key, (how, value) in declared(scenario).items():
         if key.startswith("model.") and value is not None and not _sets_speed(scenario, key, how, value):
-            axes.append(Axis(key, how.unit, how.low, how.high, usual_scale(how.low, how.high)))
+            axes.append(Axis(key, how.unit, how.low, how.high, usual_scale(how.low, how.high), how.whole))
     return Space(tuple(axes))
 
 

@@ -49,7 +49,9 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
 def _axis(key: str, entry: Mapping[str, Any], how: Quantity) -> Axis:
     low, high = float(entry.get("low", how.low)), float(entry.get("high", how.high))
     scale = str(entry.get("scale", usual_scale(low, high)))
-    return Axis(key, how.unit, low, high, scale, bool(entry.get("integer", False)), str(entry.get("above", "")))
+    return Axis(
+        key, how.unit, low, high, scale, how.whole or bool(entry.get("integer", False)), str(entry.get("above", ""))
+    )
 
 
 def _entries(table: Any) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
@@ -96,6 +98,10 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
             faults.append(f"space.{key}.scale = {value!r} is none of linear, log")
         elif name == "integer" and not isinstance(value, bool):
             faults.append(f"space.{key}.integer = {value!r} is none of true, false")
+        elif how.whole and (name == "tied" or (name == "integer" and not value)):
+            faults.append(f"space.{key}.{name} = {str(value).lower()}: only whole numbers make sense")
+        elif how.whole and name == "fixed" and value != int(value):
+            faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
         elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
             near = get_close_matches(str(value), known, n=1, cutoff=0.5)
             faults.append(

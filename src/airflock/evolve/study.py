@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import resources
@@ -12,23 +12,27 @@ from typing import Any
 from airflock import __version__
 from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.bounds import usual_space
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_objectives
 from airflock.evolve.search_table import SEED_BITS, Search, search_faults
+from airflock.evolve.several import common_space, distinct, faults_together, read_scenarios
 from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
 from airflock.scenarios import formats, schema
-from airflock.scenarios.files import load, tells_of_study
+from airflock.scenarios.files import tells_of_study
 from airflock.scenarios.scenario import Scenario
 
-KEYS = ("title", "scenario", "set", "space", "objective", "search")
+KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued
 
 
 @dataclass(frozen=True)
 class Study:
-    """Everything that decides the result of an optimisation."""
+    """Everything that decides the result of an optimisation.
+
+    others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them all
+    labels : what to call each scenario, the first included
+    """
 
     scenario: Scenario
     space: Space
@@ -37,6 +41,14 @@ class Study:
     title: str = ""
     device: str = "cpu"  # cpu or cuda: they agree to rounding, and a study's identity is to the bit
     notes: tuple[str, ...] = ()  # where its bounds come from, for a person to read
+    others: tuple[Scenario, ...] = ()
+    over_scenarios: str = "mean"
+    labels: tuple[str, ...] = ()
+
+    @property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """All scenarios in which each candidate flies."""
+        return (self.scenario, *self.others)
 
     def whole(self, name: str) -> int:
         """A whole number of the search."""
@@ -56,7 +68,7 @@ class Study:
         return {
             "layout": LAYOUT,
             "airflock": __version__,
-            "rules": fingerprint(self.scenario, int(q.precision)),
+            "rules": " ".join(fingerprint(scenario, int(q.precision)) for scenario in self.scenarios),
             "device": self.device,
             "title": self.title,
             "name": self.scenario.name,
@@ -75,8 +87,20 @@ class Study:
                 for o in self.objectives
             ],
             "space": self.space.document(),
-            "scenario": {key: value for key, value in self.scenario.document.items() if key != "published"},
+            "scenario": _unpublished(self.scenario),
+            **self._several(),
         }
+
+    def _several(self) -> dict[str, Any]:
+        """What a study of several scenarios adds to its document."""
+        if not self.others:
+            return {}
+        found = {f"scenario_{i}": _unpublished(scenario) for i, scenario in enumerate(self.others, 2)}
+        return {"over_scenarios": self.over_scenarios, "labels": list(self.labels), **found}
+
+
+def _unpublished(scenario: Scenario) -> dict[str, Any]:
+    return {key: value for key, value in scenario.document.items() if key != "published"}
 
 
 def fingerprint(scenario: Scenario, precision: int) -> str:
@@ -141,25 +165,35 @@ def make_study(
     settings: Mapping[str, Any] | None = None,
     search: Mapping[str, Any] | None = None,
     folder: Path | None = None,
-    scenario: Scenario | None = None,
+    scenario: Scenario | Sequence[Scenario] | None = None,
     trust: bool = False,
 ) -> Study:
-    """Study from a nested dict; `scenario` stands in for its key of that name; `trust` lets code run that it names."""
+    """Study from a nested dict; `trust` lets code run that it names.
+
+    scenario : in place of its key of that name; or several, in place of `scenarios`
+    """
     document, faults = formats.current(document, where), []
     for key in document:
         if key not in KEYS:
             near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
             faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
     if scenario is None:
-        scenario = _scenario(document, where, settings or {}, folder, trust)
+        scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
+        if more or not scenarios:
+            raise ScenarioError([f"{where}: {fault}" for fault in [*faults, *more]])
+    else:
+        scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
+        labels = distinct([each.name for each in scenarios])
     space: Space | None
     notes: list[str] = []
     if "space" in document:
-        space, more = read_space(document["space"], scenario)
+        space, more = read_space(document["space"], scenarios[0])
         faults += more
     else:
-        space, notes = usual_space(scenario)
-    objectives, more = read_objectives(document.get("objective", {}), scenario, folder, trust=trust)
+        space, notes = common_space(scenarios)
+    over = document.get("over_scenarios", "mean")
+    faults += faults_together(scenarios, labels, space, over)
+    objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
     faults += more
     table = document.get("search", {})
     if isinstance(table, Mapping):
@@ -171,18 +205,10 @@ def make_study(
         faults += search_faults(found, len(objectives), space)
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
-    return Study(scenario, space, objectives, found, str(document.get("title", "")), notes=tuple(notes))
-
-
-def _scenario(
-    document: Mapping[str, Any], where: str, settings: Mapping[str, Any], folder: Path | None, trust: bool
-) -> Scenario:
-    named, keys = document.get("scenario"), document.get("set", {})
-    if not isinstance(named, str) or not isinstance(keys, Mapping):
-        wrong = f"scenario = {named!r} is missing or not a name" if not isinstance(named, str) else "set is not a table"
-        raise ScenarioError([f"{where}: {wrong}; give a preset or a scenario file"])
-    beside = folder / named if folder is not None else None
-    return load(beside if beside is not None and is_file(beside) else named, {**keys, **settings}, trust=trust)
+    return Study(
+        scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
+        others=scenarios[1:], over_scenarios=str(over), labels=labels,
+    )  # fmt: skip
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:

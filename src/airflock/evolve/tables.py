@@ -65,9 +65,14 @@ def _fitness(text: Any, count: int) -> list[float]:
     return [math.nan if value is None else float(value) for value in found]
 
 
-def export(store: Store, folder: Path) -> list[Path]:
-    """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed."""
+def export(store: Store, folder: Path, scenarios: Sequence[str] = ()) -> list[Path]:
+    """Write all flights as evaluations.csv, and as evaluations.parquet where pyarrow is installed.
+
+    scenarios : what those of the study are called; of several, each flight tells its own
+    """
     table = flights(store)
+    if len(scenarios) > 1:
+        table["scenario"] = [scenarios[repeat % len(scenarios)] for repeat in table["repeat"]]
     written = [folder / "evaluations.csv"]
     try:
         atomic.write(written[0], table.to_csv(index=False))

@@ -66,8 +66,10 @@ def validate(
         if law is not None:
             raise AirflockError(f"{text}: is a study; --law is for scenarios and recordings")
         study = load_study(text, settings=settings, trust=trust)
-        plan_of(study.scenario)
-        what = f"{len(study.space.axes)} parameters of {study.scenario.name} vary"
+        for scenario in study.scenarios:
+            plan_of(scenario)
+        where = ", ".join(study.labels)
+        what = f"{len(study.space.axes)} parameters of {where} vary"
         return Valid(f"valid study; {what}; begin it with airflock evolve {text} --out DIR", ())
     found = load(name, settings, law, trust=trust)
     plan_of(found)  # probes the rules

@@ -71,6 +71,7 @@ def card_document(
             "forget": scenario.radio.delay + 0.5 * period if held else 5.0,
         },
         "silence": plain(silence),
+        **({"topology": plain(scenario.topology)} if scenario.meets is not None else {}),
         "safety": plain(limits),
         "fence": {
             "corners": outline(scenario.world, margin),

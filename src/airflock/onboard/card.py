@@ -25,6 +25,8 @@ from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
 from airflock.onboard.safety import Safety
+from airflock.topology import parameters as topologies
+from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, polygon_fault
 from airflock.world.shapes import COLUMNS
@@ -34,6 +36,7 @@ KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "world",
     "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
+OPTIONAL = ("topology",)  # left out where a drone meets all whom it hears
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
@@ -67,6 +70,7 @@ class Card:
     hearing: Hearing
     delay: float
     silence: Silence
+    topology: topologies.Parameters
     safety: Safety
     fence: Fence
     low: float
@@ -87,7 +91,7 @@ class Card:
         return Pilot(
             self.model, self.parameters, self.place, index=self.members.index(member), period=self.period,
             hearing=self.hearing, body=self.body, b=self.body_parameters, silence=self.silence, flat=self.flat,
-            seed=self.seed,
+            seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
 
     def sides(self, own: State) -> list[tuple[float, float, float, float]]:
@@ -136,8 +140,8 @@ def card_of(document: Any, where: str = "card") -> Card:
         raise CardError([f"{where}: is not a flight card of version {VERSION}"])
     faults: list[str] = []
     for key in document:
-        if key not in KEYS:
-            near = get_close_matches(key, KEYS, n=1)
+        if key not in (*KEYS, *OPTIONAL):
+            near = get_close_matches(key, (*KEYS, *OPTIONAL), n=1)
             faults.append(f"{key} is not known{f'; did you mean {near[0]}?' if near else ''}")
     faults += [f"{key} is missing" for key in KEYS if key not in document]
     if faults:
@@ -180,6 +184,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     body, numbers = _body(d["body"], faults)
     world = _record(arena.Parameters, d["world"], "world", faults)
     silence = _record(Silence, d["silence"], "silence", faults)
+    topology = _record(topologies.Parameters, d.get("topology", {}), "topology", faults)
     safety = _record(Safety, d["safety"], "safety", faults)
     rows = d["shapes"]
     if not _are_shapes(rows):
@@ -195,7 +200,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
-        silence=silence, safety=safety,
+        silence=silence, topology=topology, safety=safety,
         fence=Fence(corners),
         low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
         period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
@@ -222,6 +227,9 @@ def _geometry_faults(card: Card) -> list[str]:
         if card.outside(x, y, card.height) > 1e-6:
             faults.append(f"fence: does not hold the law's walls: the arena reaches to east {x:g} m, north {y:g} m")
             break
+    kind = TOPOLOGIES[card.topology.kind]
+    if kind is not None and kind.flat and not card.flat:
+        faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
     try:

@@ -15,6 +15,7 @@ from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
+from airflock.topology.registry import TOPOLOGIES
 
 
 def body_of(
@@ -123,6 +124,17 @@ def order_faults(flight: Any, found: Sensor, sensors: Any, radio: Any) -> list[s
         for key, value in ideal.items()
         if value != 0.0
     ]
+
+
+def topology_faults(topology: Any, world: Any, found: Model | None) -> list[str]:
+    """Why agents of a law in a world cannot meet each other by a topology."""
+    kind = TOPOLOGIES[topology.kind] if topology is not None else None
+    faults = []
+    if kind is not None and kind.flat and world is not None and world.dimensions == "3":
+        faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
+    if kind is not None and found is not None and found.neighbour is None:
+        faults.append(f"topology.kind = {kind.name!r}: law {found.name} has no rule for single neighbours")
+    return faults
 
 
 def metric_faults(measures: MetricSet, q: Any, world: Any) -> list[str]:

@@ -188,4 +188,4 @@ def loaded(what: Any) -> Scenario:
 
 def tells_of_study(document: Mapping[str, Any]) -> bool:
     """Whether a document has a table or key that only studies have."""
-    return bool({"space", "scenario", "objective", "search"} & set(document))
+    return bool({"space", "scenario", "scenarios", "objective", "search"} & set(document))

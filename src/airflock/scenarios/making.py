@@ -204,6 +204,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, sensor: Senso
     if flight is not None and flight.agents != int(flight.agents):
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
+    faults += checks.topology_faults(parts["topology"], parts["world"], found)
     faults += file_faults(parts["world"])
     if parts["world"] is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0

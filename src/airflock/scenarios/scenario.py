@@ -13,6 +13,7 @@ from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
 from airflock.core.sensor import Sensor
+from airflock.core.topology import Topology
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.geometry import largest_extension
@@ -21,6 +22,8 @@ from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
 from airflock.sensors.registry import SENSORS
+from airflock.topology import parameters as topologies
+from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena, goals, scenery, start
 
 
@@ -29,7 +32,7 @@ class Scenario:
     """Everything about a flight but the seed; `airflock.load` makes one.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI units
+    body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI
     flight    : number of agents, duration (s), motion step (s)
     vehicle, sensor, measures : body, sensor and metric set that `body`, `sensors` and `metrics` hold the numbers of
     groups    : agents that share numbers; faults: what befalls single agents
@@ -58,6 +61,7 @@ class Scenario:
     wing: wings.Parameters
     aero: descent.Parameters
     metrics: metric_parameters.Parameters
+    topology: topologies.Parameters
     flight: Flight
     vehicle: Body
     sensor: Sensor
@@ -119,6 +123,11 @@ class Scenario:
     def order_parameters(self) -> tuple[Metric, ...]:
         """The metrics that measure a flight."""
         return self.measures.of(self.metrics)
+
+    @property
+    def meets(self) -> Topology | None:
+        """Which of those whom an agent hears it meets; None: all of them."""
+        return TOPOLOGIES[self.topology.kind]
 
     @property
     def fault_kinds(self) -> tuple[Fault, ...]:

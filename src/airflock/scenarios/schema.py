@@ -22,7 +22,8 @@ def schema(record: type) -> type[BaseModel]:
     fields: dict[str, Any] = {}
     for name, declared, default in declarations(record):
         if isinstance(declared, Quantity):
-            number = Annotated[float, Field(ge=declared.low, le=declared.high, allow_inf_nan=False, strict=True)]
+            number: Any = Annotated[float, Field(ge=declared.low, le=declared.high, allow_inf_nan=False, strict=True)]
+            number = Annotated[number, Field(multiple_of=1.0)] if declared.whole else number
             fields[name] = (number | None if declared.optional else number, default)
         elif isinstance(declared, Choice):
             fields[name] = (Literal[declared.options], default)
@@ -94,6 +95,8 @@ def _line(section: str, item: Any, record: type) -> str:
         return f"{name}: unknown key; {hint}"
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):
+        if item["type"] == "multiple_of":
+            return f"{name} = {value:g} is not a whole number; give one in {declared.span}"
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             return f"{name} = {with_unit(_number(value), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"

@@ -13,6 +13,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.metrics import parameters as metrics
 from airflock.sensors import langevin
+from airflock.topology import parameters as topology
 from airflock.world import arena, goals, scenery, start
 
 
@@ -104,5 +105,6 @@ ORDER = (
     Section("wing", wing.Parameters, "wing"),
     Section("aero", descent.Parameters, "aero"),
     Section("wind", wind.Parameters, "air", dryden.Numbers),
+    Section("topology", topology.Parameters, "topology"),
 )
 SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

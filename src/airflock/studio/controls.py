@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from airflock.core.parameters import Choice, Quantity, declarations, with_unit
 from airflock.scenarios.scenario import Scenario
 
-SECTIONS = ("model", "body", "sensors", "radio", "wind", "goals", "wing", "metrics")
+SECTIONS = ("model", "body", "sensors", "radio", "topology", "wind", "goals", "wing", "metrics")
 USUAL = 4.0  # a slider ends at so many times the preset's value
 STEPS = 400  # of a slider
 
@@ -63,7 +63,8 @@ def slider(key: str, declared: Quantity, value: float) -> Control:
     low, high = span(declared.low, declared.high, value)
     label = with_unit(key.partition(".")[2], f"({declared.unit})" if declared.unit not in ("", "1") else "")
     hint = _hint(declared.meaning, declared.span, declared.source)
-    return Control(key, label, hint, value, low, high, _round_step((high - low) / STEPS))
+    step = _round_step((high - low) / STEPS)
+    return Control(key, label, hint, value, low, high, max(1.0, round(step)) if declared.whole else step)
 
 
 def span(low: float, high: float, value: float) -> tuple[float, float]:

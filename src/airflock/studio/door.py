@@ -1,8 +1,8 @@
 """Door: who may open a page. A token in the address, then a cookie; everything else is turned away.
 
 The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
-starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders have
-names for screen readers).
+starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders and
+buttons have names for screen readers; folders open by the keyboard).
 """
 
 import hmac
@@ -31,6 +31,19 @@ addEventListener("DOMContentLoaded", () => {
         const label = at.querySelector("label");
         if (label) { slider.setAttribute("aria-label", label.textContent); break; }
       }
+    }
+    for (const icon of document.querySelectorAll("button:not([aria-label]) svg[class*='tabler-icon-']")) {
+      const button = icon.closest("button"), kind = /tabler-icon-([a-z-]+)/.exec(icon.getAttribute("class"));
+      if (kind && !button.textContent.trim()) button.setAttribute("aria-label", kind[1].replaceAll("-", " "));
+    }
+    for (const mark of document.querySelectorAll("[style*='cursor: pointer'] > svg[class*='tabler-icon-chevron']")) {
+      const head = mark.parentElement;  // of a folder
+      if (head.hasAttribute("tabindex")) continue;
+      head.tabIndex = 0;
+      head.setAttribute("role", "button");
+      head.addEventListener("keydown", e => {
+        if (e.key === "Enter" || e.key === " ") { head.click(); e.preventDefault(); e.stopPropagation(); }
+      });
     }
   };
   new MutationObserver(name).observe(document.body, { childList: true, subtree: true });

@@ -219,9 +219,9 @@ class Side:
     def move_goal(self, number: int, place: Sequence[float]) -> None:
         """Put a goal somewhere else, m; goals that the scene gave are points from then on."""
         dims = self.scenario.dimensions
-        points = [[float(c) for c in point[:dims]] for point in self.scenario.waypoints()]
+        points = [[float(c) for c in point] for point in self.scenario.waypoints()]
         if number < len(points):
-            points[number] = [float(c) for c in place[:dims]]
+            points[number][:dims] = [float(c) for c in place[:dims]]
             self.change({"goals.kind": "points", "goals.points": points})
 
 

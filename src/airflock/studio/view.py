@@ -3,6 +3,7 @@
 import secrets
 import socket
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -37,6 +38,7 @@ class View:
         token = secrets.token_urlsafe(12)
         console = rich.get_console()
         console.quiet = True  # viser prints panels of its own
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # to a page that has just gone
         with guarded(token, port):
             self.server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
         if self.server.get_port() != port:

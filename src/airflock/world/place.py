@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from airflock.core.agent import State
-from airflock.core.maths import FAR
+from airflock.core.maths import FAR, norm
 from airflock.world import arena, bvh, edges, excursion, polygon, rays
 from airflock.world.arena import Surface
 
@@ -268,6 +268,19 @@ class Place:
             else:
                 free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
         return float(bvh.cast(x, y, z, ux, uy, uz, free, 0.0, *self._scene))
+
+    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float) -> bool:
+        """Whether an obstacle or the scene stands between two places, m; the walls of an arena hide nothing."""
+        dx, dy, dz = to_x - x, to_y - y, to_z - z
+        length = norm(dx, dy, dz)
+        ux, uy, uz = dx / length, dy / length, dz / length
+        free = float(bvh.cast(x, y, z, ux, uy, uz, length, 0.0, *self._scene))
+        for first, last in self._obstacles:
+            if self._obstacle is polygon.prism:
+                free = min(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, self._edges, first, last))
+            else:
+                free = min(free, rays.to_edges(x, y, ux, uy, self._edges, first, last))
+        return bool(free < length)
 
     def cast(
         self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float

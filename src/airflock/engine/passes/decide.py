@@ -5,11 +5,12 @@ import ast
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, asks
-from airflock.engine.passes import flock, grid, percept, scene
+from airflock.engine.passes import flock, grid, perceive, percept, scene
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import faults, surfaces
+from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.state import own_row
 from airflock.engine.stages.words import live
@@ -31,12 +32,15 @@ def neighbours(build: Builder) -> None:
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
     hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    more = perceive.around(plan)
+    meet = Call(f"meet({', '.join(['i, k_, n, m, row, whole, work', *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image
-    made = specialise(build, meeting.neighbours, receive=hear, sums=sums, images=images)
+    made = specialise(build, meeting.neighbours, receive=hear, meet=meet, sums=sums, images=images)
     if plan.grid:
-        grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
+        met = None if plan.topology is None else _met_in_cells(build)
+        grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums], met)
         return
-    arguments = "k_, n, m, time, late, row, whole, work, store"
+    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store", *more])
     build.stage("neighbours", arguments, made.once, made.body, made.answer)
 
 
@@ -44,6 +48,7 @@ def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str],
     """Of `neighbours`: what is done once, for an agent, and for each candidate, for the grid's own loops."""
     axes = build.plan.axes
     found = {f"{kind}{a}" for kind in ("m", "mv", "h", "hv") for a in axes}  # the grid lays them out in its own way
+    found |= set(grid.FOUND)
     lines = [line for line in made.once if line.partition(" = ")[0] not in found]
     lines = list(dict.fromkeys([*(build.records("w") if build.plan.periodic else []), *lines]))
     (agents,) = made.rest
@@ -51,7 +56,18 @@ def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str],
     at = next(k for k, statement in enumerate(agents.body) if isinstance(statement, ast.For))
     candidates = agents.body[at]
     assert isinstance(candidates, ast.For)
-    return lines, lines_of(agents.body[:at]), lines_of(candidates.body)
+    before = [line for line in lines_of(agents.body[:at]) if not line.startswith("meet(")]
+    return lines, before, lines_of(candidates.body)
+
+
+def _met_in_cells(build: Builder) -> tuple[list[str], list[str], list[str], list[str]]:
+    """Of `meet`: what is read, done for an agent, for each candidate and at last, for the grid's own loops."""
+    made = specialise(build, meeting_whom.meet, m=argument("padded"), images=False)
+    at = next(k for k, statement in enumerate(made.first) if isinstance(statement, ast.For))
+    candidates = made.first[at]
+    assert isinstance(candidates, ast.For)
+    read = [line for line in made.bindings if " = work[" not in line]
+    return read, lines_of(made.first[:at]), lines_of(candidates.body), lines_of(made.first[at + 1 :])
 
 
 def boundaries(build: Builder) -> None:

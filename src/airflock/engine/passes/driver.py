@@ -60,6 +60,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     perceive.perceive(build)
     perceive.tune(build)
     perceive.receive(build)
+    perceive.meet(build)
     decide.neighbours(build)
     decide.boundaries(build)
     flock.flock(build)
@@ -85,7 +86,8 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
-        choose += [f"neighbours(k, n, m, time, late, row, whole, work, store{', cells' if plan.grid else ''})"]
+        more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
+        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store', *more])})"]
         choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]

@@ -10,6 +10,7 @@ order of slabs and within a cell by slot, whatever the number of threads. Only f
 loss; there it equals all pairs but for rounding and the order of sums.
 """
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +26,8 @@ CHUNKS = 8  # parts of the flock that are counted side by side; their order is t
 BLOCK = 8  # candidates taken at once
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 SPARE = 8  # cells of the smallest periodic box
+FOUND = ("apart", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, by `stages.meet`
+OTHERS = "(integer(q) != me) & (integer(q) < many)"
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
 
@@ -60,18 +63,31 @@ def opened(build: Builder) -> list[str]:
     return [f"{KEPT} = cells", f"whose = packed.view(np.int{build.plan.bits})[:, {_width(build.plan) - 1}]"]
 
 
-def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int]) -> None:
-    """Function `neighbours` over a grid: `before`, then `inner` for each candidate j, for each agent; sums to rows."""
+def neighbours(
+    build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int],
+    met: tuple[list[str], list[str], list[str], list[str]] | None = None,
+) -> None:  # fmt: skip
+    """Function `neighbours` over a grid: `before`, then `inner` for each candidate j, for each agent; sums to rows.
+
+    met : where an agent meets but some of whom it hears, lines that find out: what is read, done once, for each
+          candidate, at last
+    """
     axes = build.plan.axes
     build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
     names = [*axes, *(f"v{a}" for a in axes)]
     for c, name in enumerate(names):
         before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
-    before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
-    inner = must_replace(inner, "integer(j) != ii", "(integer(q) != me) & (integer(q) < many)")
+    if met is None or who:
+        before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
+    if met is None:
+        inner = must_replace(inner, "integer(j) != ii", OTHERS)
     inner = must_replace(inner, "integer(j) < ii", "who[j] < ii") if who else inner
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
+    if met is not None:
+        lines = list(dict.fromkeys([*met[0], *lines]))
+        meet += _found(build, *met[1:])
+        inner = must_replace(inner, "met[j]", "met[q]")
     # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
     wide = max(1, len(sums))
@@ -83,7 +99,9 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
         f"padded = -(-(slab[ox + 3] - slab[ox]) // {BLOCK}) * {BLOCK}",
         *loop("e in range(starts[here], starts[here + 1])", meet),
     ]
-    body = [*_slabs(build, who), *loop("ox in range(count[0])", cell)]
+    found = re.findall(r"\w+", "\n".join(line for part in met or () for line in part))
+    rows = [f"{name} = np.zeros(room + {2 * BLOCK}, work.dtype)" for name in FOUND if name in found]
+    body = [*_slabs(build, who), *rows, *loop("ox in range(count[0])", cell)]
     lines = [*lines, *opened(build), f"totals = totals_[: n * {wide}].reshape(n, {wide})", *_sorted(build, who)]
     lines += loop("line in prange(count[1] * count[2])", body)
     back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
@@ -92,6 +110,17 @@ def neighbours(build: Builder, lines: list[str], before: list[str], inner: list[
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = must_replace(lines, "CHUNKS", str(CHUNKS))
     build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
+
+
+def _found(build: Builder, once: list[str], each: list[str], last: list[str]) -> list[str]:
+    """Lines that find whom an agent meets of the candidates of its cell: `met`, by number of the candidate."""
+    for c, a in enumerate(build.plan.axes):
+        once = must_replace(once, f"m{a}[i]", f"packed[e, {c}]")
+    once = [line for line in once if line != "ii = integer(i)"]
+    each = must_replace(each, "integer(j) != ii", OTHERS)
+    for name in FOUND:
+        each = [line.replace(f"{name}[j]", f"{name}[q]") for line in each]
+    return [*once, *loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]
 
 
 def _box(build: Builder) -> list[str]:

@@ -1,9 +1,11 @@
 """Perceive: the stages that bring an agent what it knows, as functions of a driver."""
 
 from airflock.engine.passes.build import Builder
+from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
 from airflock.engine.stages import faults
+from airflock.engine.stages import meet as meeting
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages import receive as hearing
 
@@ -25,6 +27,19 @@ def tune(build: Builder) -> None:
     if build.plan.suffers("radio", "clock"):
         made = specialise(build, faults.tune, decision=argument("k_"))
         build.function("tune(k_, m, row, work)", made.lines, "return 0")
+
+
+def meet(build: Builder) -> None:
+    """Function meet, where agents meet but some of whom they hear: fills row met for one agent."""
+    plan = build.plan
+    if plan.topology is not None and not plan.grid:
+        made = specialise(build, meeting.meet, decision=argument("k_"), images=build.images)
+        build.function(f"meet({', '.join(['i, k_, n, m, row, whole, work', *around(plan)])})", made.lines, "return 0")
+
+
+def around(plan: Plan) -> tuple[str, ...]:
+    """What stands in the world, where neighbours may be hidden: further arguments of `meet` and `neighbours`."""
+    return ("edges", "spans", "scene") if plan.hides else ()
 
 
 def receive(build: Builder) -> None:

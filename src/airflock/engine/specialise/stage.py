@@ -12,6 +12,7 @@ from airflock.engine.plan import WHOLE
 from airflock.engine.specialise.dead import read, without_dead
 from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
 from airflock.engine.specialise.values import LOAD, Components, Loop, given, kind_of, text_of
+from airflock.engine.stages import words
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import Itself
 
@@ -171,7 +172,8 @@ class _Statements(Expressions):
             return []  # a docstring
         if isinstance(node, ast.Call):
             called = self.value(node.func, scope)
-            if isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES):
+            helper = isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES)
+            if helper and called.__module__ != words.__name__:
                 inner = self.entered(called, node, [self.value(argument, scope) for argument in node.args], scope)
                 return self.block(inner.text.node.body, inner)
         return [ast.Expr(self.expr(node, scope))]

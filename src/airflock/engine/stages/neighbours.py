@@ -7,6 +7,7 @@ from typing import Any
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
+from airflock.engine.stages.meet import carries
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     HALF,
@@ -30,15 +31,6 @@ from airflock.engine.stages.words import (
 from airflock.world.edges import nearest_image
 
 
-def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
-    """Square of how far agent i hears agent j, m². Over links the last packet that came is heard on and on."""
-    return (
-        least(least(range2, flock.reach_in[i]), flock.reach_out[j])
-        if plan.suffers("radio") and not plan.links
-        else range2
-    )
-
-
 def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
     """How old the data of agent j are, as the clocks of both tell, s."""
     return (
@@ -50,12 +42,13 @@ def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
 
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
     agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, late: float,
-    receive: Callable[[int], None], *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
+    receive: Callable[[int], None], meet: Callable[[int], None], *, plan: Plan, model: Model,
+    sums: tuple[tuple[int, str], ...], images: bool,
 ) -> None:  # fmt: skip
-    """Sum the neighbour rule over all others in range of each agent.
+    """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late    : how old is what is heard, s
-    receive : finds whom agent i hears, where packets are lost
+    receive : finds whom agent i hears, where packets are lost; meet: whom of them it meets, where that is not all
     sums    : each field of Sums that is summed, and how it is reduced
     images  : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
@@ -80,6 +73,8 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             near2 = near * near + TINY if exact else near * near
         if selective:
             receive(i)
+        if plan.topology is not None:
+            meet(i)
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         for a in axes:
             own[a] = flock.measured_position[a][i]
@@ -111,7 +106,9 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
             for a in (X, Y, Z):
                 nh[a] = g * (v[a] + dv[a])
-            if true_range:
+            if plan.topology is not None:
+                ok = flock.met[j] > HALF
+            elif true_range:
                 for a in axes:
                     o[a] = flock.position[a][j] - true[a]
                 if plan.periodic:
@@ -122,7 +119,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                 ok = (r2 <= range2) & (integer(j) != ii)
             if model.reach is not None:
                 ok = ok & (r2 <= near2)
-            if selective:
+            if selective and plan.topology is None:
                 ok = ok & (flock.heard[j] > HALF)
             t = ask(
                 model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z], dv=speed,

@@ -46,6 +46,10 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
+    away, apart                          : offsets of the others from one agent (m), and their squares (m²), FAR of
+                                           whom it does not hear
+    hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
+    met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body, sense                          : what the body and the sensor remember, by field of their Memory
     errors, chances                      : normal and uniform numbers of the sensors
@@ -68,6 +72,7 @@ class Flock:
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
+        self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
         self.sense, self.chances = Columns("sense", take), Columns("chance", take)
         self._take = take
@@ -81,6 +86,36 @@ class Flock:
     def age(self) -> Row:
         """How old that is, s."""
         return self._take("age")
+
+    @property
+    def apart(self) -> Row:
+        """Squared distance of each other agent, m²; FAR of whom one agent does not hear."""
+        return self._take("apart")
+
+    @property
+    def hidden(self) -> Row:
+        """Whether something that stands in the world hides each other agent, 1 or 0."""
+        return self._take("hidden")
+
+    @property
+    def fade(self) -> Row:
+        """Normal number of the signal of each other agent."""
+        return self._take("fade")
+
+    @property
+    def met(self) -> Row:
+        """Whether one agent meets each other one, 1 or 0."""
+        return self._take("met")
+
+    @property
+    def heap(self) -> Row:
+        """Scratch of whoever ranks agents."""
+        return self._take("heap")
+
+    @property
+    def weak(self) -> Row:
+        """Scratch of whoever ranks signals."""
+        return self._take("weak")
 
     @property
     def reach_out(self) -> Row:

@@ -9,12 +9,16 @@ Score = Callable[[Mapping[str, float], int], Mapping[str, Any]]  # parameters an
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight to be flown: `candidate` and `repeat` say which of a generation, `seed` decides all its chance."""
+    """One flight to be flown: `candidate` and `repeat` say which of a generation, `seed` decides all its chance.
+
+    place : which of the study's scenarios
+    """
 
     candidate: int
     repeat: int
     parameters: Mapping[str, float]
     seed: int
+    place: int = 0
 
 
 @dataclass(frozen=True)

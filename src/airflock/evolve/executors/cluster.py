@@ -51,7 +51,7 @@ class Cluster:
             from distributed import Client
         except ModuleNotFoundError as fault:
             raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
-        self.task, self.timeout = Task.of(study) if task is None and study is not None else task, timeout
+        self.tasks, self.timeout = tasks_of(study) if task is None and study is not None else (task,), timeout
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)
             self.client.wait_for_workers(1, timeout=answer)
@@ -84,7 +84,9 @@ class Cluster:
                 while waiting and len(out) < threads * (1 if self.timeout else AHEAD):
                     flight = waiting.pop()
                     # impure: equal flights are equal anyway, and dask must not forget or share one
-                    future = self.client.submit(self.task, dict(flight.parameters), flight.seed, pure=False)
+                    future = self.client.submit(
+                        self.tasks[flight.place], dict(flight.parameters), flight.seed, pure=False
+                    )
                     out[future] = flight, time.monotonic()
                 try:
                     with self.client.as_current():
@@ -162,11 +164,11 @@ class Task:
         self.text, self.where, self.precision = text, where, precision
 
     @classmethod
-    def of(cls, study: Study) -> "Task":
-        """The task of a study; raises StudyError for a law that exists only in this process."""
+    def of(cls, study: Study, place: int = 0) -> "Task":
+        """The task of one of a study's scenarios; raises StudyError for a law that exists only in this process."""
         from airflock.errors import AirflockError
 
-        scenario = study.scenario
+        scenario = study.scenarios[place]
         made = cls(json.dumps(plain(scenario.document)), scenario.name, int(study.search.precision))
         try:
             rebuild(made.text, made.where)
@@ -191,6 +193,11 @@ class Task:
         with compiling:  # threads of a worker wait for the first to compile
             compile_for(scenario, precision=self.precision)
         return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
+
+
+def tasks_of(study: Study) -> tuple[Task, ...]:
+    """The task of each scenario of a study."""
+    return tuple(Task.of(study, place) for place in range(len(study.scenarios)))
 
 
 @lru_cache(maxsize=8)

@@ -22,14 +22,17 @@ def land(score: Score, flight: Flight, worker: str = "") -> Landed:
 class Here:
     """A pool of threads, one per core unless told otherwise."""
 
-    def __init__(self, score: Score, threads: int):
-        """`score` turns parameters and a seed into order parameters; it is called from `threads` threads."""
-        self.score, self.name = score, f"{os.uname().nodename}:{os.getpid()}"
+    def __init__(self, score: Score, threads: int, others: Sequence[Score] = ()):
+        """`score` turns parameters and a seed into order parameters; it is called from `threads` threads.
+
+        others : the same for further scenarios of the study
+        """
+        self.scores, self.name = (score, *others), f"{os.uname().nodename}:{os.getpid()}"
         self.pool = ThreadPoolExecutor(max(1, threads))
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
         """Yield each flight as soon as it is over."""
-        waiting: set[Future[Landed]] = {self.pool.submit(land, self.score, f, self.name) for f in flights}
+        waiting: set[Future[Landed]] = {self.pool.submit(land, self.scores[f.place], f, self.name) for f in flights}
         try:
             while waiting:
                 # a timeout, so that Ctrl-C is heard while flights are in the air

@@ -17,14 +17,16 @@ class Together:
         self.study, self.device = study, device
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
-        """Yield all flights once the batch is over."""
+        """Yield all flights of a scenario once they are over."""
+        for place in sorted({flight.place for flight in flights}):
+            yield from self._fly([flight for flight in flights if flight.place == place])
+
+    def _fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
         from airflock.engine.simulate import score_flights
 
-        if not flights:
-            return
         begin = time.perf_counter()
         try:
-            scenarios = [with_parameters(self.study.scenario, flight.parameters) for flight in flights]
+            scenarios = [with_parameters(self.study.scenarios[flight.place], flight.parameters) for flight in flights]
             precision = int(self.study.search.precision)
             rows = score_flights(scenarios, [f.seed for f in flights], precision=precision, device=self.device)
         except (AirflockError, ArithmeticError) as fault:
@@ -33,8 +35,8 @@ class Together:
                 yield Landed(flights[0], None, reason, time.perf_counter() - begin, self.device)
                 return
             half = len(flights) // 2
-            yield from self.fly(flights[:half])
-            yield from self.fly(flights[half:])
+            yield from self._fly(flights[:half])
+            yield from self._fly(flights[half:])
             return
         each = (time.perf_counter() - begin) / len(flights)
         for flight, values in zip(flights, rows, strict=True):

@@ -1,0 +1,36 @@
+"""What the section [topology] of a scenario holds."""
+
+from dataclasses import dataclass
+
+from airflock.core.parameters import Parameters as Record
+from airflock.core.parameters import choice, quantity
+
+STARLINGS = "Ballerini et al. 2008: 6.5 ± 0.9 in flocks of starlings"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Record):
+    """Which of those whom an agent hears it meets: all, the nearest, those beside it, those it sees, the strongest."""
+
+    kind: str = choice(
+        "range",
+        ("range", "nearest", "voronoi", "visible", "strongest"),
+        source="our choice",
+        meaning="range: all that the radio brings; nearest: the k nearest; voronoi: whose cell borders on the own one, "
+        "in a plane; visible: not hidden by others, obstacles or the scene; strongest: the k strongest signals",
+    )
+    k: float = quantity(
+        7.0, "1", low=1, high=1e6, source=STARLINGS, whole=True, meaning="how many, nearest or strongest"
+    )
+    radius: float = quantity(
+        0.25, "m", low=0.0, high=1e3, source="our choice: a small drone", meaning="of a body that hides others"
+    )
+    exponent: float = quantity(
+        2.0, "1", low=0.5, high=8.0, source="free space", meaning="of the path loss of signals over distance"
+    )
+    wall: float = quantity(
+        20.0, "dB", low=0.0, high=200.0, source="our choice: a house", meaning="lost behind what stands in the world"
+    )
+    fading: float = quantity(
+        4.0, "dB", low=0.0, high=40.0, source="our choice: open ground", meaning="SD of the strength of a signal"
+    )

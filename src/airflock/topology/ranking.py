@@ -1,0 +1,37 @@
+"""Ranking: the k-th least of many numbers, by a heap of the k least so far."""
+
+from airflock.core.maths import FAR
+
+HEARD = 0.5 * FAR  # what lies beyond belongs to nobody who is heard
+
+
+def kth_least(n, values, heap, k):
+    """The k-th least of the first n numbers that lie below HEARD; HEARD if there are fewer.
+
+    heap : scratch of n numbers; the greatest of the k least lies in front
+    """
+    size = 0
+    for j in range(n):
+        value = values[j]
+        if value < HEARD:
+            if size < k:
+                at = size
+                size = size + 1
+                while at > 0 and heap[(at - 1) // 2] < value:
+                    heap[at] = heap[(at - 1) // 2]
+                    at = (at - 1) // 2
+                heap[at] = value
+            elif value < heap[0]:
+                at = 0
+                below = 1
+                while below < size:
+                    if below + 1 < size and heap[below + 1] > heap[below]:
+                        below = below + 1
+                    if heap[below] <= value:
+                        below = size
+                    else:
+                        heap[at] = heap[below]
+                        at = below
+                        below = 2 * at + 1
+                heap[at] = value
+    return heap[0] if size == k else HEARD

@@ -1,0 +1,12 @@
+"""The topologies that a scenario can name: the key topology.kind. Whoever meets all whom it hears has none."""
+
+from airflock.core.topology import Topology
+from airflock.topology import nearest, strongest, visible, voronoi
+
+TOPOLOGIES: dict[str, Topology | None] = {
+    "range": None,
+    "nearest": Topology("nearest", nearest.meet, near=True),
+    "voronoi": Topology("voronoi", voronoi.meet, flat=True),
+    "visible": Topology("visible", visible.meet, near=True),
+    "strongest": Topology("strongest", strongest.meet),
+}
