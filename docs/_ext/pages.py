@@ -224,6 +224,7 @@ def vocabulary() -> None:
         "boundary": "of a model: asked for each wall and obstacle; returns Walls",
         "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
         "decide": "of a model: returns the command, and its Memory where it has one",
+        "meet": "of a topology: says whom of those that it hears an agent meets",
         "move": "of a body: returns the velocity after a step",
         "pair": "of an order parameter: asked for each pair of agents",
         "linked": "of an order parameter: whether two agents belong to one cluster",
