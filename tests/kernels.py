@@ -15,5 +15,6 @@ def compiled(rule, bits=64, loop=""):
     source = Source(JIT, {})
     name = source.name(rule)
     head = HEAD.format(label=rule.__name__, bits=bits, primitives=primitives(bits))
-    text = "\n\n".join([head, *source.blocks, loop.replace("RULE", name)]) + "\n"
-    return getattr(load_driver(text, "rule"), "run" if loop else name)
+    called = f"run = njit(**JIT | CALLED)({name}.py_func)"  # of a driver Python calls the last one only
+    text = "\n\n".join([head, *source.blocks, loop.replace("RULE", name) or called]) + "\n"
+    return load_driver(text, "rule").run

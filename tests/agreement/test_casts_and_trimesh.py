@@ -15,7 +15,7 @@ RAYS = 100_000
 LENGTH = 400.0  # m
 FACE = 42.5  # m, longest edge of the scenery: the diagonal of a box of 30 m
 LOOP = """
-@njit(**JIT)
+@njit(**JIT | CALLED)
 def run(origins, directions, length, shapes, nodes, links):
     found = np.zeros(len(origins), origins.dtype)
     for i in range(len(origins)):

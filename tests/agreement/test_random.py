@@ -24,7 +24,7 @@ KNOWN = [
     ),
 ]
 LOOP = """
-@njit(cache=True, **JIT)
+@njit(cache=True, **JIT | CALLED)
 def fill(counters, keys, words, uniforms, normals):
     for i in range(counters.shape[1]):
         c0, c1, c2, c3 = counters[0, i], counters[1, i], counters[2, i], counters[3, i]

@@ -79,6 +79,9 @@ def test_the_recording_of_a_fleet_is_measured_like_any_other(tmp_path):
     kept = load_recording(save(made, tmp_path / "fleet.nc"))
     assert measure(kept)[0]["phi_vel"] == pytest.approx(measure(made)[0]["phi_vel"])
     assert set(kept.position.dims) == {"time", "space", "keypoint", "individual"} and "own_position" in kept
+    ages = kept.age.values[:, ~np.eye(4, dtype=bool)]  # nobody knows itself from the radio
+    assert np.isnan(kept.age.values[:, np.eye(4, dtype=bool)]).all() and np.nanmin(ages) >= 0.0
+    assert abs(np.nanmedian(ages) - flown.scenario.radio.delay) <= flown.card.period + 1e-6
     assert np.abs(kept.own_position.values - kept.position.values).max() < 3.0
 
 

@@ -25,7 +25,7 @@ CALLS = {
 }
 LOOPS = {
     name: f"""
-@njit(**JIT)
+@njit(**JIT | CALLED)
 def run(a, b, number, shapes, nodes, links):
     found = np.zeros(len(a), a.dtype)
     for i in range(len(a)):

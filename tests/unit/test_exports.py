@@ -1,6 +1,7 @@
 """Round trips: what is written for other tools reads back as it was."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -35,6 +36,29 @@ def test_tables_come_back_with_the_same_bits(recording, tmp_path, ending):
         np.testing.assert_array_equal(back[name].values, own)
     assert list(back["individual"].values) == list(recording["individual"].values)
     assert back["confidence"].values[60, 0, 2] == 0.0
+
+
+@pytest.mark.parametrize("space", [2, 3])
+def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, space):
+    from airflock.recordings.layout import dataset
+
+    flat = np.concatenate([recording[name].values[:, :, 0] for name in ("position", "velocity", "command")], axis=1)
+    climb = np.linspace(20.0, 30.0, 200)[:, None, None] + 0.0 * flat[:, :1]
+    rise = np.full_like(climb, 10.0 / 19.9)
+    tall = np.concatenate([flat[:, :2], climb, flat[:, 2:4], rise, flat[:, 4:], 0.0 * rise], axis=1)
+    tall[50:90, :, 2] = np.nan
+    given = dataset(tall if space == 3 else flat, space, 0.1, {}, "velocity")
+    path = airflock.export(given, tmp_path / "log.csv", layout="px4")
+    table = pd.read_csv(path)
+    first = given["position"].values[0, :, 0, 0]
+    assert table["timestamp [us]"].dtype == int and table.loc[0, ["x [m]", "y [m]"]].tolist() == [first[1], first[0]]
+    assert (table["z [m]"] == 0.0).all() if space == 2 else table["z [m]"].iloc[0] == -20.0
+    back = airflock.load_tracks(path, axes="ned")
+    own = given.transpose("time", "space", "keypoint", "individual")
+    for name in ("position", "velocity", "command"):
+        np.testing.assert_allclose(back[name].values[:, :space], own[name].values, atol=1e-5)
+    with pytest.raises(airflock.AirflockError, match="write .csv"):
+        airflock.export(given, tmp_path / "log.parquet", layout="px4")
 
 
 @pytest.mark.parametrize("old", [False, True])

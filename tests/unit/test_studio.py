@@ -2,6 +2,7 @@
 
 import math
 import socket
+import threading
 import time
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock.errors import ScenarioError, StudioError
+from airflock.errors import RuleError, ScenarioError, StudioError
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
 from airflock.stage import colours, shades
@@ -517,3 +518,44 @@ def test_a_fault_is_an_event_and_back_takes_it_away(player):
     np.testing.assert_array_equal(player.flight.state, live)
     player.back(0.5)
     assert not player.flight.events and not player.flight.faults
+
+
+def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):
+    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: flight.device == "python"))
+    compiled, go = airflock.engine.flight.Flight.compile, threading.Event()
+    monkeypatch.setattr("airflock.engine.flight.Flight.compile", lambda flight: go.wait() and compiled(flight))
+    player = Player(PRESET, FEW, 3, at_once=True)
+    player.start()
+    assert player.compiling and "compiling" in player.status and player.flight.device == "python"
+    player.fly(60)
+    player.change("model.p_rep", 0.2)
+    player.push(3, 2.0)
+    player.fly(30)
+    seen = player.flight.state
+    go.set()
+    player.paused = True
+    while player.compiling:
+        player.tick(0.01)
+    assert player.flight.device == "cpu" and player.flight.step == 90 and not player.failure
+    np.testing.assert_allclose(player.flight.state, seen, atol=1e-3)  # double against single precision
+    whole = airflock.open(player.preset, 3, events=player.flight.events).advance(steps=90)
+    np.testing.assert_array_equal(player.flight.state, whole.state)
+    player.fly(20)
+    again = load_recording(player.save_recording(tmp_path / "begun.nc"))
+    np.testing.assert_array_equal(again["position"].values[-1, :, 0], whole.advance(steps=10).state[:2])
+    player.back(0.4)
+    assert player.flight.step == 40
+    np.testing.assert_array_equal(player.flight.state, airflock.open(player.preset, 3).advance(steps=40).state)
+
+
+def test_what_the_compiler_refuses_stops_a_flight_that_has_begun(monkeypatch):
+    def refuse(flight):
+        raise RuleError("model m: a rule does not compile")
+
+    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: False))
+    monkeypatch.setattr("airflock.engine.flight.Flight.compile", refuse)
+    player = Player(PRESET, {"agents": 3}, 3, at_once=True)
+    player.start()
+    while not player.failure:
+        player.tick(0.01)
+    assert player.status == "stopped: model m: a rule does not compile"

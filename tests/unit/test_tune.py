@@ -3,12 +3,15 @@
 import json
 import tomllib
 
+import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import airflock
 from airflock.certify.seeds import identity
-from airflock.errors import StudyError
+from airflock.errors import RecordingError, ScenarioError, StudyError
 from airflock.evolve.race import ROUNDS
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
@@ -91,3 +94,63 @@ def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch
     (folder / "hardening.json").write_text(kept)
     with pytest.raises(StudyError, match="holds no tuning to resume"):
         tune(make(MINE, "mine"), tmp_path / "new", resume=True)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """A log of four drones as a table, of a lag of 0.5 s that the scenario does not know."""
+    flown = airflock.simulate(make({**MINE, "duration": 60.0, "body": {"tau": 0.5}}, "true"), seed=3)
+    columns = {"t": np.repeat(flown["time"].values, 4), "id": np.tile(np.arange(4), flown.sizes["time"])}
+    for axis, name in enumerate("xy"):
+        for what, prefix in (("position", ""), ("velocity", "v"), ("command", "c")):
+            values = flown[what].squeeze("keypoint").transpose("time", "individual", "space").values
+            columns[f"{prefix}{name}"] = values[..., axis].ravel()
+    path = tmp_path_factory.mktemp("logs") / "log.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    return path
+
+
+def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
+    monkeypatch.setattr(tuning, "_rate", lambda *_: 300.0)
+    monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
+    how = {"like": make(MINE, "mine"), "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
+    found = tune([logs], tmp_path / "a", **how)
+    tau = load(tmp_path / "a" / "identified.toml").body.tau
+    assert tau == pytest.approx(0.5, rel=0.1) and found.scenario.body.tau == tau != make(MINE, "mine").body.tau
+    told = {number["key"]: number for number in found.document()["identified"]["numbers"]}
+    assert told["body.tau"]["low"] < 0.5 < told["body.tau"]["high"] and "reason" in told["radio.delay"]
+    page = (tmp_path / "a" / "report.html").read_text()
+    for text in ("What was identified", "body.tau", told["radio.delay"]["reason"], "log.csv"):
+        assert text in page
+    monkeypatch.setattr("airflock.tune.logs.identify", lambda *_, **__: pytest.fail("identified already"))
+    again = tune([logs], tmp_path / "a", resume=True, **how)
+    assert again.identified == found.identified and identity(again.scenario) == identity(found.scenario)
+    other = tmp_path / "log.csv"
+    other.write_text(logs.read_text() + "\n")
+    with pytest.raises(StudyError, match="holds the tuning of other logs .logs differs.; give another --out"):
+        tune([other], tmp_path / "a", resume=True, **how)
+
+
+def test_the_report_plays_the_worst_flights_and_tells_the_card_of_the_next(done):
+    found, folder = done
+    page = (folder / "report.html").read_text()
+    worst = int(found.certificate.worst[0]["seed"])
+    assert 'href="worst_1.html"' in page and str(worst) in page
+    show = (folder / "worst_1.html").read_text()
+    assert show.startswith("<!DOCTYPE html>") and "tuned.toml" in show
+    assert f"airflock fly prepare {folder / 'tuned.toml'} --site LAT,LON,ALT --members 1-4" in page
+    speed = 1.5 * found.scenario.parameters.v_flock
+    assert f"{speed:.4g} m/s" in page and "safety.speed_max" in page
+
+
+def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
+    for what, more, words in (
+        ([logs, logs], {}, "tune takes one scenario; of logs, give --like"),
+        ([logs], {"heard": logs}, "of logs, give --like"),
+        (make(MINE, "mine"), {"like": make(MINE, "mine")}, "log files are to be tuned, and no scenario"),
+    ):
+        with pytest.raises(ScenarioError, match=words):
+            tune(what, tmp_path / "a", **more)
+    with pytest.raises(RecordingError, match=r"missing.csv: No such file"):
+        tune([tmp_path / "missing.csv"], tmp_path / "a", like=make(MINE, "mine"))
+    assert not (tmp_path / "a").exists()

@@ -153,16 +153,19 @@ def _origin(text: str) -> tuple[float, float, float] | None:
 
 
 class Layout(StrEnum):
-    """Names of the dimensions of netCDF."""
+    """Names of the dimensions of netCDF, or fields of a table."""
 
     MOVEMENT = "movement"
     OLD = "movement-0.16"
+    PX4 = "px4"
 
 
 def export(
     recording: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A recording.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".csv, .parquet or .nc (movement).")],
-    layout: Annotated[Layout, typer.Option(help="Of .nc: today's, or of movement up to 0.16.")] = Layout.MOVEMENT,
+    layout: Annotated[
+        Layout, typer.Option(help="Of .nc: movement of today or up to 0.16; of .csv: a PX4 log.")
+    ] = Layout.MOVEMENT,
 ) -> None:
     """Write a recording for other tools: a long table with units in its headers, or a dataset of movement.
 

@@ -23,6 +23,7 @@ class Kind(StrEnum):
     RAYS = "rays"
     FLOCKED = "flocked"
     WASH = "wash"
+    RECEPTION = "reception"
 
 
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending decides the format.")]
@@ -46,7 +47,8 @@ def plot(
 ) -> None:
     """Draw trajectories coloured by speed, a long-exposure picture, order parameters over time, or a model's rules.
 
-    In a city, forest or mesh: paths through the scene from above or in space, rays of one agent, share flocked.
+    In a city, forest or mesh: paths through the scene from above or in space, rays of one agent, share flocked. Also
+    the time since the last packet by distance: --kind reception.
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
     """

@@ -11,7 +11,10 @@ from airflock.cli import options, tables
 
 
 def tune(
-    scenario: Annotated[str, typer.Argument(metavar="FILE|PRESET", help="Your drones, field and speed.")],
+    scenario: Annotated[
+        list[str],
+        typer.Argument(metavar="FILE|PRESET|LOGS", help="Your drones, field and speed; or logs, with --like."),
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of everything.", show_default=False)],
     budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 20min or 2h.")] = "20min",
     limit: Annotated[
@@ -21,6 +24,13 @@ def tune(
         ),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of the certificate.")] = 0.95,
+    like: Annotated[
+        str | None,
+        typer.Option(metavar="PRESET|FILE", help="Tune logs: whose law, field and speed.", show_default=False),
+    ] = None,
+    heard: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv", help="Packets of the logs, as identify takes them.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue what is in the folder.")] = False,
     changes: options.Set = None,
     trust: options.Trust = False,
@@ -33,6 +43,8 @@ def tune(
 
     Numbers of the law that the file does not give are scaled to its speed. Exit status 1 where a limit is not shown.
 
+    Of logs, the numbers of the drones are identified first (more options: airflock identify, then tune what it writes).
+
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
     from airflock.cli.certify import time_of
@@ -43,14 +55,22 @@ def tune(
     seconds, found = 1.0, None
     with options.gathering(faults):
         seconds = time_of(budget)
-    with options.gathering(faults):
-        found = load(scenario, options.settings(changes, agents, duration), trust=trust)
+    if like is None and (len(scenario) > 1 or heard is not None):
+        faults.append(f"{', '.join(scenario)}: one scenario is tuned; of logs, give --like PRESET")
+    elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
+        faults.append(f"{scenario[0]}: is not a scenario file (.toml); of logs, give --like PRESET")
+    else:
+        with options.gathering(faults):
+            found = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
     options.refuse(faults)
     assert found is not None
     options.compile_aloud(found, 32, "cpu")
+    what: Any = found if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "resume": resume, "threads": threads, "trust": trust}
+    if like is not None:
+        how |= {"like": found, "heard": heard}
     with _stages(as_json) as (watch, note):
-        made = tune(found, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
+        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
     if as_json:
         tables.emit_json(made.document())
     else:

@@ -65,6 +65,15 @@ class Course:
         with cpu.compiling(self.state.plan.model.name):
             self._placed(self.state.advance(first, last, half))
 
+    @property
+    def ready(self) -> bool:
+        """Whether the driver in force flies at once."""
+        return cpu.is_compiled(self.state.driver)
+
+    def compile(self) -> None:
+        """Have it compiled."""
+        _compiled(self.state)
+
     def advance(self, last: int) -> None:
         """Fly all steps before `last`, and keep their samples."""
         self.take_over()

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -58,6 +59,14 @@ def replay_driver(plan: Plan) -> ModuleType:
 def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
     """Driver of a plan: compiled, or with device = python its text as plain Python."""
     return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
+
+
+def is_compiled(driver: ModuleType) -> bool:
+    """Whether a driver flies without being compiled first: in this process, or from what an earlier one has kept."""
+    advance = driver.advance
+    if not hasattr(advance, "signatures"):  # interpreted
+        return True
+    return bool(advance.signatures) or any(Path(advance.stats.cache_path).glob("*.nbi"))
 
 
 def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: str = "cpu") -> Flown:

@@ -159,6 +159,16 @@ class Flight:
         stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
         return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
+    @property
+    def ready(self) -> bool:
+        """Whether it flies at once; otherwise its driver is compiled first."""
+        return self._course.ready
+
+    def compile(self) -> "Flight":
+        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it."""
+        self._course.compile()
+        return self
+
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
         """Fly on by some seconds or motion steps, at most to the end of the flight. Returns the flight.
 

@@ -20,7 +20,7 @@ from airflock.engine.integers import tree_of
 from airflock.errors import RuleError
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
-ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True)'
+ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
 GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
 NOTHING: Mapping[str, str] = {}
 INLINED = '@njit(inline="always", **JIT)'

@@ -19,7 +19,7 @@ from airflock.evolve.several import common_space, distinct, faults_together, rea
 from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
 from airflock.scenarios import formats, schema
-from airflock.scenarios.files import tells_of_study
+from airflock.scenarios.files import presets, tells_of_study
 from airflock.scenarios.scenario import Scenario
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
@@ -117,8 +117,10 @@ def shipped() -> dict[str, Path]:
 
 
 def is_study(name: str | os.PathLike[str]) -> bool:
-    """Whether a name is that of a study's file, rather than of a scenario; a preset's name is the preset's."""
+    """Whether a name is that of a study, rather than of a scenario; a preset's name is the preset's."""
     path = Path(name)
+    if str(name) in shipped() and str(name) not in presets():
+        return True
     if path.suffix != ".toml" or not is_file(path):
         return False
     try:

@@ -69,6 +69,7 @@ def recording(fleet: Fleet) -> xr.Dataset:
     found = dataset(frames, dims, fleet.card.period, attributes, "velocity")
     known = rows[:, :, 9 : 9 + dims].transpose(0, 2, 1)[:, :, None, :]
     found["own_position"] = (found["position"].dims, known, {"units": "m", "meaning": "as the node knows it"})
+    found["age"] = (("time", "receiver", "sender"), fleet.ages().astype(np.float32), {"units": "s"})
     return found
 
 

@@ -29,6 +29,7 @@ from airflock.scenarios.scenario import Scenario
 
 STARTED = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
 KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
+NEVER = -1e8  # s; a peer whose last state held before this has not been heard
 READY_TIME = 12.0  # s on the ground before a start is ordered
 
 
@@ -48,7 +49,7 @@ class Fleet:
         self._dt = scenario.flight.dt
         self._every = max(1, round(card.period / self._dt))
         self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
-        self.steps, self.frames, self.log = 0, [], []  # type: ignore[var-annotated]
+        self.steps, self.frames, self.stamps, self.log = 0, [], [], []  # type: ignore[var-annotated]
         self._noise = OuterNoise(seed, len(card.members), not card.flat)
         self.vehicles = [self._vehicle(i) for i in range(len(card.members))]
         self.nodes = [
@@ -188,10 +189,19 @@ class Fleet:
         self.frames.append(
             [(*v.state, *n.command, *(n.wire.state or v.state)) for v, n in zip(self.vehicles, self.nodes, strict=True)]
         )  # fmt: skip
+        self.stamps.append(
+            [[n.peers.all[m].at if m != n.member else -1e9 for m in self.card.members] for n in self.nodes]
+        )
 
     def array(self) -> NDArray[np.float64]:
         """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
         return np.array(self.frames)
+
+    def ages(self) -> NDArray[np.float64]:
+        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
+        times = self._every * self._dt * np.arange(len(self.stamps))
+        stamps = np.array(self.stamps)
+        return np.where(stamps > NEVER, times[:, None, None] - stamps, np.nan)
 
     def digest(self) -> str:
         """SHA-256 of all that was flown."""

@@ -9,6 +9,7 @@ from airflock.plots.heatmap import heatmap
 from airflock.plots.pareto import pareto
 from airflock.plots.picture import KINDS, plot
 from airflock.plots.rays import rays
+from airflock.plots.reception import received
 from airflock.plots.rules import rules
 from airflock.plots.save import save_figure
 from airflock.plots.series import rotations, series
@@ -19,6 +20,6 @@ from airflock.plots.transfer import transfer
 from airflock.plots.wash import wash
 
 __all__ = [
-    "KINDS", "convergence", "exposure", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "rotations",
-    "rules", "save_figure", "series", "slices", "stood", "through", "trajectories", "transfer", "wash",
+    "KINDS", "convergence", "exposure", "fitness_scatter", "flocked", "heatmap", "pareto", "plot", "rays", "received",
+    "rotations", "rules", "save_figure", "series", "slices", "stood", "through", "trajectories", "transfer", "wash",
 ]  # fmt: skip

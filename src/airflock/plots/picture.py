@@ -1,7 +1,7 @@
 """One door to the pictures of a scenario or a recording, by the name of the kind."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import xarray as xr
@@ -12,6 +12,7 @@ from airflock.errors import AirflockError
 from airflock.plots.exposure import exposure
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import rays
+from airflock.plots.reception import received
 from airflock.plots.rules import rules
 from airflock.plots.series import series
 from airflock.plots.through import through
@@ -24,7 +25,9 @@ from airflock.recordings.scores import scenario_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
-KINDS = ("trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash")
+KINDS = (
+    "trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
+)  # fmt: skip
 OF_A_SCENARIO = ("rules", "transfer")  # pictures that take no flight
 What = Scenario | xr.Dataset | str | os.PathLike[str]
 
@@ -49,7 +52,8 @@ def plot(
         A scenario or the name of one, which is flown; or a recording or a file (.nc) of one.
     kind : str
         trajectories, exposure, series, flocked; scene, space, rays where something stands in the world; wash of a
-        formation of wings; rules of a model; transfer, the partial fitnesses.
+        formation of wings; reception, the time since the last packet by distance; rules of a model;
+        transfer, the partial fitnesses.
     seed : int
         Seed of the flight, where a scenario is flown.
     start, stop : float, optional
@@ -86,7 +90,8 @@ def plot(
     if kind in OF_A_SCENARIO:
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
-    return _of_recording(flight_of(what, seed, settings, law, trust=trust), kind, start, stop, ax)
+    keep = ("heard",) if kind == "reception" else ()
+    return _of_recording(flight_of(what, seed, settings, law, trust=trust, keep=keep), kind, start, stop, ax)
 
 
 def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
@@ -96,6 +101,8 @@ def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: f
         return rays(recording, start=start, ax=ax)
     if kind == "wash":
         return wash(recording, start=start, ax=ax)
+    if kind == "reception":
+        return received(recording, ax=ax)
     if kind == "flocked":
         return flocked(recording, start=start, stop=stop, ax=ax)
     if kind == "series":
@@ -116,8 +123,9 @@ def _scenario(what: What, settings: Mapping[str, Any] | None, law: Any, trust: b
 
 
 def flight_of(
-    what: What, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False
-) -> xr.Dataset:
+    what: What, seed: int, settings: Mapping[str, Any] | None = None, law: Any = None, *, trust: bool = False,
+    keep: Sequence[str] = (),
+) -> xr.Dataset:  # fmt: skip
     """The recording that is given or named, or a flight of the scenario that is."""
     if isinstance(what, xr.Dataset) or _is_file(what):
         if settings or law is not None:
@@ -125,7 +133,7 @@ def flight_of(
                 f"{_name(what)}: is a recording; --set, --agents, --duration and --law need a scenario to fly"
             )
         return what if isinstance(what, xr.Dataset) else load_recording(what)  # type: ignore[arg-type]
-    return simulate(_scenario(what, settings, law, trust), seed)
+    return simulate(_scenario(what, settings, law, trust), seed, keep=keep)
 
 
 def _name(what: Any) -> str:

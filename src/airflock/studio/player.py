@@ -34,6 +34,7 @@ class Player:
     seed     : of the first flight; a recording brings its own
     law      : a law that flies instead of the file's; trust : whether code that the file names may run
     against  : what is flown beside it, with the same seed and noise: another preset or file, or keys of this one
+    at_once  : fly interpreted until the driver is compiled
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Player:
         law: Any = None,
         trust: bool = False,
         against: str | Mapping[str, Any] | None = None,
+        at_once: bool = False,
     ):
         first = Origin.of(where, settings, law, trust=trust)
         self.origins = [first]
@@ -54,6 +56,7 @@ class Player:
             self.origins.append(replace(first, settings={**first.settings, **against}))
         self.seed = seed if first.recording is None else int(first.recording.attrs["airflock_seed"])
         self.paused, self.note, self.failure = False, "", ""
+        self._at_once = at_once
         self.hand = 0  # which side the controls act on
         self._rate = 1e4  # motion steps per second, as measured
         self.fault: Callable[[str], None] = lambda line: None  # is told of everything that was refused
@@ -61,7 +64,7 @@ class Player:
         self._open()
 
     def _open(self) -> None:
-        sides = [Side(origin, self.seed) for origin in self.origins]
+        sides = [Side(origin, self.seed, self._at_once) for origin in self.origins]
         if len(sides) == 2 and sides[0].scenario.dimensions != sides[1].scenario.dimensions:
             flown = [f"{side.origin.where} in {side.scenario.dimensions}" for side in sides]
             raise StudioError(f"two flights side by side share one scene: {flown[0]} and {flown[1]} dimensions do not")
@@ -70,9 +73,23 @@ class Player:
         self.moments, self.failure = Moments(), ""
 
     def start(self) -> None:
-        """Place the agents; compiles what has not been compiled yet."""
+        """Place the agents; compiles what has not been compiled yet, unless an interpreted flight stands for it."""
         for side in self.sides:
             _ = side.motion
+
+    @property
+    def compiling(self) -> bool:
+        """Whether interpreted flights stand for those that are being compiled."""
+        return any(side.compiling for side in self.sides)
+
+    def settle(self) -> None:
+        """Go on as compiled flights, once they are compiled; of the moments to go back to the start is left."""
+        if not self.compiling:
+            return
+        starts = [side.hand_over() for side in self.sides]
+        self.moments = Moments()
+        if None not in starts:
+            self.moments.keep(0.0, tuple(start for start in starts if start is not None))
 
     # ------------------------------------------------------------------------------------------------- state
 
@@ -122,6 +139,8 @@ class Player:
         """What a page says while it waits, or why it stopped; empty while all is well."""
         if self.failure:
             return self.failure
+        if self.compiling:
+            return "compiling … (flying interpreted meanwhile, with other rounding)"
         return "compiling …" if any(side.flight.waiting for side in self.sides) else self.note
 
     # ------------------------------------------------------------------------------------------------ playing
@@ -137,6 +156,8 @@ class Player:
     def tick(self, elapsed: float) -> bool:
         """Do what was asked for, then fly what is due after `elapsed` s of real time. Whether anything moved."""
         asked = self._asked.answer(self._safely)
+        if self.compiling and all(side.compiled for side in self.sides):
+            asked = self._settled() or asked
         if self.paused or self.failure or any(side.flight.over for side in self.sides):
             return asked
         steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
@@ -145,6 +166,14 @@ class Player:
         began, moved = perf_counter(), self.fly(steps)
         self._rate = steps / max(perf_counter() - began, 1e-6)
         return moved or asked
+
+    def _settled(self) -> bool:
+        try:
+            self.settle()
+        except AirflockError as fault:
+            self.failure = f"stopped: {fault}"
+            self.fault(self.failure)
+        return True
 
     def _safely(self, action: Callable[[], None]) -> None:
         """Do something; a fault of the user's is a note on the page and a line in the terminal, and nothing else."""
@@ -221,6 +250,7 @@ class Player:
 
         A second flight that there was already ends.
         """
+        self.settle()
         if len(self.sides) > 1:
             self.moments = Moments()
         self.origins, self.sides = [self.side.origin], [self.side, self.side.fork()]
@@ -283,8 +313,10 @@ class Player:
 
     def save_recording(self, path: Path) -> Path:
         """Fly the flight again from its start with all that was done to it, and save it. Raises where bits differ."""
+        self.settle()
         return save(flown_again(self.flight), path)
 
     def save_replay(self, path: Path) -> Path:
         """Write the flight up to now as one HTML file that plays it."""
+        self.settle()
         return replay(flown_again(self.flight)).save(path)

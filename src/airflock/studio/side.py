@@ -1,6 +1,7 @@
 """Side: one open flight that is tuned, and what was changed on it. A page shows one of them, or two side by side."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,9 +19,11 @@ from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
+from airflock.threads import in_background
 
 BELOW, SPACED = -1e7, 1e4  # m; where agents that have left are shown: nowhere
 LONGEST = 1e6  # s; an open page has no end of its own
+MOST_AT_ONCE = 400  # agents; of more, one interpreted step holds a page up
 
 
 @dataclass(frozen=True)
@@ -50,11 +53,11 @@ class Origin:
             return scenario_of(self.recording, dict(self.settings))
         return load(self.where, dict(self.settings), self.law, trust=self.trust)
 
-    def flight(self, seed: int) -> tuple[Scenario, Flight]:
-        """The scenario without an end, and an open flight of it."""
+    def flight(self, seed: int, device: str = "cpu") -> tuple[Scenario, Flight]:
+        """The scenario without an end, and an open flight of it; that of a recording is a compiled one."""
         preset = endless(self.scenario())
         if self.recording is None:
-            return preset, Flight(preset, seed)
+            return preset, Flight(preset, seed, device=device)
         same = not self.settings and seed == int(self.recording.attrs["airflock_seed"])
         events = attributes.events(self.recording) if same else []
         return preset, Flight(preset, seed, precision=int(self.recording.attrs["airflock_precision"]), events=events)
@@ -74,16 +77,46 @@ class Origin:
 class Side:
     """One flight of an origin, with a list of what was changed, so that it can be undone.
 
+    at_once : fly interpreted while the driver is compiled, until `hand_over` (a recording, a large flock: compiled)
+
     Attributes: preset, the scenario at its start; flight; changed, keys that differ from it with their values.
     """
 
-    def __init__(self, origin: Origin, seed: int):
+    def __init__(self, origin: Origin, seed: int, at_once: bool = False):
         self.origin = origin
         self.preset, self.flight = origin.flight(seed)
+        self._compiled: Future[Flight] | None = None
+        if at_once and origin.recording is None and self.flight.agents <= MOST_AT_ONCE and not self.flight.ready:
+            self._compiled = in_background(self.flight.compile)
+            _, self.flight = origin.flight(seed, "python")
         self.changed: dict[str, Any] = {}
         self._before: list[dict[str, Any]] = []
         self._gust: tuple[float, dict[str, Any]] | None = None  # how long it blows, s; what is set back after it
         self._calm: float | None = None  # when it ends, s
+
+    @property
+    def compiling(self) -> bool:
+        """Whether an interpreted flight stands for one that is being compiled."""
+        return self._compiled is not None
+
+    @property
+    def compiled(self) -> bool:
+        """Whether `hand_over` has nothing to wait for."""
+        return self._compiled is None or self._compiled.done()
+
+    def hand_over(self) -> Snapshot | None:
+        """Go on as the compiled flight, flown again to here with all that was done; waits for it. Returns its start.
+
+        From here on, and in what is saved of it, bits are those of the compiled flight. None where nothing is compiled.
+        Raises RuleError.
+        """
+        if self._compiled is None:
+            return None
+        interpreted, (self.flight, self._compiled) = self.flight, (self._compiled.result(), None)
+        start = self.flight.snapshot()
+        self._replay(interpreted.events)
+        self._advance(interpreted.step * self.scenario.flight.dt)
+        return start
 
     def fork(self) -> "Side":
         """Another side that goes on from here, with the same noise."""

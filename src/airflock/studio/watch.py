@@ -44,14 +44,15 @@ def watch(
     >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
     """
     rival = against if against is None or isinstance(against, Mapping) else str(against)
-    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust, against=rival)
+    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust, against=rival, at_once=True)
     for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
         say(f"note: {note}")
     from airflock.studio.page import Page
     from airflock.studio.view import View
 
     player.fault = say
-    say("compiling ...")
+    if player.compiling:
+        say("compiling ... (interpreted meanwhile)")
     player.start()
     view = View(host, port, player.where)
     try:

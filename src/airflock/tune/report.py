@@ -14,10 +14,12 @@ from airflock.core.parameters import with_unit
 from airflock.evolve import tables
 from airflock.evolve.space import declared
 from airflock.evolve.store import Store
+from airflock.identify.run import UNITS
 from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
 from airflock.scenarios.scenario import Scenario
+from airflock.tune.next_flight import card, replays
 
 if TYPE_CHECKING:
     from airflock.tune.run import Tuned
@@ -33,17 +35,13 @@ td.n, th.n { text-align: right } img { max-width: 100%; break-inside: avoid }
 .verdict { font-size: 12pt; font-weight: bold; padding: 2mm 3mm; border-left: 1.5mm solid #009E73 }
 .no { border-color: #D55E00 } code { font-size: 8pt; overflow-wrap: anywhere } .sign td { height: 12mm; width: 50% }
 """
-NOT_THERE = (
-    "flight logs of these drones (airflock identify finds their numbers)",
-    "a flight card (airflock fly)",
-    "faults and failing drones",
-)
 
 
 def save(found: "Tuned") -> None:
-    """Write report.html and figures.pdf into the folder of a tuning, each complete or not at all."""
-    figures = _figures(found)
-    atomic.write(found.folder / PAGE, page(found, [_png(figure) for figure in figures.values()], list(figures)))
+    """Write report.html, replays and figures.pdf into the folder of a tuning, each complete or not at all."""
+    figures, shows = _figures(found), replays(found)
+    pictures = [_png(figure) for figure in figures.values()]
+    atomic.write(found.folder / PAGE, page(found, pictures, list(figures), shows))
     with (
         atomic.atomic(found.folder / FIGURES) as temporary,
         PdfPages(temporary, metadata={"CreationDate": None}) as pdf,
@@ -67,8 +65,8 @@ def _png(figure: Figure) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> str:
-    """The report as one HTML text; pictures are PNGs in base64."""
+def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str], shows: Mapping[int, str]) -> str:
+    """The report as one HTML text; pictures are PNGs in base64, `shows` files beside it that play flights by seed."""
     made, known = found.certificate, declared(found.scenario)
     before, r = declared(found.start), found.result
     numbers = [
@@ -90,6 +88,7 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> st
          f"{a['factor']:.3g}", a.get("note", ""))
         for a in made.tolerance.get("axis", ())
     ]  # fmt: skip
+    limits, to_run = card(found)
     verdict = "All limits are shown." if made.shown else "Not all limits are shown."
     scenario = found.scenario
     body = [
@@ -100,6 +99,7 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> st
         "<h2>What was assumed</h2>",
         _table(("key", "value", "source"), [*_assumed(found.start.document), *_defaults(found.start)]),
         _list([*found.notes, *found.start.notes]),
+        *_identified(found.identified),
         "<h2>What was found</h2>",
         f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
         f"{r.candidates:,} candidates.</p>",
@@ -122,9 +122,10 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str]) -> st
         if tolerances
         else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
         "<h2>Worst flights</h2>",
-        _table(("limit", "value", "fly it again"), [_worst(entry) for entry in made.worst]),
-        "<h2>Not there</h2>",
-        _list(NOT_THERE),
+        _table(("limit", "value", "fly it again", ""), [_worst(entry, shows) for entry in made.worst]),
+        "<h2>The flight card to fly next</h2>",
+        _table(("limit on board", "value", "meaning"), limits) if limits else "",
+        f"<p><code>{escape(to_run)}</code></p>" if limits else f"<p>{escape(to_run)}</p>",
         *(
             f'<h2>Figure {i}</h2><img alt="{escape(text)}" src="data:image/png;base64,{picture}"><p>{escape(text)}</p>'
             for i, (picture, text) in enumerate(zip(pictures, captions, strict=True), 1)
@@ -139,8 +140,29 @@ def _range(span: tuple[float, float] | None) -> str:
     return "" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
 
 
-def _worst(entry: dict[str, Any]) -> tuple[str, str, str]:
-    return entry["limit"], f"{entry['value']:.4g}", entry["replay"]
+def _worst(entry: dict[str, Any], shows: Mapping[int, str]) -> tuple[str, str, str, str]:
+    return entry["limit"], f"{entry['value']:.4g}", entry["replay"], shows.get(int(entry["seed"]), "")
+
+
+def _identified(told: Mapping[str, Any]) -> list[str]:
+    """What logs told of the drones; nothing where it did not begin with logs."""
+    if not told:
+        return []
+    rows = []
+    for number in told["numbers"]:
+        key, unit = str(number["key"]), UNITS.get(str(number["key"]), "")
+        if "reason" in number:
+            rows.append((key, "", "", f"as in {told['name']}: {number['reason']}"))
+        else:
+            span = f"{number['low']:.3g} to {number['high']:.3g}"
+            rows.append((key, with_unit(f"{number['value']:.4g}", unit), span, str(number["origin"])))
+    files = ", ".join(f"{name} ({digest})" for name, digest in told["logs"].items())
+    return [
+        "<h2>What was identified</h2>",
+        f"<p>From the logs of {told['drones']} drones: {escape(files)}.</p>",
+        _table(("number", "value", "95 % interval", "from"), rows),
+        _list([str(note) for note in told["notes"]]),
+    ]
 
 
 def _assumed(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -181,6 +203,8 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _cell(text: str) -> str:
+    if text.startswith("worst_"):
+        return f'<a href="{escape(text)}">watch</a>'
     return f"<code>{escape(text)}</code>" if text.startswith("airflock ") else escape(text)
 
 

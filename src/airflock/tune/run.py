@@ -4,7 +4,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from airflock.scenarios import formats
 from airflock.scenarios.change import variant
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import Plan, plan_of
 from airflock.tune.start import start_of
 
@@ -44,6 +45,7 @@ Note = Callable[[str], None]
 class Tuned:
     """What tuning found: the scenario to fly, and what each stage said.
 
+    identified : what logs told, where it began with logs
     steps : of hardening; empty where the law has no recipe, and `why` says so
     """
 
@@ -56,6 +58,7 @@ class Tuned:
     why: str
     certificate: Certificate
     seconds: float
+    identified: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def shown(self) -> bool:
@@ -76,16 +79,19 @@ class Tuned:
             "why_not_hardened": self.why,
             "certificate": self.certificate.document(),
             "seconds": self.seconds,
+            **({"identified": dict(self.identified)} if self.identified else {}),
         }
 
 
 def tune(
-    scenario: Scenario | str | os.PathLike[str],
+    scenario: Scenario | str | os.PathLike[str] | Paths,
     out: str | os.PathLike[str],
     *,
     budget: float = 1200.0,
     limit: Sequence[str] = (),
     confidence: float = 0.95,
+    like: Scenario | str | os.PathLike[str] | None = None,
+    heard: str | os.PathLike[str] | None = None,
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
     threads: int | None = None,
@@ -93,12 +99,13 @@ def tune(
     note: Note | None = None,
     trust: bool = False,
 ) -> Tuned:
-    """From a scenario of your own to a set that is evolved, hardened and certified, with a report.
+    """From a scenario or logs of your own to a set that is evolved, hardened and certified, with a report.
 
     Parameters
     ----------
-    scenario : Scenario, str or path
-        Your drones, field and speed; numbers of the law that it does not give are scaled to its speed.
+    scenario : Scenario, str or path, or a list of paths
+        Your drones, field and speed; numbers of the law that it does not give are scaled to its speed. With `like`, log
+        files of your drones, as `airflock.identify` reads them.
     out : str or path
         Folder of everything: start, study, hardening, certificate, report, and tuned.toml to fly.
     budget : float
@@ -108,6 +115,10 @@ def tune(
         than 0.01 per flock hour.
     confidence : float
         Of the certificate.
+    like : Scenario, str or path, optional
+        The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
+    heard : str or path, optional
+        Table of packets of these logs, as `airflock identify --heard` takes it.
     resume : bool
         Continue what is in the folder.
     settings : mapping, optional
@@ -137,12 +148,14 @@ def tune(
     airflock.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
-    mine = variant(scenario, settings, trust=trust)
+    folder = Path(out)
+    mine, logs = _mine(folder, scenario, like, heard, settings, trust)
     start, notes = start_of(mine)
     limits = list(limit) or [usual_limit(start)]
     campaign_of(start, limits, confidence)  # refused before anything flies
-    folder = Path(out)
     plan = _planned(folder, start, budget, resume, threads)
+    if logs is not None and not (folder / TOLD).is_file():
+        logs.save(folder)
     _say(note, "search")
     result = _evolved(folder, start, plan, threads, watch)
     notes = [*notes, *usual_space(start)[1]]
@@ -152,12 +165,36 @@ def tune(
     tuned, steps, why = _hardened(folder, result, plan, threads, trust)
     _say(note, "certificate")
     certificate = _certified(folder, tuned, limits, confidence, plan, threads, note)
-    found = Tuned(folder, tuned, start, tuple(notes), result, tuple(steps), why, certificate, time.monotonic() - began)
+    found = Tuned(
+        folder, tuned, start, tuple(notes), result, tuple(steps), why, certificate, time.monotonic() - began,
+        {} if logs is None else logs.told,
+    )  # fmt: skip
     _say(note, "report")
     from airflock.tune.report import save
 
     save(found)
     return found
+
+
+def _mine(
+    folder: Path,
+    what: Scenario | str | os.PathLike[str] | Paths,
+    like: Scenario | str | os.PathLike[str] | None,
+    heard: str | os.PathLike[str] | None,
+    settings: Mapping[str, Any] | None,
+    trust: bool,
+) -> tuple[Scenario, FromLogs | None]:
+    """The scenario to tune, and what logs told of it if it began with logs."""
+    paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
+    if like is None:
+        if len(paths) != 1 or heard is not None:
+            raise ScenarioError(["tune takes one scenario; of logs, give --like PRESET: whose law, field and speed"])
+        return variant(paths[0], settings, trust=trust), None
+    files = [path for path in paths if not isinstance(path, Scenario)]
+    if not files or len(files) != len(paths):
+        raise ScenarioError(["like is given, so log files are to be tuned, and no scenario"])
+    found = identified(folder, files, variant(like, settings, trust=trust), heard)
+    return found.scenario, found
 
 
 def usual_limit(scenario: Scenario) -> str:

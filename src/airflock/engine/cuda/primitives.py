@@ -24,6 +24,7 @@ WORDS = {words}
 FULL = 0xFFFFFFFF
 JIT = dict()
 INLINE = dict()
+INNER = dict()
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)

@@ -16,11 +16,13 @@ from llvmlite import ir
 from numba import njit, prange, types
 from numba.extending import intrinsic
 
+from airflock.engine.compiler import CALLED, INNER
+
 real = np.float{bits}
 integer = np.int{bits}
 COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
-JIT = dict(fastmath=True, error_model="numpy", nogil=True, forceinline=True, _nrt=COUNTED)
-INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED)
+INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED, **INNER)
+JIT = INLINE | dict(nogil=True, forceinline=True)
 ZERO = real(0.0)
 HALF = real(0.5)
 ONE = real(1.0)
@@ -233,6 +235,6 @@ def _text(build: Builder, label: str) -> str:
     head = HEAD.format(label=label, bits=build.plan.bits, primitives=primitives(build.plan.bits) + blocks)
     if not build.plan.grid:  # which sorts cells into arrays of its own
         head = must_replace(head, "COUNTED = True", "COUNTED = False")
-    last = must_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT)", 1)
+    last = must_replace(build.functions[-1], "@njit(**JIT)", "@njit(cache=True, **JIT | CALLED)", 1)
     parts = [head, *build.source.blocks, *build.functions[:-1], last, f"ROWS = {build.rows!r}"]
     return "\n\n".join(parts) + "\n"

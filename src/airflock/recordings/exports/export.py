@@ -11,7 +11,7 @@ from airflock.recordings.exports.movement import write_movement
 from airflock.recordings.exports.tables import write_csv, write_parquet
 
 ENDINGS = (".csv", ".parquet", ".nc")
-LAYOUTS = ("movement", "movement-0.16")
+LAYOUTS = ("movement", "movement-0.16", "px4")
 
 
 def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str = "movement") -> Path:
@@ -24,7 +24,8 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     path : str or path
         File to write; its ending decides: .csv, .parquet or .nc.
     layout : str
-        Names of the dimensions of .nc: movement, or movement-0.16 for releases up to 0.16.
+        Names of the dimensions of .nc: movement, or movement-0.16 for releases up to 0.16. Of .csv px4: microseconds
+        and north-east-down, with the fields of a PX4 log.
 
     Returns
     -------
@@ -49,6 +50,10 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
         raise RecordingError(wrong)
     if layout not in LAYOUTS:
         raise RecordingError(f"layout = {layout!r} is none of {', '.join(LAYOUTS)}")
-    if target.suffix.lower() == ".nc":
+    if target.suffix.lower() == ".nc" and layout != "px4":
         return write_movement(recording, target, old=layout == "movement-0.16")
-    return (write_csv if target.suffix.lower() == ".csv" else write_parquet)(recording, target)
+    if layout == "px4" and target.suffix.lower() != ".csv":
+        raise RecordingError(f"layout = 'px4' is a table; {target.name} ends in {target.suffix}: write .csv")
+    if target.suffix.lower() == ".csv":
+        return write_csv(recording, target, log=layout == "px4")
+    return write_parquet(recording, target)

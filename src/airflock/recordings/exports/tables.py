@@ -37,10 +37,31 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
     return table[there].reset_index(drop=True)
 
 
-def write_csv(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
-    """Write a long CSV table, with as many digits as the numbers have."""
+def to_log_table(recording: xr.Dataset) -> pd.DataFrame:
+    """The table as a log of PX4 has it: `timestamp` in whole microseconds, x north, y east, z down (a plane has z = 0).
+
+    The fields are those of `vehicle_local_position`; commanded velocities are cx, cy, cz in the same axes.
+    """
+    table = to_table(recording)
+    found: dict[str, object] = {
+        "id": table["id"],
+        "timestamp [us]": np.round(1e6 * table["t [s]"]).astype("int64"),
+    }
+    headers = {str(name).split()[0]: str(name) for name in table.columns}
+    for x, y, z in COLUMNS.values():
+        if x not in headers:
+            continue
+        unit = headers[x].partition(" ")[2]
+        up = table[headers[z]] if z in headers else 0.0 * table[headers[x]]
+        for name, values in ((x, table[headers[y]]), (y, table[headers[x]]), (z, 0.0 - up)):
+            found[f"{name} {unit}".strip()] = values
+    return pd.DataFrame(found)
+
+
+def write_csv(recording: xr.Dataset, path: str | os.PathLike[str], *, log: bool = False) -> Path:
+    """Write a long CSV table, with as many digits as the numbers have; `log` : as a log of PX4 has it."""
     text = io.StringIO()
-    to_table(recording).to_csv(text, index=False)
+    (to_log_table if log else to_table)(recording).to_csv(text, index=False)
     atomic.write(path, text.getvalue())
     return Path(path)
 

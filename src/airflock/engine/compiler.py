@@ -1,0 +1,159 @@
+"""The compiler of drivers: Numba's own passes, without the work that a driver never needs. Same machine code.
+
+A driver is some sixty small functions, of which Python calls one. By default Numba makes of each a function that Python
+could call: two wrappers that unpack its arguments, machine code of its own, and all three once more in every caller.
+Here the others stay what their callers link, optimised code of LLVM (`options`). The rest saves Numba's own Python:
+what it asks again and again about the same types is asked once.
+"""
+
+import gc
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from numba import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.imputils import RegistryLoader, builtin_registry
+from numba.core.typed_passes import NativeLowering, NopythonTypeInference
+
+SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
+
+
+class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and below
+    """Flags of one compilation; Numba compares and hashes them for every operator that it meets."""
+
+    _usual = {name: option.default for name, option in Flags.options.items()}
+    _same = hash(tuple(sorted(Flags.options)))
+
+    def __hash__(self) -> int:
+        return self._same  # as that of Flags, which hashes the names alone
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or bool(super().__eq__(other))
+
+    def values(self) -> dict[str, Any]:
+        """All values by name."""
+        return self._usual | self._values
+
+
+class InlinedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function that only compiled functions call: optimised, and never turned into machine code."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class InlinedLowering(NativeLowering):  # type: ignore[misc]
+    """Lowering of a function that only compiled functions call."""
+
+    _name = "inlined_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Make what callers link, and enter the function where they look for it."""
+        state.library = InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.flags.no_compile = True
+        super().run_pass(state)
+        found, described = state["cr"], state["cr"].fndesc
+        # Python may not call it: behind it stands a method of C, one for each function, that says so as a KeyError
+        entry = f"{{{described.qualname.split('.')[-1]}, which only other functions of its driver call}}".format
+        state.targetctx.insert_user_function(entry, described, [state.library])
+        state["cr"] = found._replace(cfunc=entry)
+        return True
+
+
+class Remembering:
+    """A typing context that remembers which form of an operator or a function of Numba's takes which types."""
+
+    _known: dict[Hashable, Any] = {}
+
+    def __init__(self, context: Any):
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        """Signature of a call."""
+        if named or not isinstance(function, types.Function):
+            return self._context.resolve_function_type(function, given, named)
+        key = self._context, function, given
+        if key not in self._known:
+            found = self._context.resolve_function_type(function, given, named)
+            if found is None:
+                return None
+            self._known[key] = found
+        return self._known[key]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class Typing(NopythonTypeInference):  # type: ignore[misc]
+    """Type inference that resolves no call twice."""
+
+    _name = "remembering_type_inference"
+
+    def run_pass(self, state: Any) -> bool:
+        """Infer all types of a function."""
+        context, state.typingctx = state.typingctx, Remembering(state.typingctx)
+        try:
+            return bool(super().run_pass(state))
+        finally:
+            state.typingctx = context
+
+
+class DriverCompiler(CompilerBase):  # type: ignore[misc]
+    """Compiler of one function of a driver."""
+
+    def __init__(self, *given: Any):
+        *before, flags, named = given
+        super().__init__(*before, QuickFlags(flags), named)  # type: ignore[call-arg]
+        self.state.targetctx.refresh = _when_grown(self.state.targetctx.refresh)  # of this function's own copy
+
+    def define_pipelines(self) -> list[Any]:
+        """Numba's passes, with those of this file in their places."""
+        found = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        if self.state.flags.auto_parallel.enabled:
+            return [found]
+        inner = self.state.flags.no_cpython_wrapper
+        other = {NopythonTypeInference: Typing, NativeLowering: InlinedLowering if inner else NativeLowering}
+        made = PassManager("driver")
+        made.passes = [(other.get(kind, kind), said) for kind, said in found.passes]
+        made.finalize()
+        return [made]
+
+    def _compile_core(self) -> Any:
+        with _seldom_collected():  # below Numba's lock: one thread at a time
+            return super()._compile_core()
+
+
+def _when_grown(refresh: Callable[[], None]) -> Callable[[], None]:
+    """What looks for new implementations, which Numba does whenever it finds none, only where there are new ones."""
+    seen = -1
+
+    def grown() -> None:
+        nonlocal seen
+        count = sum(len(getattr(builtin_registry, kind)) for kind in RegistryLoader.registry_items)
+        if count != seen:
+            seen = count
+            refresh()
+
+    return grown
+
+
+@contextmanager
+def _seldom_collected() -> Iterator[None]:
+    usual = gc.get_threshold()
+    gc.set_threshold(max(usual[0], SELDOM[0]) if usual[0] else 0, *map(max, usual[1:], SELDOM[1:]))
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+INNER: dict[str, Any] = {"pipeline_class": DriverCompiler, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+CALLED: dict[str, Any] = INNER | {"no_cpython_wrapper": False}

@@ -1,0 +1,76 @@
+"""The compiler of drivers: Numba's machine code, with less work."""
+
+import gc
+import re
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.errors import NumbaError
+
+from airflock.engine.compiler import CALLED, INNER
+
+OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
+
+
+def pair_of_functions(inner, called):
+    """A loop over agents that calls a rule, each compiled with options of its own."""
+
+    @njit(**inner)
+    def rule(x, y):
+        return np.float32(2.0) * x if x * x + y * y < np.float32(1.0) else y
+
+    @njit(**called)
+    def loop(xs, ys):
+        total = np.float32(0.0)
+        for i in range(xs.shape[0]):
+            total += rule(xs[i], ys[i])
+            xs[i] = total
+        return total
+
+    return rule, loop
+
+
+def instructions(function):
+    """Machine code of what Python calls, from its first label to its end, without the names that Numba makes up."""
+    text = function.inspect_asm(function.signatures[0])
+    name = next(
+        line for line in text.splitlines() if line.startswith("_ZN8__main__") or re.match(r"_ZN.*loop.*:$", line)
+    )
+    found = text[text.index(name) :].partition("\n.Lfunc_end")[0].splitlines()[1:]
+    lines = [line.strip() for line in found if line.startswith("\t") and not line.strip().startswith(".")]
+    return [re.sub(r"\.L\w+", ".L", line) for line in lines]
+
+
+def test_machine_code_is_that_of_numba():
+    xs, ys = np.linspace(-2.0, 2.0, 101, dtype=np.float32), np.ones(101, np.float32)
+    (_, ours), (_, theirs) = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED), pair_of_functions(OPTIONS, OPTIONS)
+    found = [loop(xs.copy(), ys) for loop in (ours, theirs)]
+    assert found[0] == found[1] != 0.0
+    assert len(instructions(ours)) > 10
+    assert instructions(ours) == instructions(theirs)
+
+
+def test_a_function_that_only_others_call_refuses_python():
+    rule, loop = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED)
+    xs = np.ones(3, np.float32)
+    assert loop(xs.copy(), xs) == 3.0
+    with pytest.raises(KeyError, match="rule, which only other functions"):
+        rule(np.float32(1.0), np.float32(1.0))
+
+
+def test_the_garbage_collector_is_left_as_it_was():
+    usual = gc.get_threshold()
+
+    @njit(**CALLED)
+    def wrong(x):
+        return x + "m"
+
+    for threshold in ((700, 10, 10), (0, 10, 10), (10**6, 100, 100)):
+        gc.set_threshold(*threshold)
+        try:
+            with pytest.raises(NumbaError):
+                wrong(1.0)
+            assert gc.get_threshold() == threshold
+        finally:
+            gc.set_threshold(*usual)
