@@ -189,3 +189,16 @@ def test_what_is_no_sensor_is_said_in_one_line(rules, said):
 def test_a_wrong_key_of_a_sensor_is_said_in_one_line(keys, said):
     with pytest.raises(ScenarioError, match=said):
         load(PAPER, keys)
+
+
+def mirrored(x, y, z, vx, vy, vz):
+    return x, y, z, -vx, vy, vz
+
+
+def test_a_sensor_given_directly_stays_through_changes_and_its_recordings_are_scored():
+    scenario = load(PAPER, {**SMALL, "duration": 1.0}, sensor={"measure": mirrored, "NAME": "mirror"})
+    flight = airflock.open(scenario, 2, device="python").advance(0.5).change({"model.p_rep": 0.2})
+    assert flight.scenario.sensor.measure is mirrored and flight.scenario.parameters.p_rep == 0.2
+    recording = airflock.simulate(scenario, 2, device="python")
+    scored = float(airflock.score(recording)["phi_vel"].iloc[0])
+    assert scored == pytest.approx(fly(scenario, 2, device="python").values["phi_vel"], rel=1e-5)
