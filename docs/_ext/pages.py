@@ -163,17 +163,18 @@ def _names(found: Iterable[str]) -> str:
 
 
 def robots() -> None:
-    """Bodies, sensors, radio and wind: what stands between a command and a motion."""
+    """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
     from airflock.body import radio, wind
     from airflock.body.registry import BODIES
+    from airflock.core import silence
     from airflock.scenarios.keys import keys as keys_of
     from airflock.sensors.registry import SENSORS
 
     pieces = [
-        "# Bodies, sensors, radio, wind\n\nA model commands; a body obeys as far as it can. Neighbours hear of it "
-        "through the radio, and an agent knows itself through its sensors "
+        "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
+        "Neighbours hear of it through the radio, and an agent knows itself through its sensors "
         "([how to choose and write one](../sensors.md)).\n",
         _abilities(BODIES),
     ]
@@ -188,7 +189,7 @@ def robots() -> None:
         pieces.append(f'\n## sensors.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
         pieces.append(f"{prose(sensor.Parameters.__doc__ or '')}\n\n```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(keys_of(name)))
-    for name, module in (("radio", radio), ("wind", wind)):
+    for name, module in (("radio", radio), ("silence", silence), ("wind", wind)):
         pieces.append(f"\n## {name}\n\n{prose(module.__doc__ or '')} {prose(module.Parameters.__doc__ or '')}\n\n")
         rules = [value for value in vars(module).values() if getattr(value, "__module__", "") == module.__name__]
         for rule in rules:

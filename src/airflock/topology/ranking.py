@@ -11,9 +11,10 @@ def kth_least(n, values, heap, k):
     heap : scratch of n numbers; the greatest of the k least lies in front
     """
     size = 0
+    worst = HEARD
     for j in range(n):
         value = values[j]
-        if value < HEARD:
+        if value < worst:
             if size < k:
                 at = size
                 size = size + 1
@@ -21,7 +22,7 @@ def kth_least(n, values, heap, k):
                     heap[at] = heap[(at - 1) // 2]
                     at = (at - 1) // 2
                 heap[at] = value
-            elif value < heap[0]:
+            else:
                 at = 0
                 below = 1
                 while below < size:
@@ -34,4 +35,6 @@ def kth_least(n, values, heap, k):
                         at = below
                         below = 2 * at + 1
                 heap[at] = value
-    return heap[0] if size == k else HEARD
+            if size == k:
+                worst = heap[0]
+    return worst

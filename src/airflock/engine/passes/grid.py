@@ -118,6 +118,7 @@ def _found(build: Builder, once: list[str], each: list[str], last: list[str]) ->
         once = must_replace(once, f"m{a}[i]", f"packed[e, {c}]")
     once = [line for line in once if line != "ii = integer(i)"]
     each = must_replace(each, "integer(j) != ii", OTHERS)
+    each = must_replace(each, "(r2 <= range2)", "(r2 <= range2) & (r2 <= near2)")  # nobody farther decides anything
     for name in FOUND:
         each = [line.replace(f"{name}[j]", f"{name}[q]") for line in each]
     return [*once, *loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]

@@ -5,8 +5,8 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
-from airflock.engine.stages.state import Flock, fields, numbers_of
-from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, most, real, wants
+from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, most, real, wants
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:

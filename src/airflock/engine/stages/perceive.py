@@ -12,8 +12,8 @@ from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import normals, uniforms
-from airflock.engine.stages.state import Flock, fields
-from airflock.engine.stages.words import X, Y, Z, ask, real, wants
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
 SENSOR = random.SENSOR
 
