@@ -280,25 +280,13 @@ def hear(
         carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
         carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
-        pair = i * len(flock) + j
-        arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
-            distance, k
-        )
+        period = clock(scenario)["decide_every"] * scenario.flight.dt
+        u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
         if in_range:
             found.add(j)
-        arrives = arrives and in_range and carries
-        if arrives and (k.kind == "constant" or linked(scenario, seed, number, pair, distance)):
+        if in_range and carries and u >= radio.unheard(distance, number, period, k):
             flock[i].pilot.hear(j, said[j], time - late + theirs, time + mine)
     return found
-
-
-def linked(scenario: Scenario, seed: int, number: int, pair: int, distance: float) -> bool:
-    """Whether at least one packet arrives on the fast or the slow link of a pair in this period."""
-    k, period = scenario.radio, clock(scenario)["decide_every"] * scenario.flight.dt
-    missed = 1.0
-    for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
-        missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, period)
-    return bool(random.uniform(random.words(seed, random.LINK, 0, number, pair)[0]) >= missed)
 
 
 # --------------------------------------------------------------------------------------------------------- motion

@@ -86,7 +86,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.tune("mine.toml", "tuned")', "tune",
         {
             "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
-            **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "resume", "threads", "trust")},
+            **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "warm", "resume")},
+            "threads": "threads", "trust": "trust",
         },
     ),
     "plot": Counterpart(

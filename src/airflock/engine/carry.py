@@ -23,8 +23,8 @@ def carry(old: State, new: State, step: int) -> None:
     new.arrays["past"][...] = _under_way(old, new, step, lanes)
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
-    if old.plan.links and new.plan.links:
-        new.arrays["store"][...] = old.arrays["store"][lanes[: old.agents]][..., lanes]
+    if old.plan.packets and new.plan.packets:
+        new.arrays["store"][...] = old.arrays["store"][:, lanes[: old.agents]][..., lanes]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
         new.arrays["mem"][...] = old.arrays["mem"][:, lanes]
     _remembered(old, new, lanes)

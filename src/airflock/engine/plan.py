@@ -63,6 +63,7 @@ class Plan:
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
+    few       : each of two lossy links sends at most `radio.FEW` packets in a decision
     silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
@@ -97,6 +98,7 @@ class Plan:
     delayed: bool = True
     lossy: bool = False
     links: bool = False
+    few: bool = True
     silent: bool = False
     windy: bool = False
     dryden: bool = False

@@ -68,9 +68,9 @@ def _set(state: "State", here: int) -> None:
         work[rows[axis], lanes] = AWAY
         state.arrays["past"][:, c, lanes] = AWAY
     if plan.packets:
-        for part in (state.arrays["store"][lanes], state.arrays["store"][:, :, lanes]):
-            part[...] = 0.0
-        state.arrays["store"][lanes, -1] = state.arrays["store"][:, -1, lanes] = NEVER
+        store = state.arrays["store"]
+        store[:, lanes] = store[:, :, lanes] = 0.0
+        store[-1, lanes] = store[-1, :, lanes] = NEVER
     count, real = state.agents - here, work.dtype
     state.arrays["mem"][:, lanes] = beginning(plan.model.Memory, count, real)
     state.arrays["memory"][:, lanes] = memories(plan, count, real)
@@ -86,5 +86,5 @@ def _put(state: "State", places: list[int]) -> None:
     for name in ("work", "past", "mem", "memory"):
         arrays[name][..., : state.agents] = arrays[name][..., at]
     if state.plan.packets:
-        arrays["store"][...] = arrays["store"][at]
+        arrays["store"][...] = arrays["store"][:, at]
         arrays["store"][..., : state.agents] = arrays["store"][..., at]

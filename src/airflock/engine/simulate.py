@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from airflock.body import radio
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
@@ -78,6 +79,7 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        few=_few_packets(scenario),
         silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
@@ -94,6 +96,15 @@ def _sensing(scenario: Scenario) -> dict[str, Any]:
         return {"noisy": False}
     chosen = tuple(sorted(choices(scenario.sensors).items()))
     return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": chosen}
+
+
+def _few_packets(scenario: Scenario) -> bool:
+    """Whether each of two lossy links sends at most `radio.FEW` packets between two decisions; True without links."""
+    k = scenario.radio
+    if k.kind != "links":
+        return True
+    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    return max(k.fast_rate, k.slow_rate) * period <= radio.FEW - 0.1  # rounding may make it one packet more
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:

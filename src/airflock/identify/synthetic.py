@@ -15,6 +15,7 @@ from airflock.body import radio
 from airflock.core import random
 from airflock.identify.logs import MISSING, Logs
 from airflock.recordings.flights import simulate
+from airflock.recordings.perception import packet_uniforms
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors import langevin
 
@@ -133,7 +134,7 @@ def _packets(
         fast, slow = (radio.packets(step, rate, period) for rate in (k_.fast_rate, k_.slow_rate))
         grid = np.round(d, 2)
         missed = (1.0 - arrives(grid, 0.0, k_)) ** fast * (1.0 - arrives(grid, 1.0, k_)) ** slow
-        drawn = random.uniform(words(seed, random.LINK, step, i * n + j)[0])
+        drawn = packet_uniforms(seed, 0, step, n)[i, j]
         got = (d <= k_.range) & (drawn >= missed)
         now, sent = step * period, step * period - k_.delay
         jitter = generator.normal(0.0, disturbed.stamp_jitter, len(i)) if disturbed.stamp_jitter else 0.0

@@ -109,7 +109,8 @@ def neighbours(
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = must_replace(lines, "CHUNKS", str(CHUNKS))
-    build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
+    arguments = "k_, n, m, time, late, row, whole, work, store, words, cells"
+    build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
 def _found(build: Builder, once: list[str], each: list[str], last: list[str]) -> list[str]:

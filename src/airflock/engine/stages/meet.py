@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.core import random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import pair_number
+from airflock.engine.stages.receive import by_clock, carries, hear, sent, unheard
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import (
     FAR,
@@ -23,6 +23,7 @@ from airflock.engine.stages.words import (
     choose,
     integer,
     least,
+    totals,
     vector,
 )  # fmt: skip
 from airflock.world import bvh, polygon, rays
@@ -31,13 +32,9 @@ from airflock.world.edges import nearest_image
 FADE = random.FADE
 
 
-def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
-    """Square of how far agent i hears agent j, m². Over links the last packet that came is heard on and on."""
-    return (
-        least(least(range2, flock.reach_in[i]), flock.reach_out[j])
-        if plan.suffers("radio") and not plan.links
-        else range2
-    )
+def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
+    """Number by which the signal between two agents is known, whoever else is there."""
+    return flock.number[i] * whole.born + flock.number[j] if plan.absence else i * n + j
 
 
 def hide(
@@ -81,12 +78,11 @@ def fade(i: int, others: Iterable[int], n: int, decision: int, flock: Flock, who
 
 
 def meet(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, i: int, others: Iterable[int], n: int, m: int, decision: int, edges: Any,
-    spans: Any, scene: Any, *, plan: Plan, images: bool,
+    flock: Flock, numbers: Any, whole: Any, i: int, others: Iterable[int], n: int, m: int, decision: int, time: float,
+    late: float, words: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan, images: bool,
 ) -> None:  # fmt: skip
     """Whom agent i meets: row `met`. It is judged by what the agent believes, but who is in range by the radio."""
     axes, k, w = range(plan.dimensions), numbers.k, numbers.w
-    heard_position = flock.latest_position if plan.links else flock.heard_position
     exact = plan.bits == 64
     range_ = least(k.range, LIMIT)
     range2 = range_ * range_ + TINY if exact and not plan.perturbed else range_ * range_
@@ -94,28 +90,46 @@ def meet(  # noqa: C901 - tests of the plan leave one way through
     own, true = vector(), vector()
     for a in axes:
         own[a] = flock.measured_position[a][i]
-    if plan.perturbed:
+    if plan.perturbed or plan.packets:
         for a in axes:
             true[a] = flock.position[a][i]
+    if plan.lossy or plan.links:
+        lot = words[flock.number[i] & 3]
+    if plan.links:
+        fast = sent(decision, k.fast_rate, numbers)
+        slow = sent(decision, k.slow_rate, numbers)
     for j in others:
-        d, o = vector(), vector()
-        for a in axes:
-            d[a] = heard_position[a][j] - own[a]
-        if images:
-            for a in axes:
-                d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
-        r2 = sum(d[a] * d[a] for a in axes) + TINY
-        if plan.perturbed:
+        d, o, packet = vector(), vector(), totals()
+        if plan.perturbed or plan.packets:
             for a in axes:
                 o[a] = flock.position[a][j] - true[a]
             if plan.periodic:
                 for a in axes:
                     o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-            hears = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
+            apart2 = sum(o[a] * o[a] for a in axes)
+        if plan.packets:
+            carried2 = carries(i, j, range_ * range_, flock, plan=plan)
+            hear(i, j, apart2, carried2, fast, slow, lot, None, time - late, packet, flock, numbers, plan=plan)
+        if plan.links:
+            age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
+            for a in axes:
+                d[a] = packet[a] + packet[a + plan.dimensions] * age - own[a]
+        else:
+            for a in axes:
+                d[a] = flock.heard_position[a][j] - own[a]
+        if images:
+            for a in axes:
+                d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+        r2 = sum(d[a] * d[a] for a in axes) + TINY
+        if plan.links:
+            hears = (apart2 <= range2) & (packet[2 * plan.dimensions] > -1e8) & (integer(j) != ii)
+        elif plan.perturbed:
+            hears = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
         else:
             hears = (r2 <= range2) & (integer(j) != ii)
-        if plan.lossy or plan.links:
-            hears = hears & (flock.heard[j] > HALF)
+        if plan.lossy and not plan.links:
+            distance = math.sqrt(apart2 + TINY if plan.perturbed else r2)
+            hears = hears & (random.uniform(lot[j]) >= unheard(distance, ZERO, ZERO, k, plan=plan))
         if plan.meeting("dx") or plan.hides:
             for a in axes:
                 flock.away[a][j] = d[a]
