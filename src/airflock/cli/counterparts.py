@@ -192,5 +192,5 @@ COUNTERPARTS: dict[str, Counterpart] = {
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
-    "metric", "metric_set", "check_model", "check_body", "check_metric", "quantity", "choice",
+    "sensor", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor", "quantity", "choice",
 )  # fmt: skip

@@ -60,8 +60,9 @@ def _set(state: "State", here: int) -> None:
     order = work[rows["order"], lanes].copy()
     work[:, lanes] = 0.0
     work[rows["order"], lanes] = order
-    for c, begin in enumerate(plan.body.beginnings if "body0" in rows else ()):
-        work[rows[f"body{c}"], lanes] = begin
+    for name, begin in plan.beginnings.items():
+        if name in rows:
+            work[rows[name], lanes] = begin
     state.arrays["past"][:, :, lanes] = 0.0
     for c, axis in enumerate(plan.axes):
         work[rows[axis], lanes] = AWAY

@@ -49,8 +49,9 @@ class State:
         self.buffer, self.arrays = layout.filled()
         own = self.arrays
         own["row"][:], own["whole"][:] = tables.row, tables.whole
-        for c, begin in enumerate(plan.body.beginnings if "body0" in driver.ROWS else ()):
-            own["work"][driver.ROWS[f"body{c}"]] = begin
+        for name, begin in plan.beginnings.items():
+            if name in driver.ROWS:
+                own["work"][driver.ROWS[name]] = begin
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
         self.fill_own()

@@ -11,12 +11,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.body import radio, sensors
+from airflock.body import radio
 from airflock.core import random
 from airflock.identify.logs import MISSING, Logs
 from airflock.recordings.flights import simulate
 from airflock.recordings.perception import packet_uniforms
 from airflock.scenarios.scenario import Scenario
+from airflock.sensors import langevin
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ def own_errors(seed: int, decisions: int, agents: int, period: float, s: Any) ->
         w = words(seed, random.SENSOR, k, np.arange(agents))
         drawn = normal_pair(w[0], w[1])
         for axis in (0, 1):
-            q[axis], u[axis] = sensors.langevin(q[axis], u[axis], drawn[axis], period, s)
+            q[axis], u[axis] = langevin.error(q[axis], u[axis], drawn[axis], period, s)
         found[k, :2], found[k, 2:] = q, u
     return found
 

@@ -122,7 +122,7 @@ class Inferred:
         document = self.document()
         assert self.best is not None
         own = self.best.candidate.scenario
-        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle)
+        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle, sensor=own.sensor)
 
 
 def infer(

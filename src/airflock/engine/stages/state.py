@@ -57,11 +57,12 @@ class Flock:
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
-    body                                 : what the body remembers, by field of its Memory
+    body, sense                          : what the body and the sensor remember, by field of their Memory
     goal, departed                       : where its own goal is, and where it started, m
     before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
-    errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
+    errors, chances                      : normal and uniform numbers of the sensors
+    outer, words                         : normal numbers of the outer noise, and random words
 
     take       : the row of a name in the driver
     dimensions : 2 or 3
@@ -82,6 +83,7 @@ class Flock:
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
+        self.sense, self.chances = Columns("sense", take), Columns("chance", take)
         self.packet = Columns("packet", take)
         self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
         self._take = take

@@ -100,9 +100,9 @@ def ask(rule: Callable[..., Any] | None, **offered: Any) -> Any:
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
-def wants(rule: Callable[..., Any], *names: str) -> bool:
+def wants(rule: Callable[..., Any] | None, *names: str) -> bool:
     """Whether a rule asks for any of these names."""
-    return bool(set(names) & set(inspect.signature(rule).parameters))
+    return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
 
 
 def reduced(how: str, total: Any, term: Any) -> Any:
