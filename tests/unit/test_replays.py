@@ -122,6 +122,8 @@ def test_layers_hold_clusters_faults_groups_and_what_the_recording_knows_of_each
 def test_unknown_colours_and_wrong_endings_are_one_line(recording, tmp_path):
     with pytest.raises(RecordingError, match="colour = 'mood' is none that this recording knows: speed, heading"):
         airflock.replay(recording, colour="mood")
+    with pytest.raises(RecordingError, match=r"; did you mean speed\?$"):
+        airflock.replay(recording, colour="spede")
     with pytest.raises(RecordingError, match="the only format written here"):
         airflock.replay(recording).save(tmp_path / "show.pdf")
 

@@ -8,6 +8,7 @@ from typer.main import get_command
 from airflock.cli.main import app, main
 from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
+from airflock.plots.picture import KINDS
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,7 @@ from airflock.errors import AirflockError
         ("run x --seeds", "--seeds needs a value"),
         ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),
         ("run a b c", "run: unexpected b c; for instance: airflock run"),
+        ("run x --trust=yes", "--trust takes no value; write it alone"),
         ("evolve a", "evolve: --out is missing; for instance: airflock evolve"),
         ("plot a --kind serie", "plot: --kind serie is none of trajectories, exposure, series, rules, transfer, scene"),
         ("fly prepar", "fly: prepar: unknown command; did you mean prepare?"),
@@ -45,7 +47,7 @@ def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys
 
 
 def test_the_nearest_choice_is_told():
-    with pytest.raises(AirflockError, match=r"wash; did you mean series\?$"):
+    with pytest.raises(AirflockError, match=rf" is none of {', '.join(KINDS)}; did you mean series\?$"):
         app(["plot", "a", "--kind", "serie"])
 
 

@@ -30,6 +30,8 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
     if kind == "BadParameter" and parameter is not None:
         return _refused(parameter, words, message)
     if kind == "BadOptionUsage":
+        if "does not take a value" in message:
+            return f"{fault.option_name} takes no value; write it alone"
         return f"{fault.option_name} needs a value"
     extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
     if extra is not None:

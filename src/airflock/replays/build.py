@@ -7,6 +7,7 @@ import math
 import os
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,9 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
     own = [layer.shade.name for layer in rows]
     ways = ["speed", "heading", *(["height"] if axes == 3 else []), "agent", *own]
     if colour not in ways:
-        raise RecordingError(f"colour = {colour!r} is none that this recording knows: {', '.join(ways)}")
+        near = get_close_matches(colour, ways, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise RecordingError(f"colour = {colour!r} is none that this recording knows: {', '.join(ways)}{hint}")
     flat = np.zeros((kept.shape[2], 3))
     flat[:, :axes] = kept[0, :axes].T
     first = float(recording["time"].values[0])

@@ -110,7 +110,7 @@ def _entry(
     faults += wrong
     when, wrong = schema.check(where, document[where], Timing)
     faults += wrong
-    numbers, wrong = schema.check(where, document[f"{where} "], kind.Parameters)
+    numbers, wrong = schema.check(where, document[f"{where} "], kind.Parameters, KEYS)
     faults += wrong
     who, wrong = _who(where, table, agents, groups)
     faults += wrong

@@ -8,6 +8,7 @@ from typing import Any
 
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.fault import Fault
+from airflock.core.parameters import declarations
 from airflock.core.sensor import Sensor
 from airflock.doors import is_file
 from airflock.errors import AirflockError, ScenarioError
@@ -63,7 +64,7 @@ def make(
     table, more = _model_table(merged)
     faults += more
     found = law
-    if found is None:
+    if found is None and not more:
         try:
             found = find_model(table.get("kind"), folder, trust=trust)
         except AirflockError as fault:
@@ -77,12 +78,14 @@ def make(
     else:
         more = checks.carries(vehicle, found, vehicle.name)
     faults += more
+    merged = _understood(merged, "body", vehicle.Parameters) if more else merged
     if measures is None:
         measures, more = checks.metrics_set(merged.get("metrics", {}), folder, trust=trust)
         faults += more
     if sensor is None:
         sensor, more = checks.sensor_of(merged.get("sensors", {}), folder, trust=trust)
         faults += more
+        merged = _understood(merged, "sensors", sensor.Parameters) if more else merged
     own = SECTIONS | {"body": vehicle.Parameters, "sensors": sensor.Parameters, "metrics": measures.Parameters}
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
@@ -166,6 +169,15 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
             near = get_close_matches(key, TOP, n=1, cutoff=0.5)
             faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
     return merged, faults
+
+
+def _understood(merged: dict[str, Any], section: str, record: type) -> dict[str, Any]:
+    """A document without the numbers of a section whose kind cannot be had; its stand-in judges those that it knows."""
+    known = {name for name, _, _ in declarations(record)} | {"kind"}
+    given = merged.get(section, {})
+    if not isinstance(given, Mapping):
+        return merged
+    return {**merged, section: {key: value for key, value in given.items() if key in known}}
 
 
 def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:

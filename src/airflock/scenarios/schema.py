@@ -4,7 +4,7 @@ One pydantic schema per section is derived from the parameters' declarations; it
 file, key, value, unit, allowed range, and the nearest right key for a wrong one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from typing import Annotated, Any, Literal
@@ -68,8 +68,8 @@ def _holds(interval: Any, value: Any) -> bool:
     return sound and numbers[0] <= value <= numbers[-1]
 
 
-def check(section: str, given: Mapping[str, Any], record: type) -> tuple[Any, list[str]]:
-    """Record made from a section, or None, and all faults in it."""
+def check(section: str, given: Mapping[str, Any], record: type, beside: Sequence[str] = ()) -> tuple[Any, list[str]]:
+    """Record made from a section, or None, and all faults in it; `beside`: further keys that its table may hold."""
     if not isinstance(given, Mapping):
         return None, [f"{section} = {given!r} is not a table of keys"]
     values, faults = plain(section, given, record)
@@ -77,21 +77,22 @@ def check(section: str, given: Mapping[str, Any], record: type) -> tuple[Any, li
         clean = schema(record)(**values)
     except ValidationError as error:
         for item in error.errors():
-            line = _line(section, item, record)
+            line = _line(section, item, record, beside)
             if line not in faults:
                 faults.append(line)
         return None, faults
     return (None if faults else record(**clean.model_dump())), faults
 
 
-def _line(section: str, item: Any, record: type) -> str:
-    """One complaint of pydantic in our words."""
+def _line(section: str, item: Any, record: type, beside: Sequence[str] = ()) -> str:
+    """One complaint of pydantic in our words; `beside`: keys of the same table that the record does not hold."""
     key = str(item["loc"][0]) if item["loc"] else ""
     name = f"{section}.{key}".lstrip(".")
     known = {n: d for n, d, _ in declarations(record)}
     if item["type"] == "extra_forbidden":
-        near = get_close_matches(key, known, n=1, cutoff=0.5)
-        hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(known)}"
+        may = [*known, *beside]
+        near = get_close_matches(key, may, n=1, cutoff=0.5)
+        hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(may)}"
         return f"{name}: unknown key; {hint}"
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):

@@ -99,8 +99,13 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     times = factor(unit, declared.unit)
     if times is None:
         others = ", ".join(UNITS.get(declared.unit, ()))
-        asked = "no unit" if declared.unit in ("", "1") else declared.unit
-        return None, "", f"{name} = {value} {unit}: the unit is {asked}{f', or one of {others}' if others else ''}"
+        if declared.unit in ("", "1"):
+            return None, "", f"{name} = {value} {unit}: has no unit{f'; give a number, or {others}' if others else ''}"
+        return (
+            None,
+            "",
+            f"{name} = {value} {unit}: the unit is {declared.unit}{f', or one of {others}' if others else ''}",
+        )
     scaled = _times(value, times)
     if scaled is None:
         return given, "", ""

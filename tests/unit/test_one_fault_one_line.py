@@ -1,0 +1,51 @@
+"""One mistake is one line: what a section of an unknown kind holds is not judged by the keys of another kind."""
+
+import pytest
+
+import airflock
+from airflock.errors import ScenarioError
+
+OWN = "def error(g, s):\n    return g, 0.0\n"
+
+
+def faults(tmp_path, text):
+    (tmp_path / "own.py").write_text(OWN)
+    file = tmp_path / "mine.toml"
+    file.write_text('extends = "vasarhelyi_2018/4ms"\n' + text)
+    with pytest.raises(ScenarioError) as told:
+        airflock.load(file)
+    return [line.removeprefix(f"{file}: ") for line in told.value.faults]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('[sensors]\nkind = "own.py"\noff = 0.1', "sensors.kind = 'own.py': would run the code"),
+        ('[sensors]\nkind = "none.py"\noff = 0.1', "sensors.kind = 'none.py': no such file"),
+        ('[sensors]\nkind = "gps"\nsd = 1.5', "sensors.kind = 'gps': unknown sensor; did you mean gnss?"),
+        ('[body]\nkind = "own.py"\nwheels = 4', "body.kind = 'own.py': would run the code"),
+        ('[body]\nkind = "quadroto"\nwheels = 4', "body.kind = 'quadroto': unknown body; did you mean quadrotor?"),
+    ],
+)
+def test_keys_of_a_kind_that_cannot_be_had_are_not_judged(tmp_path, text, line):
+    (found,) = faults(tmp_path, text)
+    assert found.startswith(line)
+
+
+def test_a_law_by_its_bare_name_is_one_line(tmp_path):
+    table = "model = 'vicsek_1995' is not a table; write model.kind = 'vicsek_1995'"
+    assert faults(tmp_path, 'model = "vicsek_1995"') == [table]
+
+
+def test_what_the_kind_that_cannot_be_had_shares_with_all_is_judged(tmp_path):
+    assert faults(tmp_path, '[sensors]\nkind = "gps"\nperiod = 99.0\nsd = 1.5') == [
+        "sensors.kind = 'gps': unknown sensor; did you mean gnss?",
+        "sensors.period = 99 s lies outside [0, 60] s",
+    ]
+
+
+def test_a_wrong_key_of_a_fault_names_the_right_ones(tmp_path):
+    (found,) = faults(tmp_path, '[[faults]]\nkind = "radio_silent"\nat = 1.0\nagent = 1')
+    assert found == "faults[0].agent: unknown key; did you mean faults[0].agents?"
+    (found,) = faults(tmp_path, '[[faults]]\nkind = "radio_silent"\nat = 1.0\nxyzzy = 1')
+    assert found.startswith("faults[0].xyzzy: unknown key; known: kind, at, until, lasts, per_hour, agents")
