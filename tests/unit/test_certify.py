@@ -16,6 +16,7 @@ from airflock.certify.check import check
 from airflock.certify.limits import read, read_all
 from airflock.certify.run import certify, run
 from airflock.certify.seeds import COUNT, identity, seed
+from airflock.certify.tolerance import sound_keys
 from airflock.cli.main import app
 from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.executors.here import Here
@@ -119,6 +120,14 @@ def test_a_flight_that_fails_is_no_flight_that_went_well(tmp_path):
     for resume in (False, True):
         with pytest.raises(StudyError, match=f"flight 30, seed {bad}, failed: agent 3 finds no room"):
             flown(asked, tmp_path / "a", 0.0, score=score, resume=resume)
+
+
+def test_a_number_that_the_scenario_does_not_have_has_no_tolerance():
+    exact = load("vasarhelyi_2018/4ms", {"sensors.kind": "perfect"})
+    with pytest.raises(ScenarioError, match=r"sensors\.sd is not a number of this scenario; known: radio\.delay"):
+        sound_keys(exact, ["sensors.sd"])
+    with pytest.raises(ScenarioError, match=r"topology\.k is not a number of the environment; known: radio\.delay"):
+        sound_keys(exact, ["topology.k"])
 
 
 def test_the_tolerance_of_a_number_is_found_between_two_values(tmp_path):

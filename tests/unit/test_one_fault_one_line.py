@@ -49,3 +49,18 @@ def test_a_wrong_key_of_a_fault_names_the_right_ones(tmp_path):
     assert found == "faults[0].agent: unknown key; did you mean faults[0].agents?"
     (found,) = faults(tmp_path, '[[faults]]\nkind = "radio_silent"\nat = 1.0\nxyzzy = 1')
     assert found.startswith("faults[0].xyzzy: unknown key; known: kind, at, until, lasts, per_hour, agents")
+
+
+@pytest.mark.parametrize(
+    ("settings", "note"),
+    [
+        ({"topology.k": 7}, "topology.kind = 'range' does not read topology.k: agents meet all whom they hear"),
+        ({"topology.kind": "nearest", "topology.k": 99}, "topology.k = 99: each of 100 agents meets all whom it hears"),
+        ({"topology.kind": "nearest", "topology.k": 98}, ""),
+        ({"topology.kind": "voronoi", "topology.k": 500}, ""),
+        ({}, ""),
+    ],
+)
+def test_numbers_by_which_everybody_is_met_are_told(settings, note):
+    told = [line for line in airflock.load("vasarhelyi_2018/4ms", settings).notes if "topology" in line]
+    assert bool(told) == bool(note) and all(line.startswith(note) for line in told)

@@ -54,9 +54,11 @@ def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
     known, faults = declared(scenario), []
     for key in keys:
         if key not in WORSE or key not in known:
-            near = get_close_matches(key, WORSE, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(k for k in WORSE if k in known)}"
-            faults.append(f"tolerance: {key} is not a number of the environment; {hint}")
+            may = [name for name in WORSE if name in known]
+            near = [] if key in WORSE else get_close_matches(key, may, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(may)}"
+            what = "a number of this scenario" if key in WORSE else "a number of the environment"
+            faults.append(f"tolerance: {key} is not {what}; {hint}")
         elif not known[key][1]:
             faults.append(f"tolerance: {key} = 0 in {scenario.name}; set the value from which it is to be moved")
     if faults:

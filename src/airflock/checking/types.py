@@ -129,7 +129,7 @@ def _copies(names: Sequence[str]) -> dict[str, TypedCopy]:
             faults.append(where)
             continue
         if not copies[name].rules:
-            needed = "a law has decide, a body move, an order parameter sample, a sensor measure"
+            needed = "a law has decide, a body move, an order parameter sample, a sensor measure or error"
             faults.append(f"{name}: holds no rule; {needed}")
     if faults:
         raise RuleError("\n".join(faults))

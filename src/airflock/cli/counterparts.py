@@ -24,7 +24,7 @@ LOADED = {"changes": "airflock.load(name, settings)", "agents": "airflock.load",
 LOADED |= {"law": "airflock.load", "trust": "airflock.load"}
 TABLE = {"as_json": "the value returned"}
 SEARCH = (
-    "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "start", "averages",
+    "algorithm", "population", "generations", "seeds", "seed", "restarts", "flights", "racing", "start", "averages",
 )  # fmt: skip
 SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
 FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
@@ -167,7 +167,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         "airflock.fleet.compare.fly(scenario, card, seed)", "airflock.fleet.compare.fly",
         {
             "scenario": "scenario", "seeds": "seed", "first_seed": "seed", "faults": "faults", "ground": "ground",
-            **{name: LOADED[name] for name in SETTINGS}, **TABLE,
+            **{name: LOADED[name] for name in SETTINGS}, "trust": "airflock.load", **TABLE,
             **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
             "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
         },

@@ -54,6 +54,7 @@ def prepare(
     site: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground: degrees, m.")],
     members: Annotated[str, typer.Option(metavar="1-10", help="System ids of the drones, such as 1-10 or 1,2,5.")],
     changes: options.Set = None,
+    trust: options.Trust = False,
     autopilot: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
     height: Annotated[
         float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
@@ -92,7 +93,7 @@ def prepare(
         if path.exists():
             faults.append(f"{path}: exists; a mission is never overwritten")
     with options.gathering(faults):
-        found = load(scenario, options.settings(changes))
+        found = load(scenario, options.settings(changes), trust=trust)
     with options.gathering(faults):
         safety = options.settings(limits)
     options.refuse(faults)

@@ -10,7 +10,9 @@ from airflock.errors import AirflockError
 
 
 def types(
-    files: Annotated[list[str], typer.Argument(metavar="FILE.py...", help="Laws, bodies, order parameters or faults.")],
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE.py...", help="Laws, bodies, sensors, order parameters, faults.")
+    ],
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Also write the typed copies, for an editor or another type checker."),

@@ -15,7 +15,10 @@ from airflock.world.place import half_sizes
 BINS = 24
 LEVELS = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
 COLUMNS = ("receiver", "sender", "t", "stamp", "distance", "got")
-HOW = "fly it with airflock.simulate(..., keep=('heard',)), or record a fleet with airflock fleet --save"
+HOW = (
+    "plot the scenario itself, fly it with airflock.simulate(..., keep=('heard',)), or record a fleet with "
+    "airflock fleet --save"
+)
 
 
 def reception(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFrame:

@@ -10,7 +10,8 @@ SEES_WALLS = {"ray", "cast"}
 
 def advice(scenario: Scenario) -> list[str]:
     """What a person should know before flying a scenario."""
-    return [note for note in (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario)) if note]
+    notes = (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario), _all_met(scenario))
+    return [note for note in notes if note]
 
 
 def _speed_alone(scenario: Scenario) -> str:
@@ -53,3 +54,17 @@ def _lengths(scenario: Scenario) -> str:
         f"agents of {model.name} interact within {reach:.3g} m in an arena {2.0 * size:.3g} m across, a factor of "
         f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are hardly meant"
     )
+
+
+def _all_met(scenario: Scenario) -> str:
+    """Numbers of a topology by which everybody is met."""
+    topology, given = scenario.topology, scenario.document.get("topology", {})
+    numbers = [f"topology.{key}" for key in given if key != "kind"]
+    if topology.kind == "range" and numbers:
+        return (
+            f"topology.kind = 'range' does not read {', '.join(numbers)}: agents meet all whom they hear; name a kind, "
+            "such as topology.kind = 'nearest'"
+        )
+    if topology.kind in ("nearest", "strongest") and topology.k >= scenario.agents - 1 > 0:
+        return f"topology.k = {topology.k:g}: each of {scenario.agents} agents meets all whom it hears"
+    return ""
