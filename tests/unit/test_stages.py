@@ -159,7 +159,7 @@ class World:
         around = [self.rest[name] for name in ("edges", "spans", "scene")]
 
         def pick(i):
-            meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan, images=plan.periodic)
+            meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan)
 
         neighbours.neighbours(
             range(n), range(n), flock, numbers, 0.2, hear, pick, plan=plan, model=model, sums=sums,

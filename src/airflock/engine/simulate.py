@@ -57,7 +57,7 @@ def plan_of(
             bits=precision,
             record=record,
             given_start=given_start,
-            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario),
+            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario) and _by_cells(scenario),
             absence=absence or any(kind.leaves is not None for kind in kinds),
         ),
         body=scenario.vehicle,

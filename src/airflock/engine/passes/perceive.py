@@ -33,7 +33,7 @@ def meet(build: Builder) -> None:
     """Function meet, where agents meet but some of whom they hear: fills row met for one agent."""
     plan = build.plan
     if plan.topology is not None and not plan.grid:
-        made = specialise(build, meeting.meet, decision=argument("k_"), images=build.images)
+        made = specialise(build, meeting.meet, decision=argument("k_"))
         build.function(f"meet({', '.join(['i, k_, n, m, row, whole, work', *around(plan)])})", made.lines, "return 0")
 
 

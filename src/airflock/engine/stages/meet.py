@@ -8,36 +8,10 @@ from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import pair_number
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import (
-    FAR,
-    HALF,
-    LIMIT,
-    ONE,
-    SIDES,
-    TINY,
-    ZERO,
-    X,
-    Y,
-    Z,
-    ask,
-    choose,
-    integer,
-    least,
-    vector,
-)  # fmt: skip
+from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
 from airflock.world import bvh, polygon, rays
-from airflock.world.edges import nearest_image
 
 FADE = random.FADE
-
-
-def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
-    """Square of how far agent i hears agent j, m². Over links the last packet that came is heard on and on."""
-    return (
-        least(least(range2, flock.reach_in[i]), flock.reach_out[j])
-        if plan.suffers("radio") and not plan.links
-        else range2
-    )
 
 
 def hide(
@@ -51,8 +25,8 @@ def hide(
         links = scene[2]
     for j in others:
         flock.hidden[j] = ZERO
-        if flock.apart[j] < HALF * FAR:
-            r = math.sqrt(flock.apart[j])
+        if flock.square[j] < HALF * FAR:
+            r = math.sqrt(flock.square[j])
             ux = flock.away[X][j] / r
             uy = flock.away[Y][j] / r
             uz = flock.away[Z][j] / r
@@ -84,51 +58,16 @@ def fade(i: int, others: Iterable[int], n: int, decision: int, flock: Flock, who
         flock.fade[j] = one
 
 
-def meet(  # noqa: C901 - tests of the plan leave one way through
+def meet(
     flock: Flock, numbers: Any, whole: Any, i: int, others: Iterable[int], n: int, m: int, decision: int, edges: Any,
-    spans: Any, scene: Any, *, plan: Plan, images: bool,
+    spans: Any, scene: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Whom agent i meets: row `met`. It is judged by what the agent believes, but who is in range by the radio."""
-    axes, k, w = range(plan.dimensions), numbers.k, numbers.w
-    heard_position = flock.latest_position if plan.links else flock.heard_position
-    exact = plan.bits == 64
-    range_ = least(k.range, LIMIT)
-    range2 = range_ * range_ + TINY if exact and not plan.perturbed else range_ * range_
-    ii = integer(i)
-    own, true = vector(), vector()
-    for a in axes:
-        own[a] = flock.measured_position[a][i]
-    if plan.perturbed:
-        for a in axes:
-            true[a] = flock.position[a][i]
-    for j in others:
-        d, o = vector(), vector()
-        for a in axes:
-            d[a] = heard_position[a][j] - own[a]
-        if images:
-            for a in axes:
-                d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
-        r2 = sum(d[a] * d[a] for a in axes) + TINY
-        if plan.perturbed:
-            for a in axes:
-                o[a] = flock.position[a][j] - true[a]
-            if plan.periodic:
-                for a in axes:
-                    o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-            hears = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
-        else:
-            hears = (r2 <= range2) & (integer(j) != ii)
-        if plan.lossy or plan.links:
-            hears = hears & (flock.heard[j] > HALF)
-        if plan.meeting("dx") or plan.hides:
-            for a in axes:
-                flock.away[a][j] = d[a]
-        flock.apart[j] = choose(hears, r2, FAR)
+    """Whom agent i meets of those whom it hears, as it believes them to be placed: row `met`."""
     if plan.hides:
         hide(i, others, flock, whole, edges, spans, scene, plan=plan)
     if plan.fades:
         fade(i, others, n, decision, flock, whole, plan=plan)
     ask(
-        plan.meets, n=m, dx=flock.away[X], dy=flock.away[Y], dz=flock.away[Z], r2=flock.apart,
+        plan.meets, n=m, dx=flock.away[X], dy=flock.away[Y], dz=flock.away[Z], r2=flock.square,
         hidden=flock.hidden, fade=flock.fade, met=flock.met, heap=flock.heap, weak=flock.weak, t=numbers.topology,
     )  # fmt: skip

@@ -7,9 +7,9 @@ from typing import Any
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.meet import carries
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
+    FAR,
     HALF,
     LIMIT,
     ONE,
@@ -29,6 +29,19 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 from airflock.world.edges import nearest_image
+
+# Where an agent meets but some of whom it hears, its others are gone through twice: who is heard, and, of those whom
+# it meets, what they say.
+BOTH, HEAR, ADD = "both", "hear", "add"
+
+
+def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Square of how far agent i hears agent j, m². Over links the last packet that came is heard on and on."""
+    return (
+        least(least(range2, flock.reach_in[i]), flock.reach_out[j])
+        if plan.suffers("radio") and not plan.links
+        else range2
+    )
 
 
 def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
@@ -73,8 +86,6 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             near2 = near * near + TINY if exact else near * near
         if selective:
             receive(i)
-        if plan.topology is not None:
-            meet(i)
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         for a in axes:
             own[a] = flock.measured_position[a][i]
@@ -89,44 +100,57 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             h[a] = f * v[a]
         for c, how in sums:
             total[c] = START[how]
-        for j in others:
-            d, dv, o, nh = vector(), vector(), vector(), vector()
-            for a in axes:
-                d[a] = heard_position[a][j] - own[a]
-                dv[a] = heard_velocity[a][j] - v[a]
-            if images:
+        for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
+            for j in others:
+                d, dv, o, nh = vector(), vector(), vector(), vector()
                 for a in axes:
-                    d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
-            if plan.dimensions == 2:
-                d[Z] = ZERO
-                dv[Z] = ZERO
-            r2 = sum(d[a] * d[a] for a in axes) + TINY
-            r = math.sqrt(r2)
-            speed = math.sqrt(sum(dv[a] * dv[a] for a in axes) + TINY)
-            g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
-            for a in (X, Y, Z):
-                nh[a] = g * (v[a] + dv[a])
-            if plan.topology is not None:
-                ok = flock.met[j] > HALF
-            elif true_range:
-                for a in axes:
-                    o[a] = flock.position[a][j] - true[a]
-                if plan.periodic:
+                    d[a] = heard_position[a][j] - own[a]
+                    dv[a] = heard_velocity[a][j] - v[a]
+                if images:
                     for a in axes:
-                        o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-                ok = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
-            else:
-                ok = (r2 <= range2) & (integer(j) != ii)
-            if model.reach is not None:
-                ok = ok & (r2 <= near2)
-            if selective and plan.topology is None:
-                ok = ok & (flock.heard[j] > HALF)
-            t = ask(
-                model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z], dv=speed,
-                vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
-                age=heard_age(i, j, late, flock, plan=plan), lower=ONE if integer(j) < ii else ZERO, p=own_p,
-            )  # fmt: skip
-            for c, how in sums:
-                total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))
+                        d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+                if plan.dimensions == 2:
+                    d[Z] = ZERO
+                    dv[Z] = ZERO
+                r2 = sum(d[a] * d[a] for a in axes) + TINY
+                r = math.sqrt(r2)
+                speed = math.sqrt(sum(dv[a] * dv[a] for a in axes) + TINY)
+                g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
+                for a in (X, Y, Z):
+                    nh[a] = g * (v[a] + dv[a])
+                if part == HEAR:
+                    flock.square[j] = FAR  # and so it stays where an interpreted driver goes on to the next one
+                if part == ADD:
+                    ok = flock.met[j] > HALF
+                elif true_range:
+                    for a in axes:
+                        o[a] = flock.position[a][j] - true[a]
+                    if plan.periodic:
+                        for a in axes:
+                            o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
+                    ok = (sum(o[a] * o[a] for a in axes) <= carries(i, j, range2, flock, plan=plan)) & (
+                        integer(j) != ii
+                    )
+                else:
+                    ok = (r2 <= range2) & (integer(j) != ii)
+                if model.reach is not None and (part != HEAR or plan.grid):
+                    ok = ok & (r2 <= near2)
+                if selective and part != ADD:
+                    ok = ok & (flock.heard[j] > HALF)
+                if part == HEAR:
+                    if plan.meeting("dx") or plan.hides:
+                        for a in axes:
+                            flock.away[a][j] = d[a]
+                    flock.square[j] = choose(ok, r2, FAR)
+                else:
+                    t = ask(
+                        model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z],
+                        dv=speed, vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
+                        age=heard_age(i, j, late, flock, plan=plan), lower=ONE if integer(j) < ii else ZERO, p=own_p,
+                    )  # fmt: skip
+                    for c, how in sums:
+                        total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))
+            if part == HEAR:
+                meet(i)
         for c, _ in sums:
             flock.sums[c][i] = total[c]

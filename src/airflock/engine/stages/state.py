@@ -46,7 +46,7 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
-    away, apart                          : offsets of the others from one agent (m), and their squares (m²), FAR of
+    away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
@@ -86,9 +86,9 @@ class Flock:
         return self._take("age")
 
     @property
-    def apart(self) -> Row:
+    def square(self) -> Row:
         """Squared distance of each other agent, m²; FAR of whom one agent does not hear."""
-        return self._take("apart")
+        return self._take("square")
 
     @property
     def hidden(self) -> Row:
