@@ -87,7 +87,7 @@ def judged(parameters):
 
 
 def table(folder):
-    """Rows of RESULTS-time-to-target.md."""
+    """Rows of RESULTS-searches.md."""
     published = np.array(json.loads((folder / "published.json").read_text()))
     found = [json.loads(path.read_text()) for path in sorted(folder.glob("*_*.json"))]
     print("| search | seed | whole flights | processor s | winner | difference to Table S1 (95 %) | reached |")

@@ -83,7 +83,18 @@ def settings(rng: Random) -> tuple[dict[str, Any], NDArray[np.float64] | None]:
     start = lattice(keys, rng, length, speed, reach) if rng.random() < 0.35 else None
     groups(keys, rng, kind)
     faults(keys, rng, length)
+    silence(keys, rng, kind, length, dt)
     return keys, start
+
+
+def silence(keys: dict[str, Any], rng: Random, kind: str, length: float, dt: float) -> None:
+    """Who stops for a neighbour that is lost: at once, soon, or never within such a flight."""
+    law = find_model(kind)
+    hears = law.command == "velocity" and law.neighbour is not None and law.flock is None and "aero.k_d" not in keys
+    if not hears or keys["update"] == "sequential" or rng.random() > 0.4:
+        return
+    keys |= {"silence.rule": "stop", "silence.patience": dt * rng.choice((0, 2, 6)), "silence.keep": 0.5 * length}
+    keys |= {"silence.closing": length * rng.choice((0.0, 1.0, 20.0)), "silence.forget": rng.choice((0.4, 20.0))}
 
 
 def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
@@ -342,7 +353,7 @@ CHOICES = [f"faults.kind = {kind}" for kind in KINDS]
 CHOICES += [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
 SWITCHES = (
     "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
-    "stop", "descends", "given", "sees", "walls", "groups", "faults", "absent",
+    "stop", "descends", "given", "sees", "walls", "groups", "faults", "absent", "silent",
 )  # fmt: skip
 
 
@@ -358,7 +369,7 @@ def notions(draw: Draw) -> set[str]:
         "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
         "groups": bool(found.varied), "faults": bool(found.fault_kinds),
-        "absent": any(kind.leaves for kind in found.fault_kinds),
+        "absent": any(kind.leaves for kind in found.fault_kinds), "silent": found.silence.rule == "stop",
     }  # fmt: skip
     assert tuple(switches) == SWITCHES
     kinds = {f"faults.kind = {kind.name}" for kind in found.fault_kinds}
@@ -367,7 +378,7 @@ def notions(draw: Draw) -> set[str]:
         "model": found.parameters, "body": found.body, "wind": found.wind, "radio": found.radio,
         "world": found.world, "scene": found.scene, "topology": found.topology,
         "goals": found.goals, "start": found.start, "wing": found.wing, "metrics": found.metrics,
-        "flight": found.flight,
+        "flight": found.flight, "silence": found.silence,
     } | ({"aero": found.aero} if found.descends else {})  # fmt: skip
     kind = keys["model.kind"]
     for section, record in records.items():
@@ -382,7 +393,7 @@ IMPOSSIBLE = (
     {"periodic on", "islands on"},
     {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},
     {"sequential on", "links on"}, {"descends on", "sequential on"},
-    {"sees on", "walls on"}, {"descends on", "sees on"},
+    {"sees on", "walls on"}, {"descends on", "sees on"}, {"silent on", "sequential on"}, {"silent on", "descends on"},
 )  # fmt: skip
 
 

@@ -1,9 +1,9 @@
 """Syntax trees of drivers, normalised, so that two ways to write the same driver are the same tree.
 
 Normalised are the names of locals (by first use), the numbers of rows (by their names), the place of pure bindings
-(`x = work[3]`, records, integers of a world: sorted, on top), what is computed and never read (dropped, on all sides),
-and arguments of functions of one agent (`*_of`) that their bodies do not read. The stages `noise` and `gusts` stand
-where they are called.
+(`x = work[3]`, records, integers of a world: sorted, on top), locals that are a constant (`vz = ZERO`), what is
+computed and never read (dropped, on all sides), and arguments of functions of one agent (`*_of`) that their bodies do
+not read. The stages `noise` and `gusts` stand where they are called.
 """
 
 import ast
@@ -28,7 +28,7 @@ def functions(text, rows):
     for name, node in found.items():
         if not isinstance(node, ast.FunctionDef):
             continue
-        node.body = _alive(_with_parts(node.body, parts))
+        node.body = _alive(_without_constants(_with_parts(node.body, parts)))
         if name.endswith("_of"):
             arguments = [a.arg for a in node.args.args]
             kept = sorted(a for a in arguments if a in _read(node.body))
@@ -92,6 +92,28 @@ def _with_parts(statements, parts):
         if isinstance(statement, ast.Assign):
             assert ast.unparse(statement.targets[0]) == ast.unparse(last.value)
     return done
+
+
+def _without_constants(statements):
+    """Statements with a named constant in place of each local that is bound to nothing but that constant."""
+    nodes = [node for statement in statements for node in ast.walk(statement)]
+    stored = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+    found = {}
+    for node in nodes:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            found.setdefault(node.targets[0].id, []).append(getattr(node.value, "id", ""))
+    alone = {name: to[0] for name, to in found.items() if to[0].isupper() and to == [to[0]] * stored.count(name)}
+    return [_Constants(alone).visit(statement) for statement in statements]
+
+
+class _Constants(ast.NodeTransformer):
+    def __init__(self, found):
+        self.found = found
+
+    def visit_Name(self, node):
+        if isinstance(node.ctx, ast.Load):
+            node.id = self.found.get(node.id, node.id)
+        return node
 
 
 def _read(statements):

@@ -163,16 +163,17 @@ def _names(found: Iterable[str]) -> str:
 
 
 def robots() -> None:
-    """Bodies, sensors, radio and wind: what stands between a command and a motion."""
+    """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
     from airflock.body import radio, sensors, wind
     from airflock.body.registry import BODIES
+    from airflock.core import silence
     from airflock.scenarios.keys import keys as keys_of
 
     pieces = [
-        "# Bodies, sensors, radio, wind\n\nA model commands; a body obeys as far as it can. Neighbours hear of it "
-        "through the radio, and an agent knows itself through its sensors.\n",
+        "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
+        "Neighbours hear of it through the radio, and an agent knows itself through its sensors.\n",
         _abilities(BODIES),
     ]
     for name, body in BODIES.items():
@@ -180,7 +181,7 @@ def robots() -> None:
         pieces.append(f'\n## body.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
         pieces.append(f"It takes a command of kind {body.accepts}.\n\n```python\n{getsource(body.move)}```\n\n")
         pieces.append(key_table(keys_of(name)))
-    for name, module in (("sensors", sensors), ("radio", radio), ("wind", wind)):
+    for name, module in (("sensors", sensors), ("radio", radio), ("silence", silence), ("wind", wind)):
         pieces.append(f"\n## {name}\n\n{prose(module.__doc__ or '')} {prose(module.Parameters.__doc__ or '')}\n\n")
         rules = [value for value in vars(module).values() if getattr(value, "__module__", "") == module.__name__]
         for rule in rules:

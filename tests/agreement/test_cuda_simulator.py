@@ -55,7 +55,7 @@ def crowds(request):
     return simulated("crowded.py", request.config.getoption("--seed"))
 
 
-@pytest.mark.parametrize("name", ["periodic", "few cells", "walls", "open", "plane"])
+@pytest.mark.parametrize("name", ["periodic", "few cells", "walls", "open", "plane", "gusts"])
 def test_one_big_flock_by_cells_flies_as_plain_python(crowds, name, seed):
     found = crowds[name]
     assert found["moved"] > 0.01

@@ -19,11 +19,11 @@ from airflock.core.contract import model
 from airflock.core.parameters import choices
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import could_be_near
+from airflock.core.silence import complete, could_be_near
 from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
-from airflock.onboard.card import _frozen
+from airflock.onboard.fields import frozen
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
 from flocks import ISLANDS, PENTAGON
@@ -59,7 +59,7 @@ def place_of(scenario):
     text = json.dumps({"world": plain(scenario.world), "shapes": tables})
     read = json.loads(text)
     look = 1e30 if rule is None else rule(scenario.parameters)
-    world = arena.Parameters(**_frozen(read["world"]))
+    world = arena.Parameters(**frozen(read["world"]))
     return Place(world, Shapes(**read["shapes"]), look=look, casts=scenario.model.sight is not None)
 
 
@@ -230,7 +230,7 @@ def test_an_autopilot_is_asked_for_a_velocity_whatever_the_law_commands():
 
 @given(st.floats(0, 200), st.floats(0, 60), st.floats(0, 60))
 def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, age, longer):
-    s = Silence()
+    s = complete(Silence(rule="stop"), 4.0)
     if could_be_near(distance, age, s) and age + longer < s.forget:
         assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
     assert not could_be_near(distance, s.forget, s)
@@ -238,10 +238,12 @@ def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, ag
 
 
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
-    one, own = pilot(silence=Silence()), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    one, own = pilot(silence=Silence(rule="stop", patience=2.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
-    assert math.hypot(*one.decide(own, 2.0).command[:2]) > 1.0
+    assert math.hypot(*one.decide(own, 1.9).command[:2]) > 1.0
     assert one.decide(own, 4.0).command == (0.0, 0.0, 0.0)
+    away = own._replace(x=1.5, y=-2.0)
+    assert one.decide(away, 4.05).command == pytest.approx((-0.75, 1.0, 0.0)), "back to where it stopped"
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
     assert math.hypot(*one.decide(own, 4.2).command[:2]) > 1.0
     assert one.steer(own, 9.0) == (0.0, 0.0, 0.0)

@@ -37,6 +37,9 @@ FLIGHTS = {
         "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
         "wind.kind": "dryden", "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
     }),
+    "silence": ("vasarhelyi_2018", {  # more than the half of all packets are lost: everybody stops now and then
+        "agents": 8, "radio.loss": 0.6, "radio.loss_at": 0.1, "radio.delay": 0.2, "silence.rule": "stop",
+    }),
     "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
     "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),
 }  # fmt: skip

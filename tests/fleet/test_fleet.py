@@ -132,6 +132,50 @@ def test_outer_noise_of_a_block_is_that_of_each_step(three):
             assert noise(step, drone) == (four[:3] if three else flat)
 
 
+# ----------------------------------------------------------------------------------------------- single drones differ
+
+
+WEAK = [{"name": "slow", "agents": 1, "model": {"v_flock": 2.0}, "body": {"tau": {"value": 1.4, "spread": 0.1}}},
+        {"name": "rest"}]  # fmt: skip
+BEFALLEN = {
+    "groups": {"groups": WEAK},
+    "weak motor": {"faults": [{"kind": "motor", "at": 1.0, "agents": [1]}]},
+    "drift": {"faults": [{"kind": "gnss_drift", "at": 1.0, "agents": [0]}]},
+    "deaf": {"faults": [{"kind": "radio_deaf", "at": 0.5, "lasts": 1.5, "agents": [2]}]},
+    "stuck": {"faults": [{"kind": "stuck", "at": 2.0, "agents": [2]}]},
+}
+
+
+@pytest.mark.parametrize("name", BEFALLEN)
+def test_groups_and_faults_of_a_scenario_act_on_a_fleet_as_in_the_simulator(name):
+    """Each changes the flight by more than 20 cm within 5 s, and the fleet is within 5 cm of the changed simulation."""
+    seed, settings = 1, BEFALLEN[name]
+    crowd = {"world.side": 60.0, "start.separation": 6.0}
+    found, plain = (compare.sampled(scenario(3, 5.2, **crowd, **more), 0.2) for more in (settings, {}))
+    flown = compare.fly(found, compare.software_card(found, silent=False, seed=seed), seed)
+    unlike = compare.fly(plain, compare.software_card(plain, silent=False), seed)
+    assert np.abs(flown.array()[:, :, :2] - unlike.array()[:, :, :2]).max() > 0.2
+    assert compare.departure(flown, [5.0], device="python").fleet[0] < 0.05
+
+
+def test_numbers_of_each_member_stand_on_the_card():
+    made = compare.software_card(scenario(3, groups=WEAK), seed=1)
+    assert [made.pilot(who).p.v_flock for who in made.members] == [2.0, 4.0, 4.0]
+    taus = [made.pilot(who).b.tau for who in made.members]
+    assert taus[0] != 1.4 and taus[1:] == [1.0, 1.0]
+    real = card(scenario(3, groups=WEAK))
+    assert real.pilot(1).b.tau == 1.4, "a real drone brings its own tolerance"
+    with pytest.raises(ScenarioError, match=r"groups are of 3 agents, and 5 drones are to fly; set agents = 5"):
+        card(scenario(3, groups=WEAK), members=range(1, 6))
+
+
+@pytest.mark.parametrize("kind", ["pretender", "clock", "battery", "fails"])
+def test_a_fault_that_no_fleet_flies_is_refused_with_what_to_do(kind):
+    found = scenario(2, 1.0, faults=[{"kind": kind, "at": 0.5}])
+    with pytest.raises(ScenarioError, match=rf"faults.kind = '{kind}': .*; (fly|give)"):
+        compare.fly(found, compare.software_card(found), 0)
+
+
 # ------------------------------------------------------------------------------------------------ whole missions
 
 

@@ -28,6 +28,11 @@ CASES = {
                                    "start.speed": 3.0}),
     "plane": ("vicsek_1995/ordered", {"world.side": 7.0, "dt": 1.0, "duration": 6.0, "metrics.period": 2.0,
                                       "start.speed": 0.03}),
+    # gusts outlast a step, and a decision after which agents lie in another order
+    "gusts": ("kidger/final_2d", {"sensors.period": 0.1, "agents": 12, "start.kind": "ball", "start.radius": 20.0,
+                                  "start.speed": 3.0, "wind.east": 1.0, "wind.gust": 3.0, "duration": 0.6,
+                                  "scene.kind": "none", "goals.kind": "none", "body.kind": "multirotor",
+                                  "sensors.noise": 0.0, "body.noise": 0.0, "radio.delay": 0.0}),
 }  # fmt: skip
 
 

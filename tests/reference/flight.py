@@ -131,7 +131,8 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
         scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
-        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), body=scenario.vehicle, b=b,
+        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), silence=scenario.silent_by(),
+        body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
         told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
     )  # fmt: skip
@@ -147,6 +148,8 @@ def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any
             continue
         if leaves:
             agent.present, left = False, True
+            for other in flock:
+                other.pilot.forget(number)
             continue
         known = {f"at_{name}": value for name, value in agent.state._asdict().items()}
         known |= dict(zip(("at_cx", "at_cy", "at_cz"), agent.command, strict=True))

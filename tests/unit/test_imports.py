@@ -1,6 +1,7 @@
 """Tracks of others: what a known motion reads as in every format, and one line for everything that is wrong."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -324,3 +325,16 @@ def test_tracks_that_are_scored_before_they_are_imported_are_told_how(tmp_path):
     path = written(tmp_path, circle())
     with pytest.raises(RecordingError, match="airflock import log.csv --save"):
         airflock.load_recording(path)
+
+
+@pytest.mark.parametrize(("header", "times"), [("time_ms", 1e6), ("t", 1e3), ("time_us", 1e9), ("time [ms]", 1e6)])
+def test_what_a_wrong_unit_of_time_says_to_write_is_right(tmp_path, header, times):
+    t = np.arange(0.0, 30.0, 0.1)
+    table = pd.DataFrame({"id": "a", header: t * times, "x [m]": 9.0 * np.sin(t / 3.0), "y [m]": 9.0 * np.cos(t / 3.0)})
+    table["vx [m/s]"], table["vy [m/s]"] = 3.0 * np.cos(t / 3.0), -3.0 * np.sin(t / 3.0)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    with pytest.raises(RecordingError, match="the time counts") as fault:
+        airflock.load_tracks(tmp_path / "a.csv")
+    advice = re.search(r"write t:=(.+?); or keep", str(fault.value))[1]
+    found = airflock.load_tracks(tmp_path / "a.csv", map={"t": advice})
+    assert float(found["time"][-1] - found["time"][0]) == pytest.approx(29.9, rel=1e-3)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import airflock
 import toys
+from airflock.cli.harden import _optima
 from airflock.engine.simulate import score_flight, score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
@@ -84,7 +85,7 @@ def test_every_seed_flies_in_every_scenario_and_rows_and_result_tell_which(tmp_p
     assert all(json.loads(f)[0] == pytest.approx(worst[g, c], abs=1e-12) for g, c, f in told)
     document = tomllib.loads((tmp_path / "a" / "result.toml").read_text())
     assert [row["scenario"] for row in document["scenarios"]] == list(result.scenarios)
-    assert load(tmp_path / "a" / "best_2.toml").radio.delay == 0.8
+    assert [each.radio.delay for each in _optima(str(tmp_path / "a"), {}, False)] == [1.0, 0.8]
     for name in ("best.toml", "best_2.toml"):
         assert load(tmp_path / "a" / name).parameters.p_rep == result.parameters["model.p_rep"]
 

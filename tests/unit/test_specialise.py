@@ -5,8 +5,9 @@ import pytest
 from airflock.engine.passes.build import Builder
 from airflock.engine.simulate import plan_of
 from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import StageError
-from airflock.engine.stages.words import ZERO, ask, most, vector
+from airflock.engine.specialise.values import StageError, argument
+from airflock.engine.stages import start
+from airflock.engine.stages.words import ZERO, ask, most, repeat, vector
 from airflock.scenarios.files import load
 
 
@@ -51,8 +52,27 @@ def undefined(flock, i):
 
 
 def unknown(flock, i):
-    while i:
+    with i:
         i = i - 1
+
+
+def sought(flock, i, *, plan):
+    if plan.dimensions == 3:
+        return 7
+    for attempt in repeat(1000):
+        while flock.age[i] > ZERO:
+            if plan.sequential:
+                break
+            flock.age[i] = flock.age[i] - attempt
+        if flock.heard[i] > ZERO:
+            return attempt
+    return -1
+
+
+def left(i, *, plan):
+    for a in range(plan.dimensions):
+        i = i + a
+        break
 
 
 def test_what_is_bound_once_and_known_vanishes():
@@ -83,10 +103,34 @@ def test_a_rule_is_given_what_it_asks_for_and_nothing_else_is_bound():
     assert not any(line.startswith("age") for line in found.lines)
 
 
-@pytest.mark.parametrize(
-    ("stage", "said"), [(undefined, "nowhere is not defined"), (unknown, "While is not specialised")]
+FAULTS = (
+    (undefined, "nowhere is not defined"),
+    (left, "a loop that is unrolled is left"),
+    (unknown, "With is not specialised"),
 )
+
+
+@pytest.mark.parametrize(("stage", "said"), FAULTS, ids=[said for _, said in FAULTS])
 def test_a_fault_names_file_line_and_stage(stage, said):
     line = stage.__code__.co_firstlineno + 1
     with pytest.raises(StageError, match=rf"test_specialise.py:{line}: {stage.__name__}: {said}"):
         made(stage)
+
+
+def test_loops_that_search_stay_loops_and_may_be_left():
+    found = made(sought)
+    assert found.lines == [
+        "age = work[0]", "heard = work[1]", "for attempt in range(1000):", "    while age[i] > ZERO:",
+        "        age[i] = age[i] - attempt", "    if heard[i] > ZERO:", "        return attempt",
+    ]  # fmt: skip
+    assert found.answer == "-1"
+
+
+def test_a_return_that_the_plan_chooses_ends_the_stage():
+    assert made(sought, "kidger/city").answer == "7"
+
+
+def test_a_helper_of_several_statements_stands_in_place_of_its_call():
+    found = made(start.begin, excursion=argument("excursion"))
+    assert any(line.strip() == "free = excursion(s_x, s_y, ZERO, w, edges, spans, corners, obstacles, scene) <= ZERO"
+               for line in found.lines)  # fmt: skip

@@ -4,6 +4,7 @@ import ast
 import math
 import types
 from collections import namedtuple
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from airflock.engine.passes import decide, move, perceive
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import plan_of
-from airflock.engine.stages import gusts, meet, neighbours, noise, receive, surfaces, words
+from airflock.engine.stages import decide as deciding
+from airflock.engine.stages import gusts, meet, neighbours, noise, receive, start, surfaces, words
 from airflock.engine.stages import move as motion
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages.state import Flock
@@ -91,6 +93,8 @@ class World:
             decide.boundaries,
         ):
             make(self.build)
+        decide.decide(self.build)
+        move.begin(self.build)
         move.move(self.build)
         rng, n = np.random.default_rng(seed), 6
         dims = self.plan.dimensions
@@ -103,12 +107,13 @@ class World:
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
         self.whole, self.row = types.SimpleNamespace(**whole), self.tables.row.tolist()
-        self.rest = {name: getattr(self.tables, name) for name in ("faces", "edges", "spans")} | {"scene": ()}
+        self.rest = {name: getattr(self.tables, name) for name in ("faces", "edges", "spans")}
+        self.rest["scene"] = types.SimpleNamespace()
 
     def text(self):
         """The driver's functions as plain Python."""
         held = {name: getattr(words, name) for name in ("real", "integer", "least", "most", "choose")}
-        held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT")}
+        held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT", "AWAY")}
         held |= {name: getattr(random, name) for name in random.PRIMITIVES}
         held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
         held["njit"] = lambda *_, **__: lambda function: function
@@ -124,6 +129,7 @@ class World:
         around = (self.rest[name] for name in perceive.around(self.plan))
         made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], *around)
         made["boundaries"](n, *common, *self.rest.values())
+        made["decide"](step, n, 0.7, *common, None, *list(self.rest.values())[1:])
         state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
         return state
 
@@ -135,11 +141,7 @@ class World:
             self.plan,
             self.plan.model,
         )
-        whole, numbers, at = self.whole, types.SimpleNamespace(), 0
-        for letter, fields in plan.records.items():
-            values = dict(zip(fields, self.row[at : at + len(fields)], strict=True)) | plan.constants.get(letter, {})
-            setattr(numbers, letter, types.SimpleNamespace(**values))
-            at += len(fields)
+        whole, numbers = self.whole, self.numbers()
 
         def take(name):
             if name[0] == "u" and name[1:].isdigit():
@@ -166,12 +168,43 @@ class World:
             images=plan.periodic,
         )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
+        deciding.decide(
+            range(n), flock, numbers, whole, step, 0.7, None, *list(self.rest.values())[1:], None,
+            plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
+        )  # fmt: skip
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
             lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), plan=plan,
         )  # fmt: skip
         return state
+
+    def numbers(self):
+        """Records of numbers as a stage reads them."""
+        found, at = types.SimpleNamespace(wing=None, aero=None), 0
+        for letter, fields in self.plan.records.items():
+            values = dict(zip(fields, self.row[at : at + len(fields)], strict=True))
+            setattr(found, letter, types.SimpleNamespace(**values | self.plan.constants.get(letter, {})))
+            at += len(fields)
+        return found
+
+    def places(self):
+        """Rows with where agents begin: by the text of the driver, and by the stage as it stands."""
+        n, rest = 6, list(self.rest.values())[1:]
+        text, direct = (np.zeros_like(self.state["work"]) for _ in range(2))
+        ended = [self.text()["begin"](n, n, self.row, self.tables.whole.tolist(), text, *rest[:2], None, rest[2])]
+        flock = Flock(lambda name: direct[self.build.row(name)], self.plan.dimensions, words.Itself())
+        far = partial(start.excursion, plan=self.plan)
+        ended += [start.begin(flock, self.numbers(), self.whole, n, n, *rest[:2], None, rest[2], far, plan=self.plan)]
+        return ended, text, direct
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_start_as_it_stands_is_that_of_the_driver_made_of_it(name, seed):
+    (text_ended, ended), text, direct = World(name, seed).places()
+    assert ended == text_ended == 0
+    np.testing.assert_array_equal(direct, text)
+    assert len(np.unique(text[:2], axis=1).T) == 6
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
+from airflock.engine.flight import Flight
 from airflock.errors import RuleError, ScenarioError, StudioError
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
@@ -32,6 +33,13 @@ from airflock.studio.side import Origin, Side, value_of
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
+
+
+@pytest.fixture
+def interpreted(monkeypatch):
+    """Flights are interpreted: compiling them would add nothing to what is tested."""
+    plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
+    monkeypatch.setattr("airflock.studio.side.Flight", plainly)
 
 
 @pytest.fixture
@@ -197,7 +205,7 @@ def test_near_pairs_of_a_periodic_world_are_those_of_the_nearest_image():
 @pytest.mark.parametrize(
     "name", ["vasarhelyi_2018/obstacles", "kidger/city", "couzin_2002/torus", "vicsek_1995/ordered"]
 )
-def test_a_stage_holds_the_flock_and_what_stands_in_its_world(name):
+def test_a_stage_holds_the_flock_and_what_stands_in_its_world(interpreted, name):
     player = Player(name, {"agents": 5})
     position, _ = player.motion
     stage = stage_of(player.scenario, position)
@@ -238,7 +246,7 @@ def test_clusters_are_what_links_between_agents_join(count, distance, periodic, 
 GROUPS = [{"name": "slow", "agents": [0, 3], "model": {"v_flock": 3.0}}, {"name": "rest"}]
 
 
-def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers():
+def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers(interpreted):
     player = Player(PRESET, {**FEW, "groups": GROUPS}, 3)
     player.flight.fault("motor", 5)
     player.fly(30)
@@ -384,7 +392,7 @@ def test_a_gust_blows_for_its_time_and_is_an_event(player):
     assert last.kind == "change" and last.step == began + 50 and last.data == {"wind.east": 0.0, "wind.north": 0.0}
 
 
-def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in():
+def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in(interpreted):
     player = Player("vasarhelyi_2018/obstacles", FEW, 3)
     position, _ = player.motion
     with pytest.raises(StudioError, match="agent 4 is where"):
@@ -400,14 +408,14 @@ def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in():
     assert len(player.scenario.world.obstacles) == before
 
 
-def test_a_goal_of_a_flat_world_is_moved():
+def test_a_goal_of_a_flat_world_is_moved(interpreted):
     goals = {"goals.kind": "points", "goals.points": [[40.0, 0.0, 0.0], [-60.0, 50.0, 0.0]]}
     player = Player(PRESET, {**FEW, **goals}, 1)
     player.move_goal(0, [10.0, -20.0, 0.0])
     np.testing.assert_allclose(player.scenario.waypoints(), [[10.0, -20.0, 0.0], [-60.0, 50.0, 0.0]])
 
 
-def test_a_goal_is_moved_and_the_others_stay():
+def test_a_goal_is_moved_and_the_others_stay(interpreted):
     player = Player("kidger/city", {"agents": 4}, 1)
     before = player.scenario.waypoints()
     player.move_goal(1, [10.0, -20.0, 80.0])
@@ -416,7 +424,7 @@ def test_a_goal_is_moved_and_the_others_stay():
     np.testing.assert_allclose(np.delete(after, 1, 0), np.delete(before, 1, 0), atol=1e-4)
 
 
-def test_what_an_agent_perceives_is_drawn_where_it_is():
+def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
     player = Player("vasarhelyi_2018/real_4ms", {**FEW, "model.r0_rep": 50.0}, 3)
     player.fly(400)
     seen = next(seen for seen in map(player.flight.look, range(12)) if len({any(term) for term in seen.terms}) == 2)
@@ -495,7 +503,7 @@ def test_a_study_in_the_background_searches_around_what_was_set(tmp_path):
         Study(tmp_path / "study", "", {}, "fitness")
 
 
-def test_an_agent_that_left_is_nowhere_and_the_others_fly_on(player):
+def test_an_agent_that_left_is_nowhere_and_the_others_fly_on(interpreted, player):
     player.fly(50)
     before = player.motion[0].copy()
     player.flight.remove(3)
@@ -507,7 +515,7 @@ def test_an_agent_that_left_is_nowhere_and_the_others_fly_on(player):
     assert measures.Pairs(player.motion[0]).nearest() < 300.0
 
 
-def test_a_fault_is_an_event_and_back_takes_it_away(player):
+def test_a_fault_is_an_event_and_back_takes_it_away(interpreted, player):
     player.fly(100)
     player.flight.fault("radio_silent", 2)
     player.fly(150)
@@ -522,7 +530,7 @@ def test_a_fault_is_an_event_and_back_takes_it_away(player):
 
 def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):
     monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: flight.device == "python"))
-    compiled, go = airflock.engine.flight.Flight.compile, threading.Event()
+    compiled, go = Flight.compile, threading.Event()
     monkeypatch.setattr("airflock.engine.flight.Flight.compile", lambda flight: go.wait() and compiled(flight))
     player = Player(PRESET, FEW, 3, at_once=True)
     player.start()

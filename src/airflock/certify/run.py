@@ -2,33 +2,26 @@
 
 import math
 import os
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from airflock.certify.asked import asked, campaign_of, check_options
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import Certificate
 from airflock.certify.counting import Count, Watch, count
-from airflock.certify.flights import Task, score_of
+from airflock.certify.executing import executor_for, folder_of, planned
 from airflock.certify.hazard import Hazard, hazard
-from airflock.certify.limits import read_all
 from airflock.certify.maps import bounds_over, sound_axes
-from airflock.certify.seeds import TOLERANCE, seed
-from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.executors import Executor, Flight
-from airflock.evolve.executors.here import Here
-from airflock.evolve.folder import open_folder, read, sweep, versions, write
+from airflock.evolve.executors import Executor
+from airflock.evolve.folder import open_folder, sweep, versions, write
 from airflock.evolve.run import Interrupted
 from airflock.evolve.store import Store
 from airflock.scenarios import formats
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
-PILOT = 16  # flights that tell how many there is time for
 COUNTED = 2.0 / 3.0  # share of the budget that counting may take where tolerance is asked for
 
 
@@ -137,113 +130,6 @@ def certify(
             executor.close()
 
 
-def campaign_of(
-    scenario: Scenario,
-    limit: str | Sequence[str],
-    confidence: float = 0.95,
-    flights: int | None = None,
-    *,
-    uncertain: bool = False,
-    precision: int = 32,
-    device: str = "cpu",
-) -> Campaign:
-    """The campaign that is asked for. Raises ScenarioError, all faults together."""
-    faults: list[str] = []
-    limits: tuple[Any, ...] = ()
-    try:
-        limits = read_all([limit] if isinstance(limit, str) else list(limit), scenario)
-    except ScenarioError as fault:
-        faults += fault.faults
-    if not 0.5 <= confidence < 1.0:
-        faults.append(f"confidence = {confidence:g} lies outside [0.5, 1); 0.95 is usual")
-    if flights is not None and not 1 <= flights < 1 << 30:
-        faults.append(f"flights = {flights} lies outside [1, {(1 << 30) - 1}]")
-    if precision not in (32, 64):
-        faults.append(f"precision = {precision} is neither 32 nor 64")
-    if device not in ("cpu", "python"):
-        faults.append(f"device = {device!r}: a certificate flies on cpu or python")
-    campaign = Campaign(
-        scenario, limits, confidence, 64 if device == "python" else precision, flights, uncertain, device
-    )
-    if uncertain and not campaign.intervals:
-        faults.append(f"{scenario.name}: no number has an interval; airflock identify --uncertain writes them")
-    if faults:
-        raise ScenarioError(faults)
-    return campaign
-
-
-def asked(campaign: Campaign, tolerance: bool | Sequence[str], split: bool = False) -> tuple[str, ...]:
-    """Keys whose tolerance is asked for; ScenarioError where one cannot be varied, or nothing can be split."""
-    if split:
-        from airflock.certify.branches import refuse
-
-        refuse(campaign)
-    if not tolerance:
-        return ()
-    from airflock.certify.tolerance import sound_keys, usual_keys
-
-    return usual_keys(campaign.scenario) if tolerance is True else sound_keys(campaign.scenario, list(tolerance))
-
-
-def check_options(budget: float, timeout: float | None, scheduler: str | None, device: str) -> None:
-    """Refuse times in which nothing could fly, and a scheduler's workers in plain Python."""
-    if not budget > 0.0:
-        raise StudyError(f"budget = {budget:g} s is not positive")
-    if timeout is not None and not timeout > 0.0:
-        raise StudyError(f"timeout = {timeout:g} s is not positive")
-    if scheduler is not None and device != "cpu":
-        raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
-
-
-@contextmanager
-def folder_of(folder: str | os.PathLike[str] | None) -> Iterator[Path]:
-    """The folder of flights: the one that is given, or one that is gone afterwards."""
-    if folder is not None:
-        yield Path(folder)
-        return
-    with tempfile.TemporaryDirectory(prefix="airflock-certify-") as made:
-        yield Path(made)
-
-
-def executor_for(
-    campaign: Campaign, scheduler: str | None = None, threads: int | None = None, timeout: float | None = None
-) -> Executor:
-    """Who flies: this process, or the workers of a dask scheduler."""
-    if scheduler is not None:
-        from airflock.evolve.executors.cluster import Cluster
-
-        task = Task(campaign.scenario, campaign.limits, campaign.precision)
-        return Cluster(None, scheduler, timeout=timeout, task=task)
-    from airflock.engine.simulate import compile_for, takes_all_cores
-    from airflock.threads import cores
-
-    score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)
-    if campaign.device != "cpu":
-        return Here(score, 1)
-    compile_for(campaign.flown, precision=campaign.precision)
-    return Here(score, 1 if takes_all_cores(campaign.flown) else threads or cores())
-
-
-def planned(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:
-    """The campaign with a number of flights where a limit has no rate: as many as there is time for.
-
-    A few flights on seeds of their own tell how long one takes; the number then stands before the first one counts.
-    """
-    if campaign.flights is not None or all(limit.rate is not None for limit in campaign.limits):
-        return campaign
-    if resume and (folder / f"{FOLDER}.toml").is_file():
-        known = read(folder / f"{FOLDER}.toml").get("flights")
-        return replace(campaign, flights=known if isinstance(known, int) else None)
-    began = time.monotonic()
-    own = [seed(campaign.hash, TOLERANCE, (1 << 29) + i) for i in range(PILOT)]
-    for landed in executor.fly([Flight(0, i, campaign.parameters(s), s) for i, s in enumerate(own)]):
-        if landed.values is None:
-            raise StudyError(f"{campaign.scenario.name}: seed {landed.flight.seed}: {landed.reason}")
-    able = 0.9 * budget * PILOT / max(time.monotonic() - began, 1e-6)
-    digits = 10.0 ** max(0, math.floor(math.log10(max(able, 1.0))) - 1)
-    return replace(campaign, flights=max(1, min(int(able / digits) * int(digits), (1 << 30) - 1)))
-
-
 def run(
     campaign: Campaign,
     folder: Path,
@@ -264,6 +150,10 @@ def run(
     """
     began = time.monotonic()
     where = str(folder / "scenario.toml") if kept else campaign.scenario.name
+
+    def left(share: float = 1.0) -> float:
+        return share * (budget if campaign.flights else max(0.0, budget - (time.monotonic() - began)))
+
     with Store(folder) as store:
         store.begin(versions())
         sweep(folder)
@@ -271,22 +161,16 @@ def run(
         try:
             part = COUNTED if keys or split or axes else 1.0
             counted = count(campaign, store, executor, math.inf if campaign.flights else budget * part, watch)
-            tolerances: Mapping[str, Any] = {}
             rare: Mapping[str, Any] = {}
-
-            def left() -> float:
-                return budget if campaign.flights else max(0.0, budget - (time.monotonic() - began))
-
+            tolerances: Mapping[str, Any] = {}
             if split:
                 from airflock.certify.branches import split as splitting
 
-                rare = splitting(
-                    campaign, store, executor, counted, left() * (0.5 if keys else 1.0), threads, note, where
-                )
+                rare = splitting(campaign, store, executor, counted, left(0.5 if keys else 1.0), threads, note, where)
             if keys:
                 from airflock.certify.tolerance import tolerance
 
-                tolerances = tolerance(campaign, store, executor, counted, keys, left() * (0.5 if axes else 1.0), note)
+                tolerances = tolerance(campaign, store, executor, counted, keys, left(0.5 if axes else 1.0), note)
             cells = bounds_over(campaign, store, executor, axes, left(), note) if axes else {}
         except KeyboardInterrupt as stop:
             told = f"{store.count('count'):,} flights are stored in {folder}; continue with --resume"

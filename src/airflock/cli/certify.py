@@ -15,62 +15,70 @@ from airflock.errors import ScenarioError
 LENGTHS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
+Where = Annotated[
+    str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
+]
+Limits = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--limit", "-l", metavar="LIMIT", show_default=False,
+        help="'r_min<1 at 1e-3/h' (per flock hour), '.../drone-h', 'phi_wall>0 at 1%' (of flights), "
+        "'phi_vel>=3 in 99%'; without a rate: bound it. Repeatable; all hold together.",
+    ),
+]  # fmt: skip
+Budget = Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.")]
+Flights = Annotated[
+    int | None, typer.Option(help="Fly so many and look once, whatever the time.", show_default="by the limit")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", "-o", metavar="FILE.toml", help="Certificate; its flights are kept in FILE_flights beside it."
+    ),
+]
+Tolerance = Annotated[bool, typer.Option("--tolerance", help="Also find how far delay, noise, lag, ... may move.")]
+ToleranceOf = Annotated[
+    list[str] | None,
+    typer.Option("--tolerance-of", metavar="KEY", help="Only of these keys, such as radio.delay; repeatable."),
+]
+Split = Annotated[
+    bool, typer.Option("--split", help="Also estimate r_min limits by splitting: finds and ranks, shows nothing.")
+]
+Map = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="KEY=VALUES", help="Twice: also bounds over a grid, such as radio.delay=0.5:1.5:5."),
+]
+Uncertain = Annotated[
+    bool, typer.Option("--uncertain", help="Draw each flight's numbers from the intervals in the file.")
+]
+Check = Annotated[
+    bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again, compare the bits.")
+]
+Plot = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Bounds, distances and tolerances.")]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")]
+Timeout = Annotated[
+    float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
+]
+Device = Annotated[str, typer.Option(help="cpu, or python (no compiler, for debuggers).")]
+
+
 def certify(
-    scenario: Annotated[
-        str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
-    ],
-    limit: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--limit",
-            "-l",
-            metavar="LIMIT",
-            help="'r_min<1 at 1e-3/h' (per flock hour), '.../drone-h', 'phi_wall>0 at 1%' (of flights), "
-            "'phi_vel>=3 in 99%'; without a rate: bound it. Repeatable; all hold together.",
-            show_default=False,
-        ),
-    ] = None,
+    scenario: Where,
+    limit: Limits = None,
     confidence: Annotated[float, typer.Option(help="Of all limits together.")] = 0.95,
-    budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.")] = "10min",
-    flights: Annotated[
-        int | None, typer.Option(help="Fly so many and look once, whatever the time.", show_default="by the limit")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.toml", help="Certificate; its flights are kept in FILE_flights beside it."
-        ),
-    ] = None,
+    budget: Budget = "10min",
+    flights: Flights = None,
+    out: Out = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue with the flights beside --out.")] = False,
-    tolerance: Annotated[
-        bool, typer.Option("--tolerance", help="Also find how far delay, noise, lag, ... may move.")
-    ] = False,
-    tolerance_of: Annotated[
-        list[str] | None,
-        typer.Option("--tolerance-of", metavar="KEY", help="Only of these keys, such as radio.delay; repeatable."),
-    ] = None,
-    split: Annotated[
-        bool, typer.Option("--split", help="Also estimate r_min limits by splitting: finds and ranks, shows nothing.")
-    ] = False,
-    over: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map", metavar="KEY=VALUES", help="Twice: also bounds over a grid, such as radio.delay=0.5:1.5:5."
-        ),
-    ] = None,
-    uncertain: Annotated[
-        bool, typer.Option("--uncertain", help="Draw each flight's numbers from the intervals in the file.")
-    ] = False,
-    check: Annotated[
-        bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again, compare the bits.")
-    ] = False,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Bounds, distances and tolerances.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")
-    ] = None,
-    timeout: Annotated[
-        float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
-    ] = None,
+    tolerance: Tolerance = False,
+    tolerance_of: ToleranceOf = None,
+    split: Split = False,
+    over: Map = None,
+    uncertain: Uncertain = False,
+    check: Check = False,
+    plot: Plot = None,
+    scheduler: Scheduler = None,
+    timeout: Timeout = None,
     changes: options.Set = None,
     law: options.Law = None,
     trust: options.Trust = False,
@@ -78,7 +86,7 @@ def certify(
     duration: options.Duration = None,
     threads: options.Threads = None,
     precision: options.Precision = 32,
-    device: Annotated[str, typer.Option(help="cpu, or python (no compiler, for debuggers).")] = "cpu",
+    device: Device = "cpu",
     as_json: options.Json = False,
 ) -> None:
     """Show that an event is rare: exact bounds, seeds fixed beforehand, every look paid for.
@@ -90,17 +98,14 @@ def certify(
     if check:
         _check(scenario, threads, trust, as_json)
         return
-    from airflock.certify.campaign import FOLDER
+    from airflock.certify.asked import asked, campaign_of, check_options
     from airflock.certify.maps import sound_axes
-    from airflock.certify.run import asked, campaign_of, check_options, executor_for, folder_of, planned, run
     from airflock.cli.sweep import axis
-    from airflock.evolve.folder import open_folder
     from airflock.scenarios.files import load
 
     faults: list[str] = []
     seconds, campaign = 1.0, None
-    keys: tuple[str, ...] = ()
-    axes: dict[str, list[float]] = {}
+    also: dict[str, Any] = {}
     with options.gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
     with options.gathering(faults):
@@ -109,8 +114,8 @@ def certify(
         found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
         campaign = campaign_of(found, limit or [], confidence, flights, **how)
-        keys = asked(campaign, tolerance_of or tolerance, split)
-        axes = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
+        also = {"keys": asked(campaign, tolerance_of or tolerance, split), "split": split}
+        also["axes"] = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
     with options.gathering(faults):
         check_options(seconds, timeout, scheduler, device)
     if resume and out is None:
@@ -121,19 +126,35 @@ def certify(
         tables.say(f"note: {text}")
     if scheduler is None:
         options.compile_aloud(campaign.flown, precision, device)
+    flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
+    _end(_flown(campaign, seconds, out, resume, flying, also, quiet=as_json), out, plot, as_json)
+
+
+def _flown(
+    campaign: Any, seconds: float, out: Path | None, resume: bool, flying: dict[str, Any], also: dict[str, Any], *,
+    quiet: bool,
+) -> Any:  # fmt: skip
+    """Fly a campaign, in the folder beside `out` or one that is gone afterwards; its certificate.
+
+    flying : scheduler, threads and timeout; also: what is asked for besides counting
+    """
+    from airflock.certify.campaign import FOLDER
+    from airflock.certify.executing import executor_for, folder_of, planned
+    from airflock.certify.run import run
+    from airflock.evolve.folder import open_folder
+
     with folder_of(None if out is None else out.parent / f"{out.stem}_flights") as folder:
-        executor = executor_for(campaign, scheduler, threads, timeout)
+        executor = executor_for(campaign, **flying)
         try:
             campaign = planned(campaign, executor, seconds, folder, resume)
             open_folder(folder, campaign, resume=resume, kind=FOLDER)
-            with counting(as_json) as (watch, note):
-                made = run(
-                    campaign, folder, executor, seconds, watch, keys=keys, split=split, axes=axes, threads=threads,
-                    note=note, kept=out is not None,
+            with counting(quiet) as (watch, note):
+                return run(
+                    campaign, folder, executor, seconds, watch, **also, threads=flying["threads"], note=note,
+                    kept=out is not None,
                 )  # fmt: skip
         finally:
             executor.close()
-    _end(made, out, plot, as_json)
 
 
 def _end(made: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
@@ -150,7 +171,9 @@ def _end(made: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
     if as_json:
         tables.emit_json({**made.document(), "seconds": made.seconds})
     else:
-        _print(made)
+        from airflock.cli.certificate import show
+
+        show(made)
     if not made.shown:
         raise typer.Exit(1)
 
@@ -189,98 +212,6 @@ def counting(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
             bar.update(task, description=text, total=None)
 
         yield watch, note
-
-
-def _print(made: Any) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    from airflock.certify.certificate import NOT_SAID, bound
-
-    campaign = made.campaign
-    sure = f"{100.0 * campaign.confidence:g} %"
-    title = f"{campaign.scenario.name}: {len(made.rows):,} flights of {campaign.scenario.flight.duration:g} s"
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    for name in ("limit", "events", "flights", f"at most ({sure})", "verdict"):
-        table.add_column(name, justify="right" if name in ("events", "flights") else "left")
-    for verdict in made.verdicts:
-        said = "shown" if verdict.shown else "refuted" if verdict.refuted else "not shown"
-        table.add_row(verdict.limit.text, f"{verdict.events:,}", f"{verdict.flights:,}", bound(campaign, verdict), said)
-    console = Console()
-    console.print(table)
-    for text in made.statements:
-        console.print(text, highlight=False, markup=False, soft_wrap=True)
-    for i, found in made.hazards.items():
-        if found.events:
-            line = (
-                f"{campaign.limits[i].event}: {found.early} of {found.events} first events in the first half of flights"
-            )
-            console.print(
-                f"{line}, {100.0 * found.expected:.0f} % if even: {found.verdict}", highlight=False, soft_wrap=True
-            )
-    _worst(console, made)
-    _tolerances(console, made.tolerance)
-    _map(console, made.over)
-    for text in made.splitting.get("statements", ()):
-        console.print(text, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"Not said: {'; '.join(NOT_SAID)}.", highlight=False, markup=False, style="dim", soft_wrap=True)
-
-
-def _worst(console: Any, made: Any) -> None:
-    shown: set[str] = set()
-    for entry in made.worst:
-        if entry["limit"] in shown:
-            continue
-        shown.add(entry["limit"])
-        line = f"worst for {entry['limit']}: {tables.number(entry['value'])}"
-        moment = f" before {entry['first']:.0f} s" if "first" in entry else ""
-        console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False, soft_wrap=True)
-
-
-def _tolerances(console: Any, found: Any) -> None:
-    if not found:
-        return
-    from rich import box
-    from rich.table import Table
-
-    if "reason" in found:
-        console.print(f"tolerance: {found['reason']}", highlight=False, markup=False, soft_wrap=True)
-        return
-    title = (
-        f"safe: fewer than {100.0 * found['level']:g} % of flights with an event ({100.0 * found['confidence']:g} %)"
-    )
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
-        table.add_column(name, justify="left" if name in ("number", "") else "right")
-    for axis in found["axis"]:
-        bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
-        table.add_row(
-            axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}", bad,
-            f"{axis['flights']:,}", axis.get("note", ""),
-        )  # fmt: skip
-    console.print(table)
-
-
-def _map(console: Any, found: Any) -> None:
-    """Upper bounds in percent of flights, first key downwards, second across."""
-    if not found:
-        return
-    from rich import box
-    from rich.table import Table
-
-    (down, across), (rows, columns) = found["keys"], found["axes"]
-    title = f"at most so many % of flights with an event; * safe, below {100.0 * found['level']:g} %"
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
-    table.add_column(f"{down} / {across}", style="bold")
-    for value in columns:
-        table.add_column(f"{value:g}", justify="right")
-    cells = iter(found["cell"])
-    for value in rows:
-        row = [next(cells) for _ in columns]
-        told = [f"{100.0 * cell['high']:.3g}{'*' if cell['verdict'] == 'safe' else ''}" for cell in row]
-        table.add_row(f"{value:g}", *told)
-    console.print(table)
 
 
 def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:

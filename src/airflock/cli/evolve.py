@@ -22,6 +22,10 @@ def evolve(
         str | None,
         typer.Option(help="whole, or growing: from an eighth of a flight up to whole ones.", show_default="whole"),
     ] = None,
+    racing: Annotated[
+        bool,
+        typer.Option("--racing", help="Of several --seeds: who cannot reach the better half does not fly on."),
+    ] = False,
     start: Annotated[
         str | None,
         typer.Option(help="Where CMA-ES starts: middle of all ranges, or scenario (warm).", show_default="middle"),
@@ -68,6 +72,7 @@ def evolve(
         "seed": seed,
         "restarts": restarts,
         "flights": flights,
+        **({"racing": "optimistic", "random_numbers": "generation"} if racing else {}),
         "start": start,
         "averages": averages,
     }

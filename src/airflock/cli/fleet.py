@@ -27,8 +27,14 @@ def fleet(
         str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
     ] = None,
     silence: Annotated[
-        bool, typer.Option("--silence/--no-silence", help="Stop while a neighbour that is lost could be near.")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--silence/--no-silence",
+            show_default=False,
+            help="Stop while a neighbour that is lost could be near; by default yes, but beside the simulator as its "
+            "silence.rule says.",
+        ),
+    ] = None,
     ground: Annotated[
         bool, typer.Option("--ground", help="Take off, gather, flock, return and land, instead of starting in the air.")
     ] = False,
@@ -39,7 +45,7 @@ def fleet(
 
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
     """
-    from airflock.fleet import compare
+    from airflock.fleet import compare, individuals
     from airflock.fleet.faults import read_faults
     from airflock.recordings.scores import measure
     from airflock.scenarios.files import load
@@ -57,7 +63,10 @@ def fleet(
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
     operator = _operator(ground)
-    card = compare.software_card(found, vehicle=vehicle, operator=operator[1], silent=silence and against is None)
+    options.refuse(individuals.refused(found))
+    stops = True if silence is None and not against else silence
+    given: dict[str, Any] = {"vehicle": vehicle, "operator": operator[1], "silent": stops}
+    card = compare.software_card(found, **given, seed=first_seed)
     broken = read_faults(faults, card.members) if faults else ()
     rows: list[dict[str, Any]] = []
     beside: list[dict[str, Any]] = []
@@ -65,6 +74,7 @@ def fleet(
     ticks = seeds * (int(found.flight.duration) + (12 if ground else 0))
     with options.progress(f"{found.name}: fleet", ticks, quiet=as_json) as done:
         for seed in range(first_seed, first_seed + seeds):
+            card = compare.software_card(found, **given, seed=seed) if found.varied else card
             flown = compare.fly(found, card, seed, faults=broken, ground=ground, operator=operator[0], done=done)
             if against:
                 simulated, measured = compare.both(found, flown)

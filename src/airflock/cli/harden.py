@@ -42,45 +42,67 @@ def harden(
 
     Example: airflock harden study --out flyable.toml
     """
-    from airflock.evolve.after import BEST, further_best
-    from airflock.evolve.again import cautious, evolved_again, stricter
     from airflock.evolve.folder import write
-    from airflock.evolve.harden import document, harden
-    from airflock.scenarios.files import load
+    from airflock.evolve.harden import document
 
-    path = Path(scenario) / BEST if Path(scenario).is_dir() else scenario
-    settings = options.settings(changes, None, duration)
-    found = load(path, settings, trust=trust)
-    others = [load(each, settings, trust=trust) for each in further_best(Path(scenario))]
-    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(others) + 2))]
+    faults: list[str] = []
+    found: list[Any] = []
+    with options.gathering(faults):
+        found = _optima(scenario, options.settings(changes, None, duration), trust)
+    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(found) + 1))]
     for place in places:
-        options.writable((place, SCENARIOS))
+        with options.gathering(faults):
+            options.writable((place, SCENARIOS))
+    again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:
-            raise ScenarioError([f"{name} {factor:g} lies outside [1, 100]"])
-    if others and (r_coll is not None or delay is not None):
-        raise ScenarioError([f"{scenario}: is a study of {1 + len(others)} scenarios; --r-coll and --delay take one"])
+            faults.append(f"{name} {factor:g} lies outside [1, 100]")
+    if again and len(found) > 1:
+        faults.append(f"{scenario}: is a study of {len(found)} scenarios; --r-coll and --delay take one")
+    options.refuse(faults)
     numbers = range(first_seed, first_seed + seeds)
-    if r_coll is not None or delay is not None:
-        settings = cautious(found, r_coll or 1.0, delay or 1.0)
-        study = stricter(found, _space(scenario, found), settings, {"generations": generations})
-        folder = out.parent / f"{out.stem}_study"
-        with options.searching(study, quiet=as_json) as (watch, note):
-            steps = evolved_again(found, study, settings, folder, numbers, threads, watch, note)
+    if again:
+        stricter = (r_coll or 1.0, delay or 1.0)
+        steps = _evolved_again(scenario, found[0], stricter, generations, out, numbers, threads, as_json)
     else:
-        with options.progress(f"{scenario}: flights", 15 * seeds * (1 + len(others)), quiet=as_json) as done:  # at most
-            steps = harden([found, *others], numbers, cost=cost, threads=threads, done=done)
-    for each, place in zip((found, *others), places, strict=True):
+        from airflock.evolve.harden import harden
+
+        with options.progress(f"{scenario}: flights", 15 * seeds * len(found), quiet=as_json) as done:  # at most
+            steps = harden(found, numbers, cost=cost, threads=threads, done=done)
+    for each, place in zip(found, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
-        tables.emit_json(
-            {"scenario": found.name, "seeds": seeds, "out": str(out), "steps": [s.as_dict() for s in steps]}
-        )
+        told = [step.as_dict() for step in steps]
+        tables.emit_json({"scenario": found[0].name, "seeds": seeds, "out": str(out), "steps": told})
     else:
-        _print(found.name, steps, seeds)
+        _print(found[0].name, steps, seeds)
         tables.say(f"saved {', '.join(map(str, places))}")
     if not steps[-1].kept:
         raise typer.Exit(1)
+
+
+def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
+    """The optimum, or that of each scenario of a study's folder."""
+    from airflock.evolve.after import BEST, further_best
+    from airflock.scenarios.files import load
+
+    folder = Path(where)
+    files = [folder / BEST, *further_best(folder)] if folder.is_dir() else [where]
+    return [load(path, settings, trust=trust) for path in files]
+
+
+def _evolved_again(
+    where: str, found: Any, factors: tuple[float, float], generations: int, out: Path, numbers: range,
+    threads: int | None, quiet: bool,
+) -> list[Any]:  # fmt: skip
+    """Workaround (i): the optimum, and what is evolved with a larger radius of collision and a longer delay."""
+    from airflock.evolve.again import cautious, evolved_again, stricter
+
+    settings = cautious(found, *factors)
+    study = stricter(found, _space(where, found), settings, {"generations": generations})
+    folder = out.parent / f"{out.stem}_study"
+    with options.searching(study, quiet=quiet) as (watch, note):
+        return evolved_again(found, study, settings, folder, numbers, threads, watch, note)
 
 
 def _space(where: str, scenario: Any) -> Any:

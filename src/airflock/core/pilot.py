@@ -13,7 +13,7 @@ from airflock.core.agent import Decision, Heard, State, answer, decide, first_me
 from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import could_be_near
+from airflock.core.silence import back, complete, could_be_near
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
@@ -136,7 +136,7 @@ class Pilot:
     index    : own index in the flock; period : between two decisions, s
     hearing  : what is done with neighbours' data
     body, b  : of a law that commands an acceleration or a heading: what turns it into a velocity
-    silence  : the rule for neighbours that are lost; None: they are forgotten, as in a simulation without it
+    silence  : the rule for neighbours that are lost; None, or one that flies on: they are forgotten
     flat     : fly in a plane: every z is zero
     seed     : of the random numbers that a law may ask for
     wing, aero : parameters of the wing and of drag descent, for laws that ask for them
@@ -152,10 +152,13 @@ class Pilot:
         wing: Any = None, aero: Any = None, told: bool = False, topology: Topology | None = None, t: Any = None,
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
-        self.hearing, self.silence, self.flat, self.seed = hearing or Hearing(), silence, flat, seed
+        self.hearing, self.flat, self.seed = hearing or Hearing(), flat, seed
+        speed = float(model.preferred_speed(p)) if model.preferred_speed is not None else 0.0
+        self.silence = complete(silence, speed) if silence is not None and silence.rule == "stop" else None
         self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
         self.topology, self.t = topology, t
         self.memory = first_memory(model)
+        self.stopped: Vector | None = None
         self.packets: dict[int, Packet] = {}
         self.decisions = 0
         self.senses: Percept | None = None
@@ -218,12 +221,21 @@ class Pilot:
                 return True
         return False
 
+    def stay(self, own: State, now: float) -> Vector | None:
+        """Velocity (m/s) that keeps it where it stopped for a neighbour that it has lost; None while nobody is lost."""
+        if self.silence is None or not self.lost_near(own, now):
+            self.stopped = None
+            return None
+        x, y, z = self.stopped = self.stopped or own[:3]
+        vx, vy, vz = back(x - own.x, y - own.y, z - own.z, self.silence)
+        return vx, vy, vz
+
     def decide(
         self, own: State, now: float, percept: Percept | None = None, goal: Vector | None = None, *,
         time: float | None = None, only: Container[int] | None = None, shared: Any = None,
         fades: Mapping[int, float] | None = None,
     ) -> Decision:  # fmt: skip
-        """The law's command from the own state as measured, and its new memory; zero where `silence` stops a velocity.
+        """The law's command from the own state as measured, and its new memory; or what keeps it where it stopped.
 
         now     : by the own clock, s
         percept : of a real range finder; without it the map answers
@@ -246,8 +258,8 @@ class Pilot:
         made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
         self.memory = made.memory
-        stops = self.model.command == "velocity" and self.lost_near(own, now)
-        x, y, z = STILL if stops else made.command
+        stays = self.stay(own, now) if self.model.command == "velocity" else None
+        x, y, z = made.command if stays is None else stays
         return Decision((x, y, 0.0) if self.flat else (x, y, z), made.memory)
 
     def _decided(
@@ -260,13 +272,12 @@ class Pilot:
         )  # fmt: skip
 
     def steer(self, own: State, now: float, goal: Vector | None = None) -> Vector:
-        """Velocity (m/s) to ask an autopilot for: what the law decides now, through its body; zero where it stops."""
+        """Velocity (m/s) to ask an autopilot for: what the law decides now, through its body."""
         made = self.decide(own, now, goal=goal)
         if self.flat:
             own = level(own)
-        if self.model.command != "velocity" and self.lost_near(own, now):
-            return STILL
-        x, y, z = self.setpoint(own, made.command)
+        stays = self.stay(own, now)
+        x, y, z = self.setpoint(own, made.command) if stays is None else stays
         return (x, y, 0.0) if self.flat else (x, y, z)
 
     def setpoint(self, own: State, command: Vector) -> Vector:

@@ -79,8 +79,8 @@ class Remembering:
         return getattr(self._context, name)
 
     def resolve_function_type(self, function: Any, given: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """Signature of a call."""
-        if named or not isinstance(function, types.Function):
+        """Signature of a call. Only a function of the driver's own is asked each time: that has it compiled."""
+        if named or isinstance(function, (types.Dispatcher, types.RecursiveCall)):
             return self._context.resolve_function_type(function, given, named)
         key = self._context, function, given
         if key not in self._known:
@@ -117,8 +117,6 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
     def define_pipelines(self) -> list[Any]:
         """Numba's passes, with those of this file in their places."""
         found = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        if self.state.flags.auto_parallel.enabled:
-            return [found]
         inner = self.state.flags.no_cpython_wrapper
         other = {NopythonTypeInference: Typing, NativeLowering: InlinedLowering if inner else NativeLowering}
         made = PassManager("driver")

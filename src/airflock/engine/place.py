@@ -1,7 +1,6 @@
 """Place: the world around one agent in plain Python, its edges and what appears in it, and goals, outside a driver."""
 
 import math
-from copy import copy
 from typing import Any
 
 from airflock.core.agent import State, answer
@@ -33,12 +32,6 @@ class Place(Map):
     def shapes(self) -> Any:
         """Rows of all shapes, as they stand now."""
         return self._scene[0]
-
-    def seen(self, look: float) -> "Place":
-        """The same world, shapes that appear and all, for an agent to whom shapes say something up to `look`, m."""
-        found = copy(self)
-        found._look = look
-        return found
 
     def roomy(self, x: float, y: float, z: float) -> bool:
         """Whether an agent may start here: inside the arena, at start.clearance from what stands in the scene."""

@@ -59,6 +59,7 @@ class Plan:
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
+    silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
@@ -90,6 +91,7 @@ class Plan:
     delayed: bool = True
     lossy: bool = False
     links: bool = False
+    silent: bool = False
     windy: bool = False
     dryden: bool = False
     obstacles: bool = False
@@ -154,6 +156,11 @@ class Plan:
     def perturbed(self) -> bool:
         """Whether distances as perceived are not the true ones, which decide who is in range."""
         return self.told or self.believes or self.links or bool(self.suffers("radio"))
+
+    @property
+    def packets(self) -> bool:
+        """Whether agents keep the last packet of each other one."""
+        return self.links or self.silent
 
     @property
     def hides(self) -> bool:

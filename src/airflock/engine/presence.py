@@ -66,7 +66,7 @@ def _set(state: "State", here: int) -> None:
     for c, axis in enumerate(plan.axes):
         work[rows[axis], lanes] = AWAY
         state.arrays["past"][:, c, lanes] = AWAY
-    if plan.links:
+    if plan.packets:
         for part in (state.arrays["store"][lanes], state.arrays["store"][:, :, lanes]):
             part[...] = 0.0
         state.arrays["store"][lanes, -1] = state.arrays["store"][:, -1, lanes] = NEVER
@@ -84,6 +84,6 @@ def _put(state: "State", places: list[int]) -> None:
     arrays: dict[str, Any] = state.arrays
     for name in ("work", "past", "mem", "memory"):
         arrays[name][..., : state.agents] = arrays[name][..., at]
-    if state.plan.links:
+    if state.plan.packets:
         arrays["store"][...] = arrays["store"][at]
         arrays["store"][..., : state.agents] = arrays["store"][..., at]

@@ -76,6 +76,7 @@ def plan_of(
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
         topology=scenario.meets if scenario.model.neighbour is not None else None,
@@ -330,6 +331,7 @@ def _pays(scenario: Scenario) -> bool:
         and perfect
         and _by_cells(scenario)
         and scenario.radio.kind == "constant"
+        and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
         and not any(letter == "p" for letter, _ in scenario.varied)

@@ -14,9 +14,9 @@ from airflock.engine.beginnings import NEVER, beginning, memories
 from airflock.engine.onsets import Onset, strike
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
-from airflock.engine.passes.scene import NEAR
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
+from airflock.engine.stages.decide import NEAR
 from airflock.engine.stages.state import own_row
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached, samples, sums_of
@@ -312,7 +312,7 @@ def _layout(
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
     m, dims = lanes(agents), plan.dimensions
     label = np.int32 if plan.bits == 32 else np.int64
-    packets = (agents, 2 * dims + 1, m) if plan.links else (1, 2 * dims + 1, 1)
+    packets = (agents, 2 * dims + 1, m) if plan.packets else (1, 2 * dims + 1, 1)
     values, sums = sums_of(plan)
     beginnings = {
         "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,

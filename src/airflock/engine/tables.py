@@ -101,7 +101,7 @@ def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
     a, records = scenario.wind, scenario.records | {"metrics": scenario.measured_by()}
     derived = {
         "w": geometry(scenario), "c": Clock(scenario.flight.dt, period), "air": dryden.numbers_of(a),
-        "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time),
+        "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time), "silence": scenario.silent_by(),
     }  # fmt: skip
     return {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
 

@@ -17,6 +17,7 @@ from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
+from airflock.evolve.racing import still_needed
 from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
@@ -45,6 +46,7 @@ class Progress:
 
 
 Watch = Callable[[Progress], None]
+Flown = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
 
 
 @dataclass
@@ -111,7 +113,10 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
         tally.run, tally.generation = run, generation
         batch = Batch("search", run, generation)
         points = _asked(store, batch, state.ask())
-        rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share)
+        begun = tally.done
+        racing = study.search.racing == "optimistic"
+        rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share, racing=racing)
+        tally.total -= len(points) * study.whole("seeds") * len(study.scenarios) - (tally.done - begun)
         state.tell(points, losses(rows, study.objectives))
         values = [row[0] for row in rows]
         centre = state.centre()
@@ -168,6 +173,7 @@ def evaluate(
     seeds: Sequence[Sequence[int]] | None = None,
     parameters: Sequence[Mapping[str, float]] | None = None,
     share: float = 1.0,
+    racing: bool = False,
 ) -> list[list[float | None]]:
     """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
 
@@ -175,23 +181,47 @@ def evaluate(
     seeds : (candidate, repeat); by default those of the search
     parameters : of each candidate; by default those of its point
     share : of the scenarios' duration that is flown
+    racing : whether seeds are flown in turn, and no further by candidates that cannot reach the better half
     """
     given = [study.space.parameters(point) for point in points] if parameters is None else parameters
     numbers = _seeds(study, batch, len(points)) if seeds is None else seeds
     places = [_shortened(scenario, share) for scenario in study.scenarios]
     store.ask(batch, points.tolist(), [{**each, **places[0]} for each in given])
-    flown: dict[tuple[int, int], Mapping[str, Any] | None] = store.flown(batch)
+    flown: Flown = store.flown(batch)
     if note:
         for _ in flown:
             note(False)
-    n = len(places)
-    missing = [
-        Flight(i, j * n + k, {**given[i], **shorter}, seed, k)
+    n, last = len(places), max(len(row) for row in numbers)
+    alive = list(range(len(given)))
+    for seen in range(1, last + 1) if racing else [last]:
+        missing = [
+            Flight(i, j * n + k, {**given[i], **shorter}, seed, k)
+            for i in alive
+            for j, seed in enumerate(numbers[i][:seen])
+            for k, shorter in enumerate(places)
+            if (i, j * n + k) not in flown
+        ]
+        _fly(study, store, executor, batch, missing, flown, note)
+        if seen < last:
+            alive = _still_needed(study, flown, alive, seen, last)
+    rows = [
+        [fitness_of(study, o, [flown[i, r] for r in range(len(row) * n) if (i, r) in flown]) for o in study.objectives]
         for i, row in enumerate(numbers)
-        for j, seed in enumerate(row)
-        for k, shorter in enumerate(places)
-        if (i, j * n + k) not in flown
     ]
+    store.tell(batch, rows)
+    return rows
+
+
+def _fly(
+    study: Study,
+    store: Store,
+    executor: Executor,
+    batch: Batch,
+    missing: Sequence[Flight],
+    flown: Flown,
+    note: Callable[[bool], None] | None,
+) -> None:
+    """Fly what is missing; each flight is stored and known as soon as it lands."""
     for landed in executor.fly(missing):
         store.land(batch, landed)
         if landed.values is not None and all(values is None for values in flown.values()):
@@ -200,12 +230,21 @@ def evaluate(
         flown[landed.flight.candidate, landed.flight.repeat] = landed.values
         if note:
             note(True)
-    rows = [
-        [fitness_of(study, o, [flown[i, j] for j in range(len(row) * n)]) for o in study.objectives]
-        for i, row in enumerate(numbers)
+
+
+def _still_needed(study: Study, flown: Flown, alive: Sequence[int], seen: int, last: int) -> list[int]:
+    """Candidates that fly on after `seen` of `last` seeds; later flights that are stored already do not count."""
+    first, n = study.objectives[0], len(study.scenarios)
+    candidates = 1 + max(i for i, _ in flown)
+    values = [
+        [
+            fitness_of(study, first, [flown[i, j * n + k] for k in range(n)])
+            for j in range(seen)
+            if all((i, j * n + k) in flown for k in range(n))
+        ]
+        for i in range(candidates)
     ]
-    store.tell(batch, rows)
-    return rows
+    return still_needed(values, alive, last - seen, first.maximise)
 
 
 def fitness_of(study: Study, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:

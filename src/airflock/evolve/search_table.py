@@ -1,9 +1,11 @@
 """The table [search] of a study file: which algorithm, how many flights, how long, from where; and what cannot be."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
+from airflock.evolve.fitness import Objective
 from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
 from airflock.evolve.space import Space
 
@@ -32,6 +34,12 @@ class Search(Record):
         ("fresh", "generation", "study"),
         source="our choice",
         meaning="flights' seeds: new for each candidate, common to a generation, or common to the whole study",
+    )
+    racing: str = choice(
+        "none",
+        ("none", "optimistic"),
+        source="our choice; docs/decisions/0072",
+        meaning="whether candidates of several seeds that cannot reach the better half of a generation fly on",
     )
     restarts: float = quantity(
         0, "1", low=0, high=1000, source="our choice", meaning="independent further runs after the first"
@@ -83,24 +91,26 @@ class Search(Record):
     )
 
 
-def search_faults(search: Search, objectives: int, space: Space | None) -> list[str]:
+def search_faults(
+    search: Search, objectives: Sequence[Objective], space: Space | None, over_scenarios: str
+) -> list[str]:
     """What of a search cannot be, one line each; `space` as far as it could be read."""
     faults = [
         f"search.{name} = {value:g} is not a whole number"
         for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds", "averages")
         if (value := getattr(search, name)) != int(value)
     ]
-    if search.algorithm in SEVERAL and objectives < 2:
+    if search.algorithm in SEVERAL and len(objectives) < 2:
         faults.append(
             f"search.algorithm = '{search.algorithm}' is for several objectives, but there is one; "
             "give objective.maximise a list"
         )
-    if search.algorithm not in SEVERAL and objectives > 1:
+    if search.algorithm not in SEVERAL and len(objectives) > 1:
         faults.append(
-            f"search.algorithm = '{search.algorithm}' takes one objective, but there are {objectives}; "
+            f"search.algorithm = '{search.algorithm}' takes one objective, but there are {len(objectives)}; "
             f"give one, or search.algorithm = 'nsga2'"
         )
-    faults += _only_cmaes(search)
+    faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
     if search.flights == "growing":
         if search.generations < FEWEST:
             faults.append(
@@ -125,9 +135,23 @@ def _only_cmaes(search: Search) -> list[str]:
     if search.algorithm == "cmaes":
         return []
     usual, found = Search(), []
-    for name in ("flights", "start", "spread", "averages"):
+    for name in ("flights", "racing", "start", "spread", "averages"):
         value = getattr(search, name)
         if value != getattr(usual, name):
             shown = repr(value) if isinstance(value, str) else f"{value:g}"
             found.append(f"search.{name} = {shown} is for algorithm cmaes, but search.algorithm = '{search.algorithm}'")
     return found
+
+
+def _racing_faults(search: Search, objectives: Sequence[Objective], over_scenarios: str) -> list[str]:
+    """Why candidates of this search cannot race."""
+    if search.racing == "none":
+        return []
+    faults = []
+    if search.seeds < 2:
+        faults.append("search.racing needs at least 2 flights of a candidate; give search.seeds = 4, for instance")
+    if search.random_numbers == "fresh":
+        faults.append("search.racing needs common seeds; give search.random_numbers = 'generation'")
+    if any(objective.over_seeds != "mean" for objective in objectives) or over_scenarios != "mean":
+        faults.append("search.racing compares means; leave over_seeds and over_scenarios at 'mean'")
+    return faults

@@ -150,11 +150,11 @@ def with_parameters(scenario: Scenario, parameters: Mapping[str, float]) -> Scen
 
 
 def declared(scenario: Scenario) -> dict[str, tuple[Quantity, float | None]]:
-    """Key → declaration and present value of every number of a scenario; drag descent's only where it is flown."""
+    """Key → declaration and present value of every number of a scenario; of drag descent and silence where they fly."""
     return {
         f"{section}.{name}".lstrip("."): (how, getattr(record, name))
         for section, record in scenario.records.items()
-        if section != "aero" or scenario.descends
+        if (section != "aero" or scenario.descends) and (section != "silence" or scenario.silence.rule == "stop")
         for name, how, _ in declarations(record)
         if isinstance(how, Quantity)
     }

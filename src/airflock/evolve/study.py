@@ -204,7 +204,7 @@ def make_study(
         found, more = schema.check("search", table, Search)
     faults += more
     if found is not None:
-        faults += search_faults(found, len(objectives), space)
+        faults += search_faults(found, objectives, space, str(over))
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     return Study(

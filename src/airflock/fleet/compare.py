@@ -27,10 +27,14 @@ KEPT = ("x", "y", "z")
 
 
 def software_card(
-    scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", silent: bool = True, margin: float = 40.0,
-    as_simulated: bool = True,
+    scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", silent: bool | None = None,
+    margin: float = 40.0, as_simulated: bool = True, seed: int = 0,
 ) -> Card:  # fmt: skip
-    """Card of a fleet in software: one tick and one packet per decision, as the simulated agents."""
+    """Card of a fleet in software: one tick and one packet per decision, as the simulated agents.
+
+    silent : whether the rule of silence stops a drone; by default where the scenario says so
+    seed   : of the tolerances of manufacture that groups have
+    """
     period = min(max(scenario.sensors.period or scenario.flight.dt, 0.02), 0.2)
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
@@ -39,7 +43,7 @@ def software_card(
         limits["climb_max"] = min(limits_of(scenario).speed_max, 10.0)  # the law climbs as fast as it flies
     made = card_document(
         scenario, site=SITE, members=members, mission=1, expires=EXPIRES, operator=operator, autopilot=vehicle,
-        margin=margin, as_simulated=as_simulated, silent=silent,
+        margin=margin, as_simulated=as_simulated, silent=silent, seed=seed,
         safety=limits,
     )  # fmt: skip
     return card_of({**made, "hash": hash_of(made)})

@@ -7,7 +7,7 @@ fleet whose packets arrive once per decision loses the very packets that the sim
 import heapq
 import math
 import random as dice
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from airflock.body import radio
 from airflock.core import random
@@ -21,12 +21,15 @@ class Ether:
     """Datagrams between the members of a fleet.
 
     k : parameters of the radio; members: system ids; period: s between two packets of a drone
+    reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
-        self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = ()
-    ):
+        self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
+        reach: Callable[[int, int, float], float] | None = None,
+    ):  # fmt: skip
         self._k, self._members, self._seed, self._period, self._faults = k, list(members), seed, period, faults
+        self._reach = reach
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
@@ -65,6 +68,8 @@ class Ether:
         """Whether a packet over this distance (m) gets through."""
         k, pair = self._k, to * len(self._members) + who
         if distance > k.range or self._cut(now, who, to):
+            return False
+        if self._reach is not None and distance > self._reach(who, to, now):
             return False
         if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
             return False

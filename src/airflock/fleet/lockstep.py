@@ -18,6 +18,7 @@ from airflock.core.parameters import number_names
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
+from airflock.fleet.individuals import Faults, records_of
 from airflock.fleet.vehicle import OURS, PILOT, Vehicle
 from airflock.mavlink import orders
 from airflock.mavlink.coordinates import Geodetic
@@ -51,13 +52,16 @@ class Fleet:
         self._every = max(1, round(card.period / self._dt))
         self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.stamps, self.log = 0, [], [], []  # type: ignore[var-annotated]
+        self._befalls = befalls = Faults(scenario, seed)
+        self._bodies = [b for _, b in records_of(scenario, len(card.members), seed)]
         self._noise = OuterNoise(seed, len(card.members), not card.flat)
         self.vehicles = [self._vehicle(i) for i in range(len(card.members))]
         self.nodes = [
             Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
             for who in card.members
         ]  # fmt: skip
-        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults)
+        reach = befalls.reach if befalls else None
+        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach)
         self._errors = [State(*(0.0,) * 6)] * len(card.members)
         self._given = 0
         self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
@@ -69,12 +73,13 @@ class Fleet:
 
     def _vehicle(self, i: int) -> Vehicle:
         """A vehicle on the ground; grounds are a row of places 4 m apart."""
-        card, b = self.card, self.scenario.body
+        card, b = self.card, self._bodies[i]
         side = max(1, round(len(card.members) ** 0.5))
         at = (4.0 * (i % side) - 2.0 * (side - 1), 4.0 * (i // side) - 2.0 * (side - 1), 0.0)
         noisy = "noise" in number_names(b) and b.noise > 0.0
         draw = partial(self._noise, drone=i) if noisy else lambda step: (0.0, 0.0, 0.0)
         made = Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
+        made.faults, made.place = self._befalls or None, i
         made.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
         return made
 
@@ -128,6 +133,8 @@ class Fleet:
 
     def _step(self) -> None:
         now = self.now
+        if self._befalls:
+            self._befalls.strike(self.steps, [v.state for v in self.vehicles], [v.target for v in self.vehicles])
         if self.steps % self._tick == 0:
             self._exchange(now)
         if self.steps % self._every == 0:

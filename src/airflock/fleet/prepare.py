@@ -9,8 +9,9 @@ from shapely.geometry import Polygon
 
 from airflock.body.motion import Parameters as Multirotor
 from airflock.core.parameters import Parameters
-from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import complete
 from airflock.errors import CardError
+from airflock.fleet.individuals import records_of
 from airflock.onboard.card import VERSION
 from airflock.onboard.safety import Safety
 from airflock.scenarios.scenario import Scenario
@@ -26,7 +27,8 @@ CIRCLE = 16  # sides of the polygon around a circular arena
 def card_document(
     scenario: Scenario, *, site: tuple[float, float, float], members: Sequence[int], mission: int, expires: int,
     operator: bytes = b"", autopilot: str = "px4", height: float | None = None, margin: float = MARGIN,
-    as_simulated: bool = False, safety: Mapping[str, Any] | None = None, silent: bool = True,
+    as_simulated: bool = False, seed: int | None = None, safety: Mapping[str, Any] | None = None,
+    silent: bool | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """Document of a flight card, without its hash.
 
@@ -34,8 +36,10 @@ def card_document(
     height       : at which the flock flies, m above the site; in space, of the arena's centre
     margin       : of the fence around the law's walls, m
     as_simulated : treat neighbours' data as the scenario's radio does; else they are carried forward and kept for 5 s
+    seed         : of the tolerances of manufacture that groups have; None: real drones bring their own
     safety       : limits that differ from those that follow from the scenario
-    silent       : whether the rule of silence stops a drone
+    silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
+                   simulated where the scenario says so
 
     Raises CardError where the scenario has no walls, or a law of its own that is not in the package.
     """
@@ -51,7 +55,8 @@ def card_document(
     top = limits.base + limits.layer * (len(members) - 1)
     stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
     held = scenario.radio.kind == "constant" and as_simulated
-    silence = Silence(closing=2.0 * _speed(scenario)) if silent else Silence(closing=0.0, keep=0.0)
+    silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
+    silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
     return {
         "airflock_card": VERSION,
         "name": scenario.name,
@@ -63,6 +68,7 @@ def card_document(
         "autopilot": autopilot,
         "law": {"kind": scenario.model.name, **plain(scenario.parameters)},
         "body": {"kind": scenario.vehicle.name, **plain(scenario.body)},
+        "own": _own(scenario, records_of(scenario, len(members), seed)),
         "world": plain(scenario.world),
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
@@ -82,6 +88,19 @@ def card_document(
         "period": period,
         "seed": 0,
     }
+
+
+def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
+    """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
+    base = {"law": plain(scenario.parameters), "body": plain(scenario.body)}
+    found = [
+        {
+            part: {k: v for k, v in plain(record).items() if v != base[part][k]}
+            for part, record in zip(base, own, strict=True)
+        }
+        for own in records
+    ]
+    return found if scenario.varied else []
 
 
 def limits_of(scenario: Scenario) -> Safety:

@@ -18,6 +18,7 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.fleet import telemetry
+from airflock.fleet.individuals import Faults
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
 from airflock.mavlink.coordinates import Site, turned
@@ -78,6 +79,8 @@ class Vehicle:
         self._measures = not {"mx", "my", "mz"}.isdisjoint(asked)
         self._old = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
+        self.faults: Faults | None = None  # of the scenario, with its own place among the drones
+        self.place = 0
         self.frozen: State | None = None  # a navigation that stands still, if it does
 
     def frame(self, message: Any) -> bytes:
@@ -86,7 +89,13 @@ class Vehicle:
 
     @property
     def measured(self) -> State:
-        """Own state with the error of its navigation."""
+        """Own state as its navigation tells it."""
+        known = self.navigated
+        return known if self.faults is None else self.faults.sensed(self.place, self.now, known)
+
+    @property
+    def navigated(self) -> State:
+        """Own state with the error of its navigation, by which its controller flies."""
         if self.frozen is not None:
             return self.frozen
         (x, y, z, vx, vy, vz), (ex, ey, ez, eu, ev, ew) = self.state, self.error
@@ -271,10 +280,14 @@ class Vehicle:
             return
         (x, y, z, vx, vy, vz), c = self.state, self.wish()
         command = c if self.motor else (vx, vy, vz - 5.0)
-        measured = self.measured[3:] if self._measures else STILL
+        if self.faults is not None:
+            command = self.faults.overruled(self.place, now, command)
+        measured = self.navigated[3:] if self._measures else STILL
         known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
         moved = self.body.move(*self._take(known))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
+        if self.faults is not None:
+            velocity = self.faults.moved(self.place, now, self.state, command, velocity, dt)
         ux, uy, uz = (vx, vy, vz) if self._old else velocity
         self.state = State(x + ux * dt, y + uy * dt, z + uz * dt, *velocity)
         if self.state.z <= 0.0 and c[2] <= 0.0:

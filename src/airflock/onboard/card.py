@@ -7,10 +7,9 @@ travels in every packet: drones with different cards do not flock.
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -18,23 +17,24 @@ from airflock import atomic
 from airflock.body.registry import BODIES
 from airflock.core.agent import State
 from airflock.core.contract import Model, model
+from airflock.core.maths import FAR
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, ParameterError, reason
+from airflock.errors import AirflockError, CardError, reason
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
+from airflock.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
 from airflock.onboard.safety import Safety
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, polygon_fault
-from airflock.world.shapes import COLUMNS
 
-VERSION = 1
+VERSION = 2  # a card of version 1 does not name its rule of silence
 KEYS = (
-    "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "world",
-    "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
+    "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "own",
+    "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
 OPTIONAL = ("topology",)  # left out where a drone meets all whom it hears
 NUMBERS = {
@@ -50,6 +50,7 @@ class Card:
     mission  : number of the mission; expires: Unix time, s
     site     : origin of local coordinates; members: system ids, in the order of their layers
     operator : public key of who may give orders, 32 bytes; empty: nobody may
+    own      : numbers of law and body of each member, where they differ from one to another
     fence    : corners; low, high: heights above the site, m
     height   : at which the flock flies, m above the site; in space, of the arena's centre
     hash     : SHA-256 of the document without its own entry
@@ -66,6 +67,7 @@ class Card:
     parameters: Any
     body: Any
     body_parameters: Any
+    own: tuple[tuple[Any, Any], ...]
     place: Place
     hearing: Hearing
     delay: float
@@ -88,9 +90,11 @@ class Card:
 
     def pilot(self, member: int) -> Pilot:
         """The pilot of one member."""
+        index = self.members.index(member)
+        p, b = self.own[index] if self.own else (self.parameters, self.body_parameters)
         return Pilot(
-            self.model, self.parameters, self.place, index=self.members.index(member), period=self.period,
-            hearing=self.hearing, body=self.body, b=self.body_parameters, silence=self.silence, flat=self.flat,
+            self.model, p, self.place.seen(_look(self.model, p)), index=index, period=self.period,
+            hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
 
@@ -157,15 +161,17 @@ def card_of(document: Any, where: str = "card") -> Card:
 
 
 def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
-    site = _numbers(
+    site = numbers_in(
         d["site"],
         "site",
         {"latitude": (-85.0, 85.0), "longitude": (-180.0, 180.0), "altitude": (-500.0, 9000.0)},
         faults,
     )
-    fence = _numbers(d["fence"], "fence", {"low": (0.0, 1e4), "high": (1.0, 1e4)}, faults, more=("corners",))
-    radio = _numbers(d["radio"], "radio", {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}, faults, more=("extrapolate",))
-    one = _numbers({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
+    fence = numbers_in(d["fence"], "fence", {"low": (0.0, 1e4), "high": (1.0, 1e4)}, faults, more=("corners",))
+    radio = numbers_in(
+        d["radio"], "radio", {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}, faults, more=("extrapolate",)
+    )
+    one = numbers_in({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
     members = d["members"]
     sound = isinstance(members, list) and all(type(m) is int and 1 <= m <= LARGEST_SYSTEM for m in members)
     if not sound or not members:
@@ -175,30 +181,32 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     if not isinstance(d["autopilot"], str) or d["autopilot"] not in AUTOPILOTS:
         faults.append(f"autopilot = {d['autopilot']!r} is none of {', '.join(AUTOPILOTS)}")
     corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
-    if not _is_ring(corners):
+    if not is_ring(corners):
         faults.append("fence.corners: give a list of points [east, north] in m")
     elif polygon_fault(corners):
         faults.append(f"fence.corners {polygon_fault(corners)}")
-    operator = _hexadecimal(d["operator"], faults)
+    operator = hexadecimal(d["operator"], faults)
     law, parameters = _law(d["law"], faults)
     body, numbers = _body(d["body"], faults)
-    world = _record(arena.Parameters, d["world"], "world", faults)
-    silence = _record(Silence, d["silence"], "silence", faults)
-    topology = _record(topologies.Parameters, d.get("topology", {}), "topology", faults)
-    safety = _record(Safety, d["safety"], "safety", faults)
+    own = _own(d, law, body, faults)
+    world = record(arena.Parameters, d["world"], "world", faults)
+    silence = record(Silence, d["silence"], "silence", faults)
+    topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
+    safety = record(Safety, d["safety"], "safety", faults)
     rows = d["shapes"]
-    if not _are_shapes(rows):
+    if not are_shapes(rows):
         faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
     if faults or law is None:
         return None
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=1e30 if law.wall_reach is None else float(law.wall_reach(parameters)), casts=law.sight is not None,
+        look=_look(law, parameters), casts=law.sight is not None,
     )  # fmt: skip
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
+        own=own,
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
         silence=silence, topology=topology, safety=safety,
         fence=Fence(corners),
@@ -210,7 +218,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
 def _geometry_faults(card: Card) -> list[str]:
     """Why fence, heights, layers and walls do not fit together, or why no drone can fly the law."""
     faults = []
-    world = arena.Parameters(**_frozen(card.document["world"]))
+    world = arena.Parameters(**frozen(card.document["world"]))
     top = card.layer(card.members[-1])
     if not card.low < card.safety.base or top > card.high:
         faults.append(
@@ -232,10 +240,11 @@ def _geometry_faults(card: Card) -> list[str]:
         faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
-    try:
-        card.pilot(card.members[0])
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
+    for member in card.members if card.own else card.members[:1]:
+        try:
+            card.pilot(member)
+        except AirflockError as fault:
+            faults += str(fault).splitlines()
     return faults
 
 
@@ -264,7 +273,7 @@ def _law(table: Any, faults: list[str]) -> tuple[Model | None, Any]:
     except (AirflockError, KeyError, TypeError) as fault:
         faults.append(str(fault) if isinstance(fault, AirflockError) else "law.kind is missing")
         return None, None
-    return found, _record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, "law", faults)
+    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, "law", faults)
 
 
 def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
@@ -272,89 +281,34 @@ def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
     if not isinstance(kind, str) or kind not in BODIES:
         faults.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
         return None, None
-    return BODIES[kind], _record(
+    return BODIES[kind], record(
         BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", faults
     )  # fmt: skip
 
 
-def _record(kind: Any, table: Any, where: str, faults: list[str]) -> Any:
-    """A record of parameters from a table, its faults noted."""
-    if not isinstance(table, dict):
-        faults.append(f"{where} = {table!r} is not a table")
-        return None
-    known = kind.__dataclass_fields__
-    for key in table:
-        if key not in known:
-            near = get_close_matches(key, known, n=1)
-            faults.append(f"{where}.{key} is not known{f'; did you mean {where}.{near[0]}?' if near else ''}")
-    try:
-        return kind(**_frozen({key: value for key, value in table.items() if key in known}))
-    except ParameterError as fault:
-        faults += [f"{where}.{line.partition('.')[2]}" for line in str(fault).splitlines()]
-    except (TypeError, ValueError) as fault:
-        faults.append(f"{where}: {fault}")
-    return None
+def _own(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Any, Any], ...]:
+    """Numbers of law and body of each member; none where all are alike."""
+    rows = d["own"]
+    parts = {"law": getattr(law, "Parameters", None), "body": getattr(body, "Parameters", None)}
+    if rows == [] or None in parts.values():
+        return ()
+    if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
+        faults.append("own: give a table with law and body for each member, or an empty list")
+        return ()
+    found = []
+    for number, row in enumerate(rows):
+        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in parts)
+        if not sound:
+            faults.append(f"own[{number}] = {row!r}: give the tables law and body")
+            continue
+        made = []
+        for part, kind in parts.items():
+            usual = {key: value for key, value in d[part].items() if key != "kind"}
+            made.append(record(kind, usual | row[part], f"own[{number}].{part}", faults))
+        found.append((made[0], made[1]))
+    return tuple(found)
 
 
-def _frozen(table: Any) -> Any:
-    if isinstance(table, dict):
-        return {key: _frozen(value) for key, value in table.items()}
-    return tuple(_frozen(value) for value in table) if isinstance(table, list) else table
-
-
-def _numbers(
-    table: Any, where: str, spans: Mapping[str, tuple[float, float]], faults: list[str], more: tuple[str, ...] = ()
-) -> dict[str, float]:
-    """Numbers of a table within their ranges; what is wrong is noted."""
-    found = {}
-    if not isinstance(table, dict):
-        faults.append(f"{where} = {table!r} is not a table")
-        return {}
-    at = f"{where}." if where else ""
-    faults += [f"{at}{key} is not known" for key in table if key not in spans and key not in more]
-    faults += [f"{at}{key} is missing" for key in more if key not in table]
-    for key, (low, high) in spans.items():
-        value = table.get(key)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-            faults.append(f"{at}{key} = {value!r} is not a number")
-        elif not low <= value <= high:
-            faults.append(f"{at}{key} = {value:g} lies outside [{low:g}, {high:g}]")
-        else:
-            found[key] = value
-    return found
-
-
-def _are_shapes(rows: Any) -> bool:
-    """Whether the rows of a scene can be read: `world.shapes` and the tree of `world.bvh`."""
-    if not isinstance(rows, dict) or set(rows) != {"shapes", "nodes", "links"}:
-        return False
-    wide = {"shapes": COLUMNS, "nodes": 6, "links": 3}
-    for name, width in wide.items():
-        for row in rows[name] if isinstance(rows[name], list) else [None]:
-            if not isinstance(row, list) or len(row) != width or not all(type(v) in (int, float) for v in row):
-                return False
-    count, last = len(rows["nodes"]), len(rows["shapes"])
-    if len(rows["links"]) != count:
-        return False
-    return all(k < s <= count and 0 <= a <= b <= last for k, (s, a, b) in enumerate(rows["links"]))
-
-
-def _is_ring(corners: Any) -> bool:
-    return isinstance(corners, list) and all(
-        isinstance(c, list) and len(c) == 2 and all(type(v) in (int, float) and isfinite(v) for v in c) for c in corners
-    )
-
-
-def _hexadecimal(text: Any, faults: list[str]) -> bytes:
-    try:
-        key = bytes.fromhex(text)
-    except (TypeError, ValueError):
-        key = b"?"
-    if len(key) not in (0, 32):
-        faults.append("operator: is not a public key of 64 hexadecimal digits")
-    return key
-
-
-def records(**given: Any) -> dict[str, Any]:
-    """Records of parameters as plain tables."""
-    return {name: json.loads(json.dumps(asdict(record))) for name, record in given.items()}
+def _look(law: Model, p: Any) -> float:
+    """How far (m) a law with these numbers looks for what stands in the world."""
+    return FAR if law.wall_reach is None else float(law.wall_reach(p))

@@ -83,7 +83,8 @@ class Node:
         self._flew_at: float | None = None
         self._stream_since: float | None = None
         self._tried_at, self._beat_at, self._asked_at = -1e9, -1e9, -1e9
-        self._overloads, self._failed, self._lost_near, self._fenced = 0, False, False, False
+        self._overloads, self._failed, self._fenced = 0, False, False
+        self._stay: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._told: tuple[str, ...] = ()
         self._notes: list[str] = []
 
@@ -155,7 +156,7 @@ class Node:
     def _facts(self, now: float, overload: bool) -> Facts:
         s, own = self.card.safety, self.wire.state
         if own is not None:
-            self._lost_near = self.pilot.lost_near(self.card.law_state(own), now)
+            self._stay = self.pilot.stay(self.card.law_state(own), now)
         order = self.operator.next()
         if order == Do.GOTO and self._goal_outside():
             order = None
@@ -167,7 +168,7 @@ class Node:
         return facts(
             self.card, self.member, self.phase, self.wire, self.peers, self.operator, self._timers, self.utc(now), now,
             home=self.home, order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced,
-            lost_near=self._lost_near, twin=self._twin,
+            lost_near=self._stay is not None, twin=self._twin,
             streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
             time_over=self._flew_at is not None and now - self._flew_at > s.mission_time, before=self._before,
         )  # fmt: skip
@@ -256,13 +257,13 @@ class Node:
         if phase == Phase.RETURN and self.home is not None:
             near = [peer.state for peer in self.peers.flying().values() if peer.state is not None]
             wish = guidance.homewards(own, self.home, near, s)
-            return (0.0, 0.0, wish[2]) if self._lost_near else wish
+            return wish if self._stay is None else (*self._stay[:2], wish[2])
         if phase not in (Phase.FLOCK, Phase.GOTO):
             return STILL
         if now >= self._next_law - EPSILON:
             self._next_law = max(self._next_law + self.card.period, now)
             self._wish = self._law(own, now)
-        x, y, z = STILL if self._lost_near else self._wish
+        x, y, z = self._wish if self._stay is None else self._stay
         return x, y, guidance.climb(own, self.card.height, s) if self.card.flat else z
 
     def _law(self, own: State, now: float) -> Velocity:

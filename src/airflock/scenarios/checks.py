@@ -113,6 +113,22 @@ def metric_faults(measures: MetricSet, q: Any, world: Any) -> list[str]:
     return measures.faults(**{name: given[name] for name in asks(measures.faults, "faults", measures.name)})
 
 
+def silence_faults(rule: str, flight: Any, found: Model | None) -> list[str]:
+    """Who stops for a neighbour that it has lost must hear of neighbours, and be able to stop."""
+    if rule == "fly_on" or found is None:
+        return []
+    faults = []
+    if found.command != "velocity":
+        faults.append(
+            f"commands {'an' if found.command[0] in 'aeiou' else 'a'} {found.command}, and none of it stops an agent"
+        )
+    if found.neighbour is None or found.flock is not None:
+        faults.append("has no rule for the neighbours that an agent hears")
+    if flight.update == "sequential":
+        faults.append("sees all others as they are with update = 'sequential'")
+    return [f"silence.rule = {rule!r}: model {found.name} {fault}; set silence.rule = 'fly_on'" for fault in faults]
+
+
 MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 
 

@@ -204,6 +204,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += timing.faults(flight, parts["sensors"].period, parts["metrics"])
         faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
+        faults += checks.silence_faults(parts["silence"].rule, flight, found) if parts["silence"] is not None else []
         faults += checks.metric_faults(measures, parts["metrics"], parts["world"])
         faults += wings.faults(parts, found, measures)
     return faults

@@ -12,6 +12,8 @@ from airflock.core import random
 from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
+from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import complete
 from airflock.core.topology import Topology
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.faulty import Entry
@@ -30,7 +32,7 @@ class Scenario:
     """Everything about a flight but the seed; `airflock.load` makes one.
 
     model and parameters : the flocking law and its numbers
-    body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, metrics : records of parameters, SI
+    body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
     vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
     groups    : agents that share numbers; faults: what befalls single agents
@@ -58,6 +60,7 @@ class Scenario:
     start: start.Parameters
     wing: wings.Parameters
     aero: descent.Parameters
+    silence: Silence
     metrics: metric_parameters.Parameters
     topology: topologies.Parameters
     flight: Flight
@@ -182,6 +185,11 @@ class Scenario:
         if given["k"] is None:
             given["k"] = given["max_e"]
         return type(self.metrics)(**given)
+
+    def silent_by(self) -> Silence:
+        """The rule of silence with everything that was left to the scenario filled in."""
+        speed = self.model.preferred_speed
+        return complete(self.silence, float(speed(self.parameters)) if speed is not None else 0.0, self.radio.delay)
 
     def separation(self) -> float:
         """Smallest distance of two agents at the start, m."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from airflock.aero import descent, wing
 from airflock.body import dryden, motion, radio, sensors, wind
+from airflock.core import silence
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.metrics import parameters as metrics
@@ -105,5 +106,6 @@ ORDER = (
     Section("aero", descent.Parameters, "aero"),
     Section("wind", wind.Parameters, "air", dryden.Numbers),
     Section("topology", topology.Parameters, "topology"),
+    Section("silence", silence.Parameters, "silence"),
 )
 SECTIONS: dict[str, type[Record]] = {each.key: each.record for each in ORDER if each.key and each.record is not None}

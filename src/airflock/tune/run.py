@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from airflock import atomic
+from airflock.certify.asked import campaign_of
 from airflock.certify.campaign import FOLDER
 from airflock.certify.certificate import Certificate
-from airflock.certify.run import campaign_of, executor_for
+from airflock.certify.executing import executor_for
 from airflock.certify.run import run as certified
 from airflock.certify.seeds import identity
 from airflock.doors import from_outside, json_object, read_text

@@ -4,8 +4,9 @@ Made from the record of an arena and, where a scene stands in it, from rows of s
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from airflock.core.agent import State
 from airflock.core.maths import FAR, norm
@@ -195,6 +196,12 @@ class Place:
         self._beyond, self._clear, self._flat = BEYOND[kind], CLEAR[kind], world.arena == "polygon"
         self._edges, self._corners, self._obstacles = edge_rows(world)
         self._obstacle, self._middle = obstacle_rule(world), middle(world) if raised(world) else 0.0
+
+    def seen(self, look: float) -> Self:
+        """The same world, shapes that appear and all, for an agent to whom shapes say something up to `look`, m."""
+        found = copy(self)
+        found._look = look
+        return found
 
     def image(self, dx: float, dy: float, dz: float) -> tuple[float, float, float]:
         """Offset (m) to the nearest image in a periodic box; elsewhere the offset itself."""

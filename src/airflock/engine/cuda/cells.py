@@ -8,18 +8,20 @@ loss.
 
 from typing import Any
 
-from airflock.core import random
 from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
-from airflock.engine.passes import decide, move, scene
+from airflock.engine.cuda.start import heading_off, tried
+from airflock.engine.passes import decide, move
 from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import must_replace
-from airflock.world import start as start_rules
+from airflock.engine.stages import start
+from airflock.engine.stages.decide import NEAR as GATHERED
+from airflock.engine.stages.state import SCENE
 
 NEAR = 8  # columns of the table that neighbours read: x y z number, vx vy vz nothing
+GUSTS = 3  # deviations from the mean wind, one per axis
 COMMON = ("row", "whole", "faces", "edges", "spans", "shapes", "nodes", "links", "box", "count")
 AROUND = (
     "for qz in range(low_z, high_z):",
@@ -65,8 +67,12 @@ def crowd(plan: Plan, simulated: bool = False) -> str:
 
 
 def rest_columns(plan: Plan) -> int:
-    """Columns that only the agent itself reads: command and the model's memory, in whole vectors."""
-    return -(-(3 + len(getattr(plan.model.Memory, "_fields", ()))) // 4) * 4
+    """Columns that only the agent itself reads, in whole vectors: command, the model's memory, and gusts.
+
+    Each agent keeps the gusts of the flock: they go on from step to step, and no launch can hand them to all others.
+    """
+    memory = len(getattr(plan.model.Memory, "_fields", ()))
+    return -(-(3 + memory + (GUSTS if plan.windy else 0)) // 4) * 4
 
 
 class CellBuilder(CudaBuilder):
@@ -117,27 +123,21 @@ def _common(build: CellBuilder) -> list[str]:
     lines += reciprocal_lines(build.reciprocals)
     local = f"np.float{build.plan.bits}"
     lines += ["n = agents; sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
-    lines += [f"gust = cuda.local.array(3, {local})", f"aim = cuda.local.array(4, {local})"]
-    lines += [f"near_ = cuda.local.array({scene.NEAR}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
+    lines += [f"gust = cuda.local.array({GUSTS}, {local})", f"aim = cuda.local.array(4, {local})"]
+    lines += [f"near_ = cuda.local.array({GATHERED}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
     names = {"near": "near_", "goals": "edges", "reached": "aim", "later": "edges"}
-    return [*lines, f"scene = ({', '.join(names.get(part, part) for part in scene.PARTS)})"]
+    return [*lines, f"scene = ({', '.join(names.get(part, part) for part in SCENE)})"]
 
 
 def _begin(build: CellBuilder) -> list[str]:
     """Every agent at a random place, whoever else is there."""
-    plan, axes = build.plan, build.plan.axes
-    philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
-    spread = build.source.name(start_rules.spread)
-    draw = [f"w0, w1, w2, w3 = {philox}(i, attempt, {random.START}, world, seed_low, seed_high)"]
-    draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
-    draw += [f"free = {must_replace(beyond(build), ', w,', ', row_w,')} <= ZERO"]
-    if plan.start == "ball":
-        draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
+    plan = build.plan
+    draw = tried(build, "i")
     draw += branch("free", ["placed = True", "break"])
-    turn = [*heading_off(build, "row_w"), "vx = ux; vy = uy; vz = uz"]
-    body = ["i = slot; placed = False; sx = ZERO; sy = ZERO; sz = ZERO; vx = ZERO; vy = ZERO; vz = ZERO"]
-    body += [*loop(f"attempt in range({ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
-    put = ("sx", "sy", "sz", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
+    turn = heading_off(build, ("vx", "vy", "vz"))
+    body = ["i = slot; placed = False; s_x = ZERO; s_y = ZERO; s_z = ZERO; vx = ZERO; vy = ZERO; vz = ZERO"]
+    body += [*loop(f"attempt in range({start.ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
+    put = ("s_x", "s_y", "s_z", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
     body += [f"near[i, {c}] = {value}" for c, value in enumerate(put)]
     starts = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
     values = ["ZERO"] * 3 + [f"real({s})" for s in starts]
@@ -156,8 +156,9 @@ def _advance(build: CellBuilder) -> list[str]:
     state |= {f"c{a}_i": ("rest", c) for c, a in enumerate(axes)} | {
         f"mem{c}_i": ("rest", 3 + c) for c in range(memory)
     }
+    state |= {f"gust[{c}]": ("rest", 3 + memory + c) for c in range(GUSTS if plan.windy else 0)}
     sorted_ = {"near": "sorted_", "rest": "rest_sorted"}
-    body = ["time = real(step) * row_c.dt; answer = ZERO; gust[0] = ZERO; gust[1] = ZERO; gust[2] = ZERO"]
+    body = ["time = real(step) * row_c.dt; answer = ZERO"]
     body += ["counts[0] = 0; counts[1] = 0"]
     body += [f"{r} = {'u32(0)' if r[0] == 'u' and r[1].isdigit() else 'ZERO'}" for r in registers if r not in state]
     load = [f"{name} = {table}[slot, {c}]" for name, (table, c) in state.items()]

@@ -1,15 +1,15 @@
 """Start on a GPU: the agents of a flock take their places one after another; all threads look for room at once."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any
 
-from airflock.core import random
 from airflock.engine.cuda.build import CudaBuilder
-from airflock.engine.passes import scene
 from airflock.engine.passes.build import branch, loop
-from airflock.engine.passes.move import ATTEMPTS, beyond, heading_off, in_formation
-from airflock.engine.replace import must_replace
+from airflock.engine.passes.move import excursion
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.values import Components, argument
+from airflock.engine.stages import start
 from airflock.scenarios.wings import FORMATIONS
-from airflock.world import start as start_rules
 
 
 def tables(build: CudaBuilder) -> dict[str, int]:
@@ -41,36 +41,48 @@ def begin(build: CudaBuilder) -> list[str]:
         given = [f"{own(build, name)} = starts[block, {c}, i]" for c, name in enumerate(names)]
         return [*lines, *agents(build, given), "cuda.syncthreads()", *_heard_at_start(build)]
     if plan.start in FORMATIONS:
-        placed = in_formation(build, "s_{}", "row_w")
-        placed += [*(f"{own(build, a)} = s_{a}" for a in axes), f"{own(build, 'vx')} = row_w.speed"]
+        lines_, _ = by_stage(build, start.in_formation, s=Components("s", "vector"))
+        placed = [*lines_, *(f"{own(build, a)} = s_{a}" for a in axes), f"{own(build, 'vx')} = row_w.speed"]
         return [*lines, *agents(build, placed), "cuda.syncthreads()", *_heard_at_start(build)]
-    philox, uniform = build.source.name(random.draw), build.source.name(random.uniform)
-    spread = build.source.name(start_rules.spread)
-    draw = [f"w0, w1, w2, w3 = {philox}(e, attempt, {random.START}, world, seed_low, seed_high)"]
-    draw += [f"s{a} = {spread}({uniform}(w{c}), -row_w.extent_{a}, row_w.extent_{a})" for c, a in enumerate(axes)]
-    draw += [] if plan.dimensions == 3 else ["sz = ZERO"]
-    draw += [f"free = {must_replace(beyond(build), ', w,', ', row_w,')} <= ZERO"]
-    if plan.start == "ball":
-        draw += [f"free = free & {build.source.name(start_rules.in_ball)}(sx, sy, sz, row_w.extent_x)"]
-    draw += must_replace(scene.room(build), "w.clearance", "row_w.clearance") if plan.scene else []
-    gap = " + ".join(f"(s{a} - {place(build, 'j', a)}) * (s{a} - {place(build, 'j', a)})" for a in axes)
+    draw = tried(build, "e")
+    gap = " + ".join(f"(s_{a} - {place(build, 'j', a)}) * (s_{a} - {place(build, 'j', a)})" for a in axes)
     near = loop(
         "j in range(tid, e, THREADS)", branch(f"{gap} < row_w.separation * row_w.separation", ["crowded = integer(1)"])
     )
     crowd = ["crowded = integer(0)", *near, "free = cuda.syncthreads_or(crowded) == 0"]
     draw += branch("free and row_w.separation > ZERO", crowd)
     draw += branch("free", ["placed = True", "break"])
-    seat = [f"{place(build, 'e', a)} = s{a}" for a in axes]
-    body = ["placed = False; sx = ZERO; sy = ZERO; sz = ZERO", *loop(f"attempt in range({ATTEMPTS})", draw)]
+    seat = [f"{place(build, 'e', a)} = s_{a}" for a in axes]
+    body = ["placed = False", *(f"s_{a} = ZERO" for a in axes), *loop(f"attempt in range({start.ATTEMPTS})", draw)]
     body += branch("not placed", [*branch("tid == 0", ["statuses[block] = -(e + 1)"]), "return"])
     body += [*branch("tid == 0", seat), "cuda.syncthreads()"]
-    turn = [*heading_off(build, "row_w"), *[f"{own(build, f'v{a}')} = u{a}" for a in axes]]
+    turn = heading_off(build, [own(build, f"v{a}") for a in axes])
     seated = [f"{own(build, a)} = {place(build, 'i', a)}" for a in axes]
     turning = [*branch("row_w.speed > ZERO", turn)]
     return [
         *lines, *loop("e in range(n)", body), *agents(build, [*seated, *turning]), "cuda.syncthreads()",
         *_heard_at_start(build),
     ]  # fmt: skip
+
+
+def by_stage(build: CudaBuilder, helper: Callable[..., Any], **known: object) -> tuple[list[str], str]:
+    """Lines of a helper of the start as a kernel runs it, for agent i, and what it returns."""
+    made = specialise(build, helper, w=argument("row_w"), **known)
+    return made.lines, made.answer
+
+
+def tried(build: CudaBuilder, agent: str) -> list[str]:
+    """Lines that draw a place s_x s_y s_z of an agent, and find whether it is `free`, whoever else is there."""
+    s = Components("s", "vector")
+    lines, _ = by_stage(build, start.tried, i=argument(agent), s=s, excursion=excursion(build))
+    room, _ = by_stage(build, start.roomy, s=s)
+    return [*lines, *room]
+
+
+def heading_off(build: CudaBuilder, to: Iterable[str]) -> list[str]:
+    """Lines that draw the velocity of agent i at the start."""
+    lines, velocity = by_stage(build, start.heading_off)
+    return [*lines, f"ux, uy, uz = {velocity}", *(f"{name} = u{a}" for name, a in zip(to, "xyz", strict=False))]
 
 
 def own(build: CudaBuilder, name: str) -> str:

@@ -4,9 +4,11 @@ import re
 
 from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.start import tables
-from airflock.engine.passes import flock, scene
+from airflock.engine.passes import flock
 from airflock.engine.passes.build import columns, loop
 from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.stages.decide import NEAR
+from airflock.engine.stages.state import SCENE
 
 
 def memory(build: CudaBuilder) -> list[str]:
@@ -36,10 +38,10 @@ def memory(build: CudaBuilder) -> list[str]:
     parts = 5 if plan.dryden else 3
     lines += [f"gust = cuda.local.array({parts}, {kind})", "; ".join(f"gust[{c}] = ZERO" for c in range(parts))]
     lines += [f"aim = cuda.local.array(4, {kind})", "counts = cuda.local.array(2, np.int32)"]
-    lines += [f"near = cuda.local.array({scene.NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
+    lines += [f"near = cuda.local.array({NEAR}, np.int32)", "counts[0] = 0; counts[1] = 0; aim[3] = ZERO"]
     lines += ["aim[0] = ZERO; aim[1] = ZERO; aim[2] = ZERO"]
     lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
-    lines += [f"scene = ({', '.join(scene.PARTS)})"]
+    lines += [f"scene = ({', '.join(SCENE)})"]
     return [*lines, *_scratch(plan), *_registers(build)]
 
 

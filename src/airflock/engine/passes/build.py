@@ -11,7 +11,7 @@ from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
-from airflock.engine.stages.state import own_row
+from airflock.engine.stages.state import SCENE, own_row
 from airflock.world import edges
 
 JIT = "@njit(**JIT)"
@@ -89,6 +89,10 @@ class Builder:
     def whole(self, *names: str) -> list[str]:
         """Lines that read integers of this world."""
         return [f"{name} = whole[{WHOLE.index(name)}]" for name in names]
+
+    def scene(self, *names: str) -> list[str]:
+        """Lines that take arrays out of the scene."""
+        return [f"{name} = scene[{SCENE.index(name)}]" for name in names]
 
     def call(self, rule: Callable[..., Any], kind: str, given: Mapping[str, str], owner: str = "") -> str:
         """Text of a call of a rule with what it asks for."""

@@ -2,18 +2,15 @@
 
 import ast
 
-from airflock.core.contract import Model
-from airflock.core.maths import norm
-from airflock.core.vocabulary import Own, asks
-from airflock.engine.passes import flock, grid, perceive, percept, scene
+from airflock.engine.passes import grid, perceive, percept
 from airflock.engine.passes.build import Builder
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
-from airflock.engine.stages import faults, surfaces
+from airflock.engine.stages import decide as deciding
+from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
-from airflock.engine.stages.state import own_row
-from airflock.engine.stages.words import live
+from airflock.engine.stages.words import live, wants
 
 EXTREME = {"min": "least", "max": "most"}
 START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
@@ -80,49 +77,26 @@ def boundaries(build: Builder) -> None:
 
 
 def decide(build: Builder) -> None:
-    """Call the decide rule for each agent and keep its command."""
-    plan, axes, model = build.plan, build.plan.axes, build.plan.model
-    used = set(asks(model.decide, "decide", model.name))
-    memory = getattr(model.Memory, "_fields", ()) if "memory" in used else ()
-    lines = build.records(" ".join(["p c", *(name for name in ("wing", "aero") if name in used)]))
-    lines += build.bind([own_row(letter, name) for letter, name in plan.varied if letter == "p"])
-    lines += build.bind([f"m{a}" for a in axes] + [f"mv{a}" for a in axes])
-    lines += build.bind([f"c{a}" for a in axes])
-    body = [f"v{a} = mv{a}[i]" for a in axes] + ([] if plan.dimensions == 3 else ["vz = ZERO"])
-    if "own" in used:
-        body += [f"f = ONE / {build.source.name(norm)}(vx, vy, vz)"]
-        body += [f"own = {build.source.name(Own)}(vx, vy, vz, f * vx, f * vy, f * vz)"]
-    for record, word, rows in ((model.Sums, "sums", "sum"), (model.Walls, "walls", "wall")):
-        if word in used and record is not None:
-            kept = live(record, plan.dimensions)
-            kept = _asked(build, kept) if word == "sums" else kept
-            present = _present(model, word)
-            lines += build.bind([f"{rows}{c}" for c in kept]) if present else []
-            values = [f"{rows}{c}[i]" if c in kept and present else "ZERO" for c in range(len(record._fields))]  # type: ignore[attr-defined]
-            body += [f"{word} = {build.source.name(record)}({', '.join(values)})"]
-    if "shared" in used:
-        lines += flock.columns_of(build, model.Shared, "model")
-        body += flock.shared(build, model.Shared, "model", bound=True)
-    if memory:
-        values = [f"mem[{c}, i]" for c in range(len(memory))]
-        body += [f"memory = {build.source.name(model.Memory)}({', '.join(values)})"]
-    if "percept" in used:
-        lines += build.records("w") + build.whole("world", "seed_low", "seed_high", "corners", "obstacles")
-        lines += build.order()
-        body += scene.parts("aim") if plan.goals else []
-        lines += build.bind([f"goal_{a}" for a in axes]) if plan.own else []
-        body += scene.look(build, model)
-        body += [f"percept = {percept.record(build)}({percept.values(build)})"]
-    own, p = build.own("p")
-    body = [*own, *body]
-    body += [f"o = {build.call(model.decide, 'decide', {'period': 'c.period', 'p': p}, model.name)}"]
-    body += [f"c{a}[i] = o[{c}]" for c, a in enumerate(axes)]
-    body += [f"mem[{c}, i] = o[3][{c}]" for c in range(len(memory))]
-    if "percept" in used and model.sight is not None:
-        lines += build.bind(["rays_"])
-        body += ["rays_[i] = real(counts[0])"]
+    """Function decide: the law's rule for the command of each agent, and those that its percept is bound to."""
+    plan, model = build.plan, build.plan.model
+    summed = live(model.Sums, plan.dimensions) if model.neighbour is not None else []
+    made = specialise(
+        build, deciding.decide, decision=argument("k_"), percept_of=argument("PERCEPT"),
+        summed=_asked(build, summed) if wants(model.decide, "sums") else [],
+        walled=live(model.Walls, plan.dimensions) if model.boundary is not None else [],
+    )  # fmt: skip
+    if wants(model.decide, "percept"):
+        percept.record(build)
     percept.bind(build)
-    build.stage("decide", "k_, n, time, row, whole, work, mem, edges, spans, scene", lines, build.each(body))
+    arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
+    build.stage("decide", arguments, made.once, made.body, made.answer)
+
+
+def stop(build: Builder) -> None:
+    """Function stop: who has lost somebody stands still, where the scenario says so."""
+    if build.plan.silent:
+        made = specialise(build, silence.stop)
+        build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
 
 
 def overrule(build: Builder) -> None:
@@ -139,7 +113,3 @@ def _asked(build: Builder, sums: list[int]) -> list[int]:
     text = "\n".join(build.source.blocks)
     fields = model.Sums._fields  # type: ignore[union-attr]
     return [c for c in sums if f".{fields[c]}" in text] if "sums[" not in text and "*sums" not in text else sums
-
-
-def _present(model: Model, word: str) -> bool:
-    return (model.neighbour if word == "sums" else model.boundary) is not None

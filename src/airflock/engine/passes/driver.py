@@ -67,6 +67,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     decide.boundaries(build)
     flock.flock(build)
     decide.decide(build)
+    decide.stop(build)
     decide.overrule(build)
     move.begin(build)
     move.move(build)
@@ -96,6 +97,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
+    choose += ["stop(n, time, row, work, store)"] if plan.silent else []
     choose += ["overrule(n, time, row, work)"] if plan.suffers("overrule") else []
     step = ["time = real(step) * c.dt"]
     if plan.sequential:  # who senses and who moves alternate: there is no place to cut a step

@@ -7,8 +7,7 @@ from airflock.engine.passes import flock, scene
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.passes.decide import START, combine
 from airflock.engine.passes.members import members
-from airflock.engine.passes.move import beyond
-from airflock.engine.replace import must_replace
+from airflock.engine.passes.move import excursion
 
 CLOCKS = ("sample", "collision")
 
@@ -100,7 +99,8 @@ def _pairs(build: Builder, metrics: list[Metric], least: bool) -> list[str]:
 def _excursions(build: Builder, metrics: list[Metric]) -> list[str]:
     if not any(build.wants(metric.agent, "agent", "excursion") for metric in metrics):
         return []
-    call = must_replace(beyond(build), "sx, sy, sz", f"x[i], y[i], {build.z('z[i]')}")
+    excursion(build)
+    call = f"excursion(x[i], y[i], {build.z('z[i]')}, w, edges, spans, corners, obstacles, scene)"
     return [*build.bind(["excursion_"]), *loop("i in range(n)", [f"excursion_[i] = {call}"])]
 
 

@@ -44,6 +44,6 @@ def around(plan: Plan) -> tuple[str, ...]:
 
 def receive(build: Builder) -> None:
     """Function receive, where packets are lost: fills rows heard, age and, over two links, e*, for one agent."""
-    if build.plan.lossy or build.plan.links:
+    if build.plan.lossy or build.plan.packets:
         made = specialise(build, hearing.receive, decision=argument("k_"))
         build.function("receive(i, k_, n, time, late, row, whole, work, store)", made.lines, "return 0")

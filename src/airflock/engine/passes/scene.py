@@ -6,89 +6,14 @@ cast at this decision, whether positions before are known); goals, aim (where th
 A shape that is not there yet has its bounds far away, so that nothing meets it.
 """
 
-from airflock.core.contract import Model
 from airflock.engine.passes.build import Builder, branch, loop
-from airflock.world import bvh, goals, rays
-from airflock.world.inside import inside
-
-PARTS = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
-CAST = ("shapes", "nodes", "links", "near", "counts", "gathered")  # what a percept carries for its casts
-NEAR = 64  # shapes gathered at most; where more are in sight, each cast goes through the tree
+from airflock.engine.stages.state import SCENE
+from airflock.world import bvh, goals
 
 
 def parts(*names: str) -> list[str]:
     """Lines that take arrays out of the tuple."""
-    return [f"{name} = scene[{PARTS.index(name)}]" for name in names]
-
-
-def sees(build: Builder) -> bool:
-    """Whether the model casts at what stands in the scene."""
-    return build.plan.scene and build.plan.model.sight is not None
-
-
-def carried(build: Builder) -> tuple[str, ...]:
-    """What a percept carries for its rays and casts."""
-    if build.plan.model.sight is not None:
-        return CAST
-    return CAST[:3] if build.plan.scene else ()
-
-
-def look(build: Builder, model: Model) -> list[str]:
-    """Lines that take what agent i needs for its rays, and gather what it can see before it decides."""
-    if model.sight is None:
-        return parts(*carried(build))
-    lines = [*parts(*CAST[:-1]), "counts[0] = 0"]
-    if build.plan.grid:  # decided side by side: each agent gathers into memory of its own
-        own = f"near = np.empty({NEAR}, np.int64); counts = np.zeros(2, np.int64)"
-        lines = [*parts(*(part for part in CAST[:-1] if part not in ("near", "counts"))), own]
-    if not sees(build):
-        return [*lines, "gathered = 0"]
-    position = f"mx[i], my[i], {build.z('mz[i]')}"
-    sight = build.call(model.sight, "sight", {"p": build.own("p")[1]}, model.name)
-    return [*lines, f"gathered = {build.source.name(bvh.gather)}({position}, {sight}, shapes, nodes, links, near)"]
-
-
-def cast(build: Builder) -> list[str]:
-    """Body of percept_cast(percept, ux, uy, uz, length, radius)."""
-    plan = build.plan
-    lines = ["percept.counts[0] += 1", "x = -percept.centre_x; y = -percept.centre_y; z = -percept.centre_z"]
-    lines += ["t = length"]
-    if plan.ray is not rays.to_nothing:
-        rule = build.source.name(rays.to_box if plan.ray is rays.to_polygon else plan.ray)
-        sides = "LIMIT, LIMIT" if plan.ray is rays.to_polygon else "percept.half_x - radius, percept.half_y - radius"
-        height = "percept.half_z - radius" if plan.dimensions == 3 else "LIMIT"
-        level = "z - percept.edges[percept.corners, 0]" if plan.raised else "z"
-        lines += [f"t = least(t, {rule}(x, y, {level}, ux, uy, uz, {sides}, {height}, percept.edges, 0))"]
-    if sees(build):
-        near, tree = build.source.name(bvh.cast_near), build.source.name(bvh.cast)
-        given = "x, y, z, ux, uy, uz, t, radius, percept.shapes"
-        lines += branch("percept.gathered >= 0", [f"t = {near}({given}, percept.near, percept.gathered)"])
-        lines += ["else:", f"    t = {tree}({given}, percept.nodes, percept.links)"]
-    return [*lines, "return t"]
-
-
-def excursion(build: Builder) -> list[str]:
-    """Lines that raise the excursion e (m) at x y z by what stands there."""
-    if not build.plan.scene:
-        return []
-    nearest = build.source.name(bvh.nearest)
-    return [
-        *parts("shapes", "nodes", "links"),
-        f"e = most(e, -{nearest}(x, y, z, LIMIT, shapes, nodes, links).distance)",
-    ]
-
-
-def room(build: Builder) -> list[str]:
-    """Lines that ask for start.clearance around a start at sx sy sz, and that no mesh closes around it."""
-    plan = build.plan
-    if not plan.scene:
-        return []
-    nearest = build.source.name(bvh.nearest)
-    call = f"{nearest}(sx, sy, sz, w.clearance, shapes, nodes, links)"
-    lines = branch("free", [*parts("shapes", "nodes", "links"), f"free = {call}.distance >= w.clearance"])
-    if plan.meshed:
-        lines += branch("free", [f"free = {build.source.name(inside)}(sx, sy, sz, shapes, nodes, links) < HALF"])
-    return lines
+    return [f"{name} = scene[{SCENE.index(name)}]" for name in names]
 
 
 def contacts(build: Builder) -> list[str]:

@@ -38,6 +38,9 @@ def _without(statements: list[ast.stmt], needed: set[str], count: list[int]) -> 
             statement.body = _without(statement.body, needed, count)
             statement.orelse = _without(statement.orelse, needed, count)
             dead = not statement.body and not statement.orelse
+        elif isinstance(statement, ast.While):
+            statement.body = _without(statement.body, needed, count)
+            dead = False
         else:
             dead = False
         count[0] += dead

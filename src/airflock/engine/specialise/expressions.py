@@ -10,7 +10,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from airflock.engine.specialise.values import LOAD, STORE, Call, Components, StageError, Text, given, kind_of, text_of
+import numpy as np
+
+from airflock.engine.specialise.values import (
+    LOAD,
+    STORE,
+    Bundle,
+    Call,
+    Components,
+    StageError,
+    Text,
+    given,
+    kind_of,
+    text_of,
+)
 from airflock.engine.stages import words
 from airflock.engine.stages.words import Itself, Named, Nothing
 
@@ -21,6 +34,7 @@ KEPT: dict[Any, str] = {
     words.least: "least",
     words.most: "most",
     words.choose: "choose",
+    words.repeat: "range",
 }
 LOCALS: dict[Any, str] = {words.vector: "vector", words.totals: "totals", words.aliases: "aliases"}
 STAGES = words.__name__.rpartition(".")[0]
@@ -32,6 +46,7 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Is: operator.is_, ast.IsNot: operator.is_not, ast.In: lambda a, b: a in b,
     ast.NotIn: lambda a, b: a not in b,
 }  # fmt: skip
+MODULES = {math: "math", np: "np"}  # that drivers import
 MISSING = object()
 
 
@@ -79,6 +94,8 @@ class Expressions:
         if isinstance(value, Named):
             name = ast.Name(value.spelled.lstrip("-"), LOAD)
             return ast.UnaryOp(ast.USub(), name) if value.spelled[0] == "-" else name
+        if isinstance(value, Bundle):
+            return ast.Name(value.name, LOAD)
         if isinstance(value, float):
             return ast.Call(ast.Name("real", LOAD), [ast.Constant(value)], [])
         if isinstance(value, (bool, int, str)):
@@ -108,8 +125,8 @@ class Expressions:
 
     def _Attribute(self, node: ast.Attribute, scope: Scope) -> object:
         value = self.value(node.value, scope)
-        if value is math:
-            return ast.Attribute(ast.Name("math", LOAD), node.attr, LOAD)
+        if isinstance(value, types.ModuleType) and value in MODULES:
+            return ast.Attribute(ast.Name(MODULES[value], LOAD), node.attr, LOAD)
         if residual(value):
             return ast.Attribute(value, node.attr, LOAD)
         try:

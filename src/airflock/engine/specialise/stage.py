@@ -11,9 +11,9 @@ from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
 from airflock.engine.specialise.dead import read, without_dead
 from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
-from airflock.engine.specialise.values import LOAD, Components, Loop, given, kind_of, text_of
+from airflock.engine.specialise.values import LOAD, Bundle, Components, Loop, given, kind_of, text_of
 from airflock.engine.stages import words
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import SCENE, Flock
 from airflock.engine.stages.words import Itself
 
 UNROLLED = (range, tuple, list, enumerate, zip)
@@ -53,14 +53,16 @@ class Specialised:
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Specialised:
     """Text of a stage for a builder's plan.
 
-    known : what parameters of the stage stand for; others keep their names
+    known : what parameters of the stage stand for; others keep their names. What a vector is given is kept.
     """
     made = _Statements(build)
     once, body, answer = made.run(stage, known)
     kept = read([answer]) if answer is not None else set()
+    kept |= {name for value in known.values() if isinstance(value, Components) for name in value.set.values()}
     whole = without_dead([*once, *body], kept)
     first = {id(statement) for statement in once}
-    names = [node for statement in whole for node in ast.walk(statement) if kind_of(node)]
+    parts = whole if answer is None else [*whole, answer]
+    names = [node for part in parts for node in ast.walk(part) if kind_of(node)]
     for node in names:
         if kind_of(node) == "rule":
             node.id = build.source.name(node.item)  # type: ignore[attr-defined]
@@ -79,11 +81,12 @@ def lines_of(statements: list[ast.stmt]) -> list[str]:
 
 def _bindings(build: Builder, names: list[Any]) -> list[str]:
     """Lines that bind the rows, records and integers of these names."""
-    found: dict[str, list[str]] = {"row": [], "number": [], "record": [], "whole": [], "word": []}
+    found: dict[str, list[str]] = {"row": [], "number": [], "record": [], "whole": [], "word": [], "scene": []}
     for kind, name in dict.fromkeys((kind_of(node), node.id) for node in names):
         if kind in found:
             found[kind].append(name)
     lines = build.records(" ".join(found["record"])) + build.whole(*found["whole"]) + build.bind(found["row"])
+    lines += build.scene(*found["scene"])
     lines += build.order() if found["number"] else []
     return lines + [f"{name} = words[{name[1:]}]" for name in found["word"]]
 
@@ -118,6 +121,7 @@ class _Statements(Expressions):
             "flock": Flock(take, plan.dimensions, number),
             "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records} | own),
             "whole": SimpleNamespace(**{name: given(name, "whole") for name in WHOLE}),
+            "scene": Bundle("scene", SCENE),
             "agents": Loop("n", agents=True),
             "lanes": Loop("m", agents=True),
             "others": Loop("m", agents=False),
@@ -125,28 +129,29 @@ class _Statements(Expressions):
         text = text_of(stage)
         names = [a.arg for a in (*text.node.args.args, *text.node.args.kwonlyargs)]
         scope = Scope(text, {name: value for name, value in standing.items() if name in names} | known)
-        statements, answer = list(text.node.body), None
-        if isinstance(statements[-1], ast.Return):
-            last = statements.pop()
-            assert isinstance(last, ast.Return)
-        else:
-            last = None
         done: list[ast.stmt] = []
-        for statement in statements:
+        for statement in text.node.body:
             before, looped = len(done), self.split is not None
             done += self.statement(statement, scope)
             if self.split is not None and not looped:
                 self.split = before
-        if last is not None and last.value is not None:
-            answer = self.expr(last.value, scope)
+            if _ends(done):
+                break
+        last = done.pop() if done and isinstance(done[-1], ast.Return) else None
+        answer = last.value if isinstance(last, ast.Return) else None
         once, body = done[: self.split], done[len(done) if self.split is None else self.split :]
         carried = {item.id for s in body for item in ast.walk(s) if isinstance(item, ast.Name) and _stored(item)}
         first = [s for s in once if isinstance(s, ast.Assign) and _name(s.targets[0]) in carried]
         return [s for s in once if s not in first], [*first, *body], answer
 
     def block(self, statements: list[ast.stmt], scope: Scope) -> list[ast.stmt]:
-        """Statements of the driver for those of a block."""
-        return [made for statement in statements for made in self.statement(statement, scope)]
+        """Statements of the driver for those of a block, up to one that leaves it."""
+        done: list[ast.stmt] = []
+        for statement in statements:
+            done += self.statement(statement, scope)
+            if _ends(done):
+                break
+        return done
 
     def statement(self, node: ast.stmt, scope: Scope) -> list[ast.stmt]:
         """Statements of the driver for one of a stage."""
@@ -162,8 +167,15 @@ class _Statements(Expressions):
             if not residual(test):
                 return self.block(node.body if test else node.orelse, scope)
             return [ast.If(test, self.block(node.body, scope), self.block(node.orelse, scope))]
+        if isinstance(node, ast.While):
+            test = self.expr(node.test, scope)
+            return [ast.While(test, self.block(node.body, scope), [])]
         if isinstance(node, ast.Expr):
             return self.call(node.value, scope)
+        if isinstance(node, ast.Return):
+            return [ast.Return(None if node.value is None else self.expr(node.value, scope))]
+        if isinstance(node, (ast.Break, ast.Continue)):
+            return [node]
         raise scope.fault(node, f"{type(node).__name__} is not specialised")
 
     def call(self, node: ast.expr, scope: Scope) -> list[ast.stmt]:
@@ -174,9 +186,25 @@ class _Statements(Expressions):
             called = self.value(node.func, scope)
             helper = isinstance(called, types.FunctionType) and called.__module__.startswith(STAGES)
             if helper and called.__module__ != words.__name__:
-                inner = self.entered(called, node, [self.value(argument, scope) for argument in node.args], scope)
-                return self.block(inner.text.node.body, inner)
+                done, answer = self.inlined(called, node, scope)
+                if answer is not None:
+                    raise scope.fault(node, f"nothing takes what {called.__name__} returns")
+                return done
         return [ast.Expr(self.expr(node, scope))]
+
+    def inlined(
+        self, called: Callable[..., Any], node: ast.Call, scope: Scope
+    ) -> tuple[list[ast.stmt], tuple[ast.expr, Scope] | None]:
+        """Statements of a helper in place of its call, and the expression that it returns, as the helper knows it."""
+        inner = self.entered(called, node, [self.value(argument, scope) for argument in node.args], scope)
+        *body, last = inner.text.node.body
+        if isinstance(last, ast.Return) and last.value is not None:
+            done, answer = self.block(body, inner), (last.value, inner)
+        else:
+            done, answer = self.block([*body, last], inner), None
+        if any(isinstance(item, ast.Return) for statement in done for item in ast.walk(statement)):
+            raise scope.fault(node, f"{called.__name__} returns from within")
+        return done, answer
 
     def loop(self, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """A loop: unrolled where it is known, over agents, or as it stands."""
@@ -186,6 +214,8 @@ class _Statements(Expressions):
             for item in over:
                 self.bind(node.target, item, scope)
                 done += self.block(node.body, scope)
+                if _ends(done):
+                    raise scope.fault(node, "a loop that is unrolled is left")
             return done
         if isinstance(over, Loop):
             self.split = 0 if over.agents and self.split is None else self.split
@@ -199,17 +229,36 @@ class _Statements(Expressions):
     def assign(self, node: ast.Assign, scope: Scope) -> list[ast.stmt]:
         """An assignment; none where its name stands for what is known from then on."""
         (target,) = node.targets
-        value = self.made(target, node.value, scope)
+        before: list[ast.stmt] = []
+        if (helper := self.helped(node.value, scope)) is not None:
+            before, answer = self.inlined(helper, node.value, scope)  # type: ignore[arg-type]
+            if answer is None:
+                raise scope.fault(node, f"{helper.__name__} returns nothing")
+            value = self.value(*answer)
+        else:
+            value = self.made(target, node.value, scope)
         names = [_name(part) for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
         parts = value if isinstance(target, ast.Tuple) and isinstance(value, (tuple, list)) else [value]
-        if all(name in scope.text.once for name in names) and all(map(settled, parts)):
+        once = all(name in scope.text.once for name in names)
+        if isinstance(value, Components) or (once and all(map(settled, parts))):
             self.bind(target, value, scope)
-            return []
+            return before
         made, stored = self.printed(value, node, scope), self.target(target, scope)
+        if helper is not None and ast.unparse(made) == ast.unparse(stored):
+            return before  # the helper calls it what its caller does
         sum_ = made if isinstance(made, ast.BinOp) and isinstance(made.op, ast.Add) else None
         if sum_ is not None and isinstance(stored, ast.Name) and _name(sum_.left) == stored.id:
-            return [ast.AugAssign(stored, sum_.op, sum_.right)]
-        return [ast.Assign([stored], made, lineno=0)]
+            return [*before, ast.AugAssign(stored, sum_.op, sum_.right)]
+        return [*before, ast.Assign([stored], made, lineno=0)]
+
+    def helped(self, node: ast.expr, scope: Scope) -> Callable[..., Any] | None:
+        """The helper of several statements that an expression calls, if it is such a call."""
+        called = self.value(node.func, scope) if isinstance(node, ast.Call) else None
+        if not isinstance(called, types.FunctionType) or not called.__module__.startswith(STAGES):
+            return None
+        if called.__module__ == words.__name__ or len(text_of(called).node.body) <= 2:
+            return None
+        return called
 
     def made(self, target: ast.expr, node: ast.expr, scope: Scope) -> Any:
         """Value that is assigned; a local vector has the name of its variable."""
@@ -217,6 +266,11 @@ class _Statements(Expressions):
             return tuple(self.made(*pair, scope) for pair in zip(target.elts, node.elts, strict=True))
         kind = LOCALS.get(self.value(node.func, scope)) if isinstance(node, ast.Call) and not node.args else None
         return self.value(node, scope) if kind is None else Components(_name(target), kind)
+
+
+def _ends(statements: list[ast.stmt]) -> bool:
+    """Whether nothing after these statements would be reached."""
+    return bool(statements) and isinstance(statements[-1], (ast.Return, ast.Break, ast.Continue))
 
 
 def _stored(node: ast.Name) -> bool:

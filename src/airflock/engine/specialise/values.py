@@ -32,6 +32,14 @@ class Call:
     text: str
 
 
+class Bundle:
+    """A tuple of arrays: it is handed on whole under its own name, and its parts are bound to names of theirs."""
+
+    def __init__(self, name: str, parts: tuple[str, ...]):
+        self.name = name
+        self.__dict__ |= {part: given(part, name) for part in parts}
+
+
 @dataclass
 class Components:
     """A local vector, totals or aliases: one variable of the driver for each component that is set."""
@@ -59,7 +67,7 @@ def argument(name: str) -> ast.Name:
 def given(name: str, kind: str, item: object = None) -> ast.Name:
     """A name that the driver binds for a stage.
 
-    kind : row, number, record or whole; or rule, the plain function or class `item`, which is named at the end
+    kind : row, number, record, whole or scene; or rule, the plain function or class `item`, which is named at the end
     """
     made = ast.Name(name, LOAD)
     made.kind, made.item = kind, item  # type: ignore[attr-defined]

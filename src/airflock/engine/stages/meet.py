@@ -7,7 +7,7 @@ from typing import Any
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import pair_number
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
 from airflock.world import bvh, polygon, rays
 
@@ -19,10 +19,6 @@ def hide(
 ) -> None:
     """Whom obstacles or the scene hide from agent i, as it believes both to be placed: row `hidden`."""
     x = flock.measured_position
-    if plan.scene:
-        shapes = scene[0]
-        nodes = scene[1]
-        links = scene[2]
     for j in others:
         flock.hidden[j] = ZERO
         if flock.square[j] < HALF * FAR:
@@ -43,7 +39,7 @@ def hide(
                     else:
                         free = least(free, rays.to_edges(x[X][i], x[Y][i], ux, uy, edges, spans[o, 0], spans[o, 1]))
             if plan.scene:
-                free = least(free, bvh.cast(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, ZERO, shapes, nodes, links))
+                free = least(free, bvh.cast(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, ZERO, *tree(scene)))
             flock.hidden[j] = ONE if free < r else ZERO
 
 

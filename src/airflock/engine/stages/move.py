@@ -6,17 +6,12 @@ from typing import Any
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
 from airflock.engine.stages.state import Flock, numbers_of
-from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, most, real, wants
+from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, most, real, wants
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
     """Own velocity as agent i measures it along one axis, m/s."""
     return flock.velocity[a][i] + flock.own_drift[a][i] if plan.noisy and a < plan.dimensions else flock.velocity[a][i]
-
-
-def fields(record: Any) -> range:
-    """Numbers of the fields of a record; none where there is no record."""
-    return range(len(getattr(record, "_fields", ())))
 
 
 def remembered(i: int, flock: Flock, *, plan: Plan) -> Any:

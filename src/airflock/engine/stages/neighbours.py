@@ -48,7 +48,7 @@ def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
     """How old the data of agent j are, as the clocks of both tell, s."""
     return (
         flock.age[j]
-        if plan.lossy or plan.links
+        if plan.lossy or plan.packets
         else (late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late)
     )
 
@@ -68,7 +68,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     axes, k, w = range(plan.dimensions), numbers.k, numbers.w
     heard_position = flock.latest_position if plan.links else flock.heard_position
     heard_velocity = flock.latest_velocity if plan.links else flock.heard_velocity
-    selective = plan.lossy or plan.links
+    selective = plan.lossy or plan.packets
     true_range = plan.perturbed  # who is in range is a matter of true distances
     # A neighbour at exactly the range or the reach counts. Squares of distances that carry the guard TINY, which only
     # double precision can tell, are compared with squares that carry it, too.

@@ -30,11 +30,13 @@ def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
-def receive(
+def receive(  # noqa: C901 - tests of the plan leave one way through
     flock: Flock, numbers: Any, whole: Any, i: int, decision: int, n: int, time: float, late: float, store: Any,
     *, plan: Plan,
 ) -> None:  # fmt: skip
     """Whom agent i hears now, and on two lossy links the newest packet of each, extrapolated.
+
+    What has just come is kept, too, where agents mind whom they have lost.
 
     late  : how old a packet is when it arrives, s
     store : of each pair the last packet: position, velocity, time stamp
@@ -45,8 +47,8 @@ def receive(
     if plan.links:
         fast = real(radio.packets(real(decision), k.fast_rate, numbers.c.period))
         slow = real(radio.packets(real(decision), k.slow_rate, numbers.c.period))
-        if plan.bits == 64:
-            farthest = math.sqrt(k.range * k.range + TINY)  # as d carries its guard
+    if plan.packets and plan.bits == 64:
+        farthest = math.sqrt(k.range * k.range + TINY)  # as d carries its guard
     for j in range(n):
         if plan.periodic:  # neighbours are met at their image
             o = vector()
@@ -71,12 +73,16 @@ def receive(
                 & (d <= (farthest if plan.bits == 64 else k.range))
                 & (random.uniform(w0) >= miss_fast * miss_slow)
             )
+        elif plan.silent:
+            got = arrives & (d <= (farthest if plan.bits == 64 else k.range))
+        if plan.links or plan.silent:
             if plan.suffers("radio"):
                 got = got & (d * d <= least(flock.reach_in[i], flock.reach_out[j]) + TINY)
             if got:
                 for c, row in enumerate(said):
                     store[i, c, j] = row[j]
                 store[i, 2 * dims, j] = by_clock(time - late, j, flock, plan=plan)
+        if plan.links:
             flock.age[j] = by_clock(time, i, flock, plan=plan) - store[i, 2 * dims, j]
             flock.heard[j] = ONE if store[i, 2 * dims, j] > -1e8 else ZERO
             for a in axes:

@@ -8,6 +8,11 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.words import NOTHING
 
 Row = Any  # one number per agent: row[i]
+# The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
+# (rays cast at this decision, whether positions before are known); goals, aim (where the goal is, its number) and
+# reached (time of each, s; -1 before); later (bounds, time and number of each shape that is yet to appear; time -1 once
+# it has). A shape that is not there yet has its bounds far away, so that nothing meets it.
+SCENE = ("shapes", "nodes", "links", "near", "counts", "goals", "aim", "reached", "later")
 
 
 @dataclass(frozen=True)
@@ -46,12 +51,15 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
+    stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
     away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body                                 : what the body remembers, by field of its Memory
+    goal                                 : where its own goal is, m
+    rays                                 : rays that it cast at its last decision
     errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
 
     take       : the row of a name in the driver
@@ -70,9 +78,11 @@ class Flock:
         self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
+        self.stop_position = axes("stop_")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
+        self.goal = axes("goal_")
         self._take = take
 
     @property
@@ -84,6 +94,11 @@ class Flock:
     def age(self) -> Row:
         """How old that is, s."""
         return self._take("age")
+
+    @property
+    def rays(self) -> Row:
+        """How many rays each agent cast at its last decision."""
+        return self._take("rays_")
 
     @property
     def square(self) -> Row:
@@ -130,13 +145,27 @@ class Flock:
         """How far the clock of each agent is ahead, s."""
         return self._take("clock")
 
+    @property
+    def stopped(self) -> Row:
+        """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
+        return self._take("stopped")
+
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
         return self._take(fault_row(kind, what))
 
+    def shared(self, owner: str, name: str) -> Row:
+        """A column of Shared, that a rule of the whole flock fills: of the "model" or of a metric, by its name."""
+        return self._take(f"shared_{owner}_{name}")
+
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""
         return self._take(own_row(letter, name))
+
+
+def tree(scene: Any) -> tuple[Any, Any, Any]:
+    """Shapes of a scene and the tree over them, as `world.bvh` takes them."""
+    return scene.shapes, scene.nodes, scene.links
 
 
 def fault_row(kind: str, what: str) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 from airflock.core.contract import Model
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.state import Flock, numbers_of, tree
 from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
 from airflock.world import bvh, polygon
 
@@ -79,10 +79,6 @@ def boundaries(
     x = flock.measured_position
     if plan.polygon or plan.scene:
         look = least(LIMIT if model.wall_reach is None else ask(model.wall_reach, p=numbers.p), LIMIT)
-    if plan.scene:
-        shapes = scene[0]
-        nodes = scene[1]
-        links = scene[2]
     for i in agents:
         for c in live(model.Walls, plan.dimensions):
             flock.walls[c][i] = ZERO
@@ -99,7 +95,7 @@ def boundaries(
             for i in agents:
                 f = bvh.nearest_of(
                     x[X][i], x[Y][i], x[Z][i], reach_of(i, look, flock, numbers, plan=plan, model=model), ground,
-                    shapes, nodes, links,
+                    *tree(scene),
                 )  # fmt: skip
                 if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
                     feel(i, f, flock, numbers, plan=plan, model=model)

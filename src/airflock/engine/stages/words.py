@@ -27,6 +27,7 @@ class Named(float):
 
 ZERO, HALF, ONE = Named(0.0, "ZERO"), Named(0.5, "HALF"), Named(1.0, "ONE")
 TINY, FAR, LIMIT = Named(1e-12, "TINY"), Named(1e30, "FAR"), Named(1e8, "LIMIT")
+AWAY = Named(1e9, "AWAY")  # m, along each axis: where agents are that only fill up vectors
 START = {"sum": ZERO, "min": FAR, "max": Named(-1e30, "-FAR")}  # a total before its first term
 
 
@@ -72,6 +73,11 @@ def choose(test: Any, a: Any, b: Any) -> Any:
     return a if test else b
 
 
+def repeat(count: int) -> range:
+    """Turns of a loop that a driver keeps as a loop, though their number is known."""
+    return range(count)
+
+
 def vector() -> Any:
     """A local vector, zero along each axis that is not set; in a driver one variable for each that is."""
     return [ZERO, ZERO, ZERO]
@@ -101,6 +107,11 @@ def wants(rule: Callable[..., Any], *names: str) -> bool:
 def reduced(how: str, total: Any, term: Any) -> Any:
     """A total with one more term: their sum, the lesser or the greater."""
     return total + term if how == "sum" else least(total, term) if how == "min" else most(total, term)
+
+
+def fields(record: Any) -> range:
+    """Numbers of the fields of a record; none where there is no record."""
+    return range(len(getattr(record, "_fields", ())))
 
 
 def live(record: Any, dimensions: int) -> list[int]:

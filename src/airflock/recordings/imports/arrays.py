@@ -74,6 +74,11 @@ def refuse_pickle(path: Path) -> None:
 
 
 def _pickled(path: Path) -> str:
+    if path.suffix.lower() in (".pkl", ".pickle"):
+        return (
+            f"{path}: holds pickled Python objects, which could run code when read; if you trust the file and it is a "
+            f"table of pandas, python -c \"import pandas as pd; pd.read_pickle('{path.name}').to_csv('tracks.csv')\""
+        )
     return f"{path}: holds pickled Python objects, which could run code when read; {PLAIN}{COMMAND}".replace(
         "FILE", path.name
     )

@@ -6,21 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.recordings.imports.checks import period_of
+from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, split
 from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
 
 Array = NDArray[np.float64]
 LAG = 0.5  # s over which velocities are summed up, so that resolution does not hide the slope
 TOLERANCE = 0.1  # of a slope that should be 1
 SIGMAS, WILD = 8.0, 20.0  # of a jump, with and without a velocity to predict it
-REASONS = {
-    1e-6: "the time counts microseconds: write t:={t}*1e-6",
-    1e-3: "the time counts milliseconds (or microseconds are named ms): write t:={t}*1e-3",
-    1e3: "positions are in mm, or the time is 1000 times too small: write x:={x}*1e-3, or t:={t}*1e3",
-    1e6: "the time is 10^6 times too small: write t:={t}*1e6",
-    1e2: "positions are in cm: write x:={x}*0.01",
-    1e-2: "velocities are in cm/s: write vx:={vx}*0.01",
-    1 / 3.6: "velocities are in km/h: write vx:={vx}/3.6",
-    3.2808: "positions are in ft: write x:={x}*0.3048",
+REASONS = {  # how many times too fast → why, and what to write: targets and the numbers by which they are wrong
+    1e-6: ("the time counts microseconds", (("t", 1e-6),)),
+    1e-3: ("the time counts milliseconds (or microseconds are named ms)", (("t", 1e-3),)),
+    1e3: ("positions are in mm, or the time is 1000 times too small", (("x", 1e-3), ("t", 1e3))),
+    1e6: ("the time is 10^6 times too small", (("t", 1e6),)),
+    1e2: ("positions are in cm", (("x", 0.01),)),
+    1e-2: ("velocities are in cm/s", (("vx", 0.01),)),
+    1 / 3.6: ("velocities are in km/h", (("vx", 1 / 3.6),)),
+    3.2808: ("positions are in ft", (("x", 0.3048),)),
 }
 
 
@@ -98,14 +99,25 @@ def _compare(
     if wrong:
         slope = float(np.median(slopes[wrong]))
         near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
-        words = {"t": track.label("t"), "x": track.label("x"), "vx": track.label("vx")}
-        reason = REASONS[near].format(**words) if abs(np.log(near / slope)) < 0.1 else "units differ"
+        words, changes = REASONS[near]
+        reason = f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
+        if abs(np.log(near / slope)) >= 0.1:
+            reason = "units differ"
         told = ", ".join(track.label(POSITION[i]) for i in wrong)
         findings.fault(
             f"{source}: column {told}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
             f"as the velocities say: {reason}",
             "axes",
         )
+
+
+def _mapped(track: Track, target: str, wrong: float) -> str:
+    """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
+    label = track.label(target)
+    name, unit = split(label)
+    own = {**TIMES, **LENGTHS, **SPEEDS}.get(unit, 1.0) if name else 1.0
+    column = label if label.isidentifier() else f"'{label}'"
+    return f"{target}:={column}*{own * wrong:.6g}"
 
 
 def check_jumps(track: Track, findings: Findings) -> None:

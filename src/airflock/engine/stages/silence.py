@@ -1,0 +1,41 @@
+"""Silence: an agent stops while a neighbour that it has lost could be near."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from airflock.core import silence
+from airflock.engine.plan import Plan
+from airflock.engine.stages.receive import by_clock
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import HALF, SIDES, TINY, ZERO, X, Y, Z, choose, integer, most, vector
+from airflock.world.edges import nearest_image
+
+
+def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float, store: Any, *, plan: Plan) -> None:
+    """Let stand still who has lost somebody that could be near by now.
+
+    store : of each pair the last packet: position, velocity, time stamp
+    """
+    axes, w, c = range(plan.dimensions), numbers.w, flock.command
+    for i in agents:
+        somebody = ZERO
+        for j in range(n):
+            d = vector()
+            for a in axes:
+                d[a] = store[i, a, j] - flock.measured_position[a][i]
+            if plan.periodic:
+                for a in axes:
+                    d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+            distance = math.sqrt(sum(d[a] * d[a] for a in axes) + TINY)
+            age = by_clock(time, i, flock, plan=plan) - store[i, 2 * plan.dimensions, j]
+            near = silence.could_be_near(distance, age, numbers.silence)
+            somebody = most(somebody, choose(integer(j) == integer(i), ZERO, near))
+        at, o = flock.stop_position, vector()
+        for a in axes:
+            at[a][i] = choose(flock.stopped[i] > HALF, at[a][i], flock.measured_position[a][i])
+            o[a] = at[a][i] - flock.measured_position[a][i]
+        flock.stopped[i] = somebody
+        v = silence.back(o[X], o[Y], o[Z], numbers.silence)
+        for a in axes:
+            c[a][i] = choose(somebody > HALF, v[a], c[a][i])

@@ -1,0 +1,127 @@
+"""Start: where agents are when a flight begins, and how far a place is outside."""
+
+from collections.abc import Callable
+from typing import Any
+
+from airflock.core import random
+from airflock.engine.plan import Plan
+from airflock.engine.stages.percept import level
+from airflock.engine.stages.state import Flock, tree
+from airflock.engine.stages.words import AWAY, HALF, LIMIT, ZERO, X, Y, Z, most, repeat, vector
+from airflock.scenarios.wings import FORMATIONS
+from airflock.world import bvh
+from airflock.world import start as places
+from airflock.world.inside import inside
+
+START = random.START
+SPEEDS, OFFSETS = START + 256, START + 512  # further draws of the same agent
+ATTEMPTS = 20_000  # draws per agent before a start is given up; the border refuses crowded arenas beforehand
+EXTENTS = ("extent_x", "extent_y", "extent_z")
+
+
+def excursion(
+    x: Any, y: Any, z: Any, w: Any, edges: Any, spans: Any, corners: int, obstacles: int, scene: Any, *, plan: Plan
+) -> Any:
+    """How far a position is outside the arena, or inside of what stands in it, m; negative elsewhere."""
+    e = plan.excursion(x, y, level(z, edges, corners, plan=plan), w.half_x, w.half_y, w.half_z, edges, corners)
+    if plan.obstacles:
+        for o in range(obstacles):
+            e = most(e, -plan.obstacle(x, y, z, edges, spans[o, 0], spans[o, 1]).distance)
+    if plan.scene:
+        e = most(e, -bvh.nearest(x, y, z, LIMIT, *tree(scene)).distance)
+    return e
+
+
+def tried(
+    i: int, attempt: int, s: Any, w: Any, whole: Any, edges: Any, spans: Any, scene: Any,
+    excursion: Callable[..., Any], *, plan: Plan,
+) -> Any:  # fmt: skip
+    """Put a random place of agent i into the vector s, m; returns whether it lies in the region of the start."""
+    w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
+    for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
+        s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
+    free = excursion(s[X], s[Y], s[Z], w, edges, spans, whole.corners, whole.obstacles, scene) <= ZERO
+    if plan.start == "ball":
+        free = free & places.in_ball(s[X], s[Y], s[Z], w.extent_x)
+    return free
+
+
+def roomy(free: Any, s: Any, w: Any, scene: Any, *, plan: Plan) -> Any:
+    """Whether a place that is free so far is at `start.clearance` from the scene, and no mesh closes around it."""
+    if plan.scene:
+        if free:
+            free = bvh.nearest(s[X], s[Y], s[Z], w.clearance, *tree(scene)).distance >= w.clearance
+        if plan.meshed and free:
+            free = inside(s[X], s[Y], s[Z], *tree(scene)) < HALF
+    return free
+
+
+def heading_off(i: int, w: Any, whole: Any, *, plan: Plan) -> Any:
+    """Velocity of agent i at the start, in a random direction, m/s."""
+    w0, w1, w2, w3 = random.draw(i, 0, SPEEDS, whole.world, whole.seed_low, whole.seed_high)
+    gx, gy = random.normal_pair(w0, w1)
+    gz, _ = random.normal_pair(w2, w3)
+    return places.heading_off(gx, gy, gz if plan.dimensions == 3 else ZERO, w.speed)
+
+
+def in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> None:
+    """Put the place of agent i in a formation into the vector s, off it by `start.jitter`, m."""
+    f, g = vector(), vector()
+    f[X], f[Y], f[Z] = FORMATIONS[plan.start](i, w.spacing_x, w.spacing_y, w.spacing_z)
+    w0, w1, w2, w3 = random.draw(i, 0, OFFSETS, whole.world, whole.seed_low, whole.seed_high)
+    g[X], g[Y] = random.normal_pair(w0, w1)
+    g[Z], _ = random.normal_pair(w2, w3)
+    for a in range(plan.dimensions):
+        s[a] = f[a] + w.jitter * g[a]
+
+
+def begin(  # noqa: C901 - tests of the plan leave one way through
+    flock: Flock, numbers: Any, whole: Any, n: int, m: int, edges: Any, spans: Any, start: Any, scene: Any,
+    excursion: Callable[..., Any], *, plan: Plan,
+) -> int:  # fmt: skip
+    """Place all agents at rest or at start speed; returns minus the first agent (from 1) that found no room.
+
+    start     : positions and velocities that are handed over, (component, agent)
+    excursion : the stage of this name
+    """
+    axes, x, v, w = range(plan.dimensions), flock.position, flock.velocity, numbers.w
+    for i in range(m):
+        for a in axes:
+            x[a][i] = AWAY
+            v[a][i] = ZERO
+    if plan.given_start:
+        for i in range(n):
+            for a in axes:
+                x[a][i] = start[a, i]
+            for a in axes:
+                v[a][i] = start[a + plan.dimensions, i]
+        return 0
+    if plan.start in FORMATIONS:
+        for i in range(n):
+            s = vector()
+            in_formation(i, s, w, whole, plan=plan)
+            for a in axes:
+                x[a][i] = s[a]
+            v[X][i] = w.speed
+        return 0
+    for i in range(n):
+        placed = False
+        for attempt in repeat(ATTEMPTS):
+            s = vector()
+            free = tried(i, attempt, s, w, whole, edges, spans, scene, excursion, plan=plan)
+            for j in range(i if w.separation > ZERO else 0):
+                free = free & (sum((s[a] - x[a][j]) * (s[a] - x[a][j]) for a in axes) >= w.separation * w.separation)
+            free = roomy(free, s, w, scene, plan=plan)
+            if free:
+                for a in axes:
+                    x[a][i] = s[a]
+                placed = True
+                break
+        if not placed:
+            return -(i + 1)
+        if w.speed > ZERO:
+            u = vector()
+            u[X], u[Y], u[Z] = heading_off(i, w, whole, plan=plan)
+            for a in axes:
+                v[a][i] = u[a]
+    return 0
