@@ -93,7 +93,8 @@ def parameters_of(scenario: Scenario, bits: int = 32) -> Any:
         "tau": body.tau, "a_max": body.a_max, "outer_noise": body.noise,
         "sensor_noise": sensors.noise, "damping": sensors.damping,
         "spring": (2.0 * sensors.damping * sensors.noise) ** 0.5 / sensors.scale,
-        "range": scenario.radio.range, "half_side": 0.5 * scenario.world.side,
+        **{name: getattr(scenario.radio, name) for name in PARAMETERS if hasattr(scenario.radio, name)},
+         "half_side": 0.5 * scenario.world.side,
         "separation": scenario.separation(), "r_coll": measured.r_coll, "r_cluster": measured.r_cluster,
         "dt": scenario.flight.dt, "period": sensors.period,
     }  # fmt: skip
@@ -108,7 +109,7 @@ class Reference:
     def __init__(self, scenario: Scenario, folder: Path, *, bits: int = 32, vector_bits: int = 0, trial: bool = False):
         self.vector_bits = vector_bits or widest()
         self.bits = bits
-        room = max(112, -(-scenario.agents // 16) * 16)
+        room = -(-scenario.agents // 16) * 16
         options = [*flags(self.vector_bits), f"-DROOM={room}"]
         options += ["-DREAL=double"] if bits == 64 else []
         options += ["-DTRIAL_PHYSICS"] if trial else []
@@ -120,6 +121,7 @@ class Reference:
         self.parameters = parameters_of(scenario, bits)
         times = clock(scenario)
         self.times = {name: times[name] for name in TIMES if name in times} | {"agents": scenario.agents}
+        self.times["links"] = int(scenario.radio.kind == "links")
         self.times["delay"] = times["delay"] // times["decide_every"]
 
     def _schedule(self, seed: int, skip: bool) -> Schedule:

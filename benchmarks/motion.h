@@ -94,28 +94,45 @@ PASS void perceive(flock *f, state *ring, int64_t k, const parameters *p, const 
 
 /* ---- Decide ------------------------------------------------------------------------------------------------------ */
 
+typedef struct {
+    real r0_rep, p_rep, r0_frict, c_frict, v_frict, p_frict, a_frict;
+} law;
+
+INLINE law law_of(const parameters *p)
+{
+    return (law){p->r0_rep, p->p_rep, p->r0_frict, p->c_frict, p->v_frict, p->p_frict, p->a_frict};
+}
+
+/* What one neighbour adds: at the offset (dx, dy) from it, with the velocity (ux, uy) relative to the own. */
+INLINE void influence(real dx, real dy, real ux, real uy, const law *l, real *ax, real *ay)
+{
+    real r2 = dx * dx + dy * dy + TINY, u2 = ux * ux + uy * uy + TINY;
+    real per_r = 1 / root(r2), per_u = 1 / root(u2), r = r2 * per_r, u = u2 * per_u;
+    real push = l->p_rep * most(l->r0_rep - r, 0) * per_r;
+    real allowed = most(l->v_frict, braking_curve(r - l->r0_frict, l->a_frict, l->p_frict));
+    real align = l->c_frict * most(u - allowed, 0) * per_u;
+    *ax = push * dx + align * ux;
+    *ay = push * dy + align * uy;
+}
+
 /* Repulsion (Eqs 2-3) and alignment (Eqs 4-7) of all pairs within radio range, summed into the command. */
 PASS void neighbours(flock *f, int n, const parameters *p)
 {
     const state *heard = &f->heard;
-    const real range2 = p->range * p->range, r0_rep = p->r0_rep, p_rep = p->p_rep, r0_frict = p->r0_frict;
-    const real c_frict = p->c_frict, v_frict = p->v_frict, p_frict = p->p_frict, a_frict = p->a_frict;
+    const real range2 = p->range * p->range;
+    const law l = law_of(p);
     for (whole i = 0; i < n; i++) {
         const real mx = f->measured.x[i], my = f->measured.y[i], mvx = f->measured.vx[i], mvy = f->measured.vy[i];
         const real x = f->now.x[i], y = f->now.y[i];
         real sum_x = 0, sum_y = 0;
 #pragma omp simd reduction(+ : sum_x, sum_y) /* gcc would take the outer loop, and leave its rest to scalar code */
         for (whole j = 0; j < ROOM; j++) {
-            real dx = mx - heard->x[j], dy = my - heard->y[j], r2 = dx * dx + dy * dy + TINY;
-            real ux = heard->vx[j] - mvx, uy = heard->vy[j] - mvy, u2 = ux * ux + uy * uy + TINY;
-            real per_r = 1 / root(r2), per_u = 1 / root(u2), r = r2 * per_r, u = u2 * per_u;
-            real push = p_rep * most(r0_rep - r, 0) * per_r;
-            real allowed = most(v_frict, braking_curve(r - r0_frict, a_frict, p_frict));
-            real align = c_frict * most(u - allowed, 0) * per_u;
+            real dx = mx - heard->x[j], dy = my - heard->y[j], ax, ay;
+            influence(dx, dy, heard->vx[j] - mvx, heard->vy[j] - mvy, &l, &ax, &ay);
             real ox = f->now.x[j] - x, oy = f->now.y[j] - y;
-            int hears = ((TRIAL ? r2 : ox * ox + oy * oy) <= range2) & (j != i);
-            sum_x += hears ? push * dx + align * ux : 0;
-            sum_y += hears ? push * dy + align * uy : 0;
+            int hears = ((TRIAL ? dx * dx + dy * dy + TINY : ox * ox + oy * oy) <= range2) & (j != i);
+            sum_x += hears ? ax : 0;
+            sum_y += hears ? ay : 0;
         }
         f->cx[i] = sum_x, f->cy[i] = sum_y;
     }

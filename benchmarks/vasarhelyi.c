@@ -2,9 +2,9 @@
 
    The yardstick for the generated drivers of airflock: the same equations, the same random numbers, the same order of
    events, so that both can be compared number by number, and every loop laid out so that a C compiler vectorises it.
-   The stages of a step are in motion.h, the order parameters in measure.h; this file is their order. */
+   The stages of a step are in motion.h and radio.h, the order parameters in measure.h; this file is their order. */
 #include "measure.h"
-#include "motion.h"
+#include "radio.h"
 
 static void conclude(const sums *t, int n, score *out)
 {
@@ -37,13 +37,16 @@ int evaluate(const parameters *p, const schedule *s, real *frames, score *out)
     flock flying, *f = &flying;
     state ring[s->delay + 1];
     sums t = {.least = (double)FAR};
+    real packet[s->links ? 5 * n * ROOM : 1] __attribute__((aligned(64)));
+    for (int i = 0; i < (s->links ? 5 * n * ROOM : 0); i++) packet[i] = i < 4 * n * ROOM ? 0 : (real)-1e9;
     real gap = 0, travelled = 0; /* no pair can have met before it has travelled this gap */
     int status = begin(f, n, p, s);
     for (int64_t step = 0; status == 0 && step <= s->steps - TRIAL; step++) {
         real near2 = -1; /* not known */
         if (step % s->decide_every == 0) {
             perceive(f, ring, step / s->decide_every, p, s);
-            neighbours(f, n, p);
+            if (s->links) neighbours_linked(f, n, p, s, step / s->decide_every, packet);
+            else neighbours(f, n, p);
             decide(f, p);
         }
         if (step % s->sample_every == 0) {

@@ -25,6 +25,7 @@ typedef struct {
     real sensor_noise, damping, spring;          /* errors of the sensors: m²/s², 1/s, 1/s² */
     real range, half_side, separation;           /* radio range, half side of the arena, least distance at the start */
     real r_coll, r_cluster;                      /* nearer pairs collide; nearer pairs are linked */
+    real near, far, received_near, received_far, fast_rate, slow_rate; /* two lossy links: m, shares, 1/s */
     real dt, period;                             /* motion step; time between two decisions */
 } parameters;
 
@@ -32,6 +33,7 @@ typedef struct {
     int64_t agents, steps;
     int64_t decide_every, sample_every, collide_every; /* in steps */
     int64_t delay;                                     /* in decisions */
+    int64_t links; /* 1: packets come over two lossy links, and the newest of each is carried on */
     int64_t skip; /* 1: leave the collision check out while nobody can be near enough; 0: all pairs every time */
     uint32_t seed_low, seed_high;
 } schedule;

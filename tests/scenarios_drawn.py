@@ -22,6 +22,7 @@ from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import SENSORS
 
 # A length (m) at which agents of a law act on each other, the number that carries it, and a speed, m/s
 SCALES = {
@@ -278,21 +279,38 @@ def perception(keys: dict[str, Any], rng: Random, length: float, dt: float) -> N
     if rng.random() < 0.25 and keys["model.kind"] != "dimock_2003" and "aero.k_d" not in keys:
         keys |= {
             "update": "sequential",
-            "sensors.noise": 0.0,
+            "sensors.kind": rng.choice(("perfect", "langevin")),
             "sensors.period": rng.choice((0.0, dt)),
             "radio.delay": 0.0,
         }
+        if keys["sensors.kind"] == "langevin":
+            keys["sensors.noise"] = 0.0
         return
     keys["update"] = "synchronous"
-    keys["sensors.noise"] = rng.choice((0.0, 0.05 * length))
-    keys["sensors.scale"] = rng.choice((3.0, 0.3 * length))
     keys["sensors.period"] = dt * rng.choice((0, 1, 2, 3, 5))
+    sensors(keys, rng, length, dt)
     keys["radio.delay"] = dt * rng.choice((0, 0, 1, 4, 7))
     keys["radio.kind"] = rng.choice(("constant", "links"))
     if keys["radio.kind"] == "links":
         keys |= {"radio.near": 0.2 * length, "radio.far": length, "radio.slow_rate": rng.choice((0.7, 4.0))}
     if rng.random() < 0.4:
         keys |= {"radio.loss": rng.choice((0.3, 1.0)), "radio.loss_at": length}
+
+
+def sensors(keys: dict[str, Any], rng: Random, length: float, dt: float) -> None:
+    """By what agents know themselves."""
+    kind = keys["sensors.kind"] = rng.choice(("langevin", "langevin", *SENSORS))
+    if kind == "langevin":
+        keys["sensors.noise"] = rng.choice((0.0, 0.05 * length))
+        keys["sensors.scale"] = rng.choice((3.0, 0.3 * length))
+    if kind == "delayed":
+        keys["sensors.lag"] = max(keys["sensors.period"], dt) * rng.choice((0.0, 1.0, 1.3, 4.0))
+    if kind == "gnss":
+        for name in ("sd", "sd_up", "white", "bias", "sd_velocity", "jump_sd", "coasting"):
+            keys[f"sensors.{name}"] = rng.choice((0.0, 0.02 * length))
+        keys |= {"sensors.drift_time": rng.choice((0.1, 10.0)), "sensors.jump_rate": rng.choice((0.0, 2.0))}
+        keys |= {"sensors.jump_time": rng.choice((0.0, 0.2)), "sensors.outage_time": rng.choice((0.0, 0.3))}
+        keys["sensors.outage_rate"] = rng.choice((0.0, 2.0))
 
 
 def topology(keys: dict[str, Any], rng: Random, length: float, three: bool) -> None:
@@ -346,6 +364,7 @@ OPTIONS = {section: options(record) for section, record in {**SECTIONS, "flight"
 OPTIONS |= {kind: options(find_model(kind).Parameters) for kind in MODELS}
 OPTIONS |= {
     "model": {"kind": MODELS},
+    "sensors": {"kind": tuple(SENSORS)},
     "body": {"kind": tuple(KNOWN_BODIES), **options(KNOWN_BODIES["heading"].Parameters)},
 }
 OPTIONS["wing"] = OPTIONS["wing"] | {"segments": tuple(dict.fromkeys(SEGMENTS))}
@@ -361,7 +380,7 @@ def notions(draw: Draw) -> set[str]:
     """What is on or off, and which of each choice was drawn."""
     found, keys = draw.scenario, draw.keys
     switches: dict[str, bool] = {
-        "three": found.dimensions == 3, "noisy": found.sensors.noise > 0.0, "late": found.radio.delay > 0.0,
+        "three": found.dimensions == 3, "noisy": found.errs, "late": found.radio.delay > 0.0,
         "lossy": found.radio.loss > 0.0, "links": found.radio.kind == "links", "gusts": found.wind.gust > 0.0,
         "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
         "scene": found.scene.kind != "none", "goals": found.goals.kind not in ("none", "own"),
@@ -384,7 +403,7 @@ def notions(draw: Draw) -> set[str]:
     for section, record in records.items():
         owner = kind if section == "model" else section
         names |= {f"{owner}.{name} = {value}" for name, value in choices(record).items()}
-    return names | {f"model.kind = {kind}", f"body.kind = {keys['body.kind']}"}
+    return names | {f"{section}.kind = {keys[f'{section}.kind']}" for section in ("model", "body", "sensors")}
 
 
 IMPOSSIBLE = (

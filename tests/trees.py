@@ -10,8 +10,11 @@ import ast
 import copy
 import hashlib
 
-STAGES = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move")
-STAGES = (*STAGES, "turns", *(f"{name}_of" for name in STAGES))
+TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
+STAGES = (
+    *TURNS, *(f"{name}_of" for name in TURNS), "begin", "excursion", "tune", "meet", "aim_", "glide_", "appear_",
+    "measure_sample", "measure_collision", "advance", "measure_frames", "turns",
+)  # fmt: skip
 
 
 def functions(text, rows):

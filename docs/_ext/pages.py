@@ -166,14 +166,16 @@ def robots() -> None:
     """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
-    from airflock.body import radio, sensors, wind
+    from airflock.body import radio, wind
     from airflock.body.registry import BODIES
     from airflock.core import silence
     from airflock.scenarios.keys import keys as keys_of
+    from airflock.sensors.registry import SENSORS
 
     pieces = [
         "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
-        "Neighbours hear of it through the radio, and an agent knows itself through its sensors.\n",
+        "Neighbours hear of it through the radio, and an agent knows itself through its sensors "
+        "([how to choose and write one](../sensors.md)).\n",
         _abilities(BODIES),
     ]
     for name, body in BODIES.items():
@@ -181,7 +183,13 @@ def robots() -> None:
         pieces.append(f'\n## body.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
         pieces.append(f"It takes a command of kind {body.accepts}.\n\n```python\n{getsource(body.move)}```\n\n")
         pieces.append(key_table(keys_of(name)))
-    for name, module in (("sensors", sensors), ("radio", radio), ("silence", silence), ("wind", wind)):
+    for name, sensor in SENSORS.items():
+        rule = sensor.measure or sensor.error
+        module = sys.modules[rule.__module__]
+        pieces.append(f'\n## sensors.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
+        pieces.append(f"{prose(sensor.Parameters.__doc__ or '')}\n\n```python\n{getsource(rule)}```\n\n")
+        pieces.append(key_table(keys_of(name)))
+    for name, module in (("radio", radio), ("silence", silence), ("wind", wind)):
         pieces.append(f"\n## {name}\n\n{prose(module.__doc__ or '')} {prose(module.Parameters.__doc__ or '')}\n\n")
         rules = [value for value in vars(module).values() if getattr(value, "__module__", "") == module.__name__]
         for rule in rules:
@@ -217,6 +225,7 @@ def vocabulary() -> None:
         "boundary": "of a model: asked for each wall and obstacle; returns Walls",
         "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
         "decide": "of a model: returns the command, and its Memory where it has one",
+        "meet": "of a topology: says whom of those that it hears an agent meets",
         "move": "of a body: returns the velocity after a step",
         "pair": "of an order parameter: asked for each pair of agents",
         "linked": "of an order parameter: whether two agents belong to one cluster",
@@ -228,13 +237,16 @@ def vocabulary() -> None:
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
         "limits": "of a body: what of a scenario it cannot fly, as lines",
+        "measure": "of a sensor: the position and velocity that an agent believes, and its Memory where it has one",
+        "error": "of a sensor: the errors of position and velocity along one axis after one more measurement",
+        "exact": "of a sensor: whether it tells the truth with these numbers",
+        "bounds": "of a sensor: what of a scenario it cannot measure, as lines",
         "sense": "of a fault: the position and velocity that an agent believes, after its sensors",
         "tell": "of a fault: the position and velocity that it sends to the others",
         "radio": "of a fault: how far its radio hears and is heard",
         "clock": "of a fault: how far its clock is ahead, s",
         "overrule": "of a fault: the command that reaches the body",
         "motion": "of a fault: the velocity after a step of motion",
-        "meet": "of a topology: fills a row with 1.0 for each neighbour that an agent meets",
         "leaves": "of a fault: time from its beginning until the agent is absent, s",
         "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
     }
@@ -265,7 +277,8 @@ def keys() -> None:
         "# Every key of a scenario file\n\nThe same lists are printed by `airflock keys`, `airflock keys radio`, "
         "`airflock keys delay`, and with `--json` for machines. A dash means that the value comes from the rest of the "
         "scenario. Four more keys stand at the top: `title`, `extends` (a preset or file to begin from), `published` "
-        "(what a paper reports), and `model.kind` and `body.kind` name the law and the body.\n"
+        "(what a paper reports), and `model.kind`, `body.kind` and "
+        "`sensors.kind` name the law, the body and the sensor.\n"
     ]
     for name in records():
         head = f'model.kind = "{name}"' if name in MODELS else name

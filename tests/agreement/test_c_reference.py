@@ -39,6 +39,15 @@ def test_hand_written_c_flies_the_compiled_flight(tmp_path, seed, bits, seconds,
     assert flown.values == pytest.approx(score, rel=margin, abs=margin)
 
 
+def test_hand_written_c_hears_the_packets_that_the_compiled_flight_hears(tmp_path, seed):
+    keys = {"radio.kind": "links", "radio.delay": 0.4, "radio.near": 5.0, "radio.far": 15.0, "radio.received_far": 0.2}
+    found = load("vasarhelyi_2018/4ms", CROWDED | keys | {"duration": 12.0})
+    frames, score = c_reference.Reference(found, tmp_path, bits=64).frames(seed)
+    flown = fly(found, seed, precision=64, record=True)
+    np.testing.assert_allclose(frames, flown.frames[:, :4], rtol=0.0, atol=1e-9)
+    assert flown.values == pytest.approx(score, rel=1e-9, abs=1e-9)
+
+
 def test_skipping_the_pairs_changes_no_bit_in_c(tmp_path, seed):
     reference = c_reference.Reference(crowd(5.0), tmp_path)
     assert reference.evaluate(seed, skip=True) == reference.evaluate(seed, skip=False)

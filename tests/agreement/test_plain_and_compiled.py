@@ -25,8 +25,9 @@ FLIGHTS = {
     }),
     "polygon": ("vasarhelyi_2018", {
         "agents": 8, "world.arena": "polygon", "world.corners": NOTCHED, "radio.kind": "links", "radio.loss": 0.6,
-        "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "wind.north": -1.5, "sensors.noise": 0.0,
-        "radio.delay": 0.31, "sensors.period": 0.3, "metrics.period": 0.5,
+        "radio.near": 10.0, "radio.far": 25.0, "radio.slow_rate": 0.7, "radio.fast_rate": 33.0, "wind.north": -1.5,
+        "sensors.kind": "delayed", "sensors.lag": 0.4, "radio.delay": 0.31, "sensors.period": 0.3,
+        "metrics.period": 0.5,
     }),
     "circle": ("vasarhelyi_2018", {
         "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "fixed_wing",
@@ -36,6 +37,9 @@ FLIGHTS = {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
         "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
         "wind.kind": "dryden", "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
+        "sensors.kind": "gnss",
+        "sensors.drift_time": 3.0, "sensors.bias": 1.0, "sensors.white": 0.3, "sensors.jump_rate": 0.2,
+        "sensors.jump_time": 1.0, "sensors.outage_rate": 0.2, "sensors.outage_time": 0.8,
     }),
     "silence": ("vasarhelyi_2018", {  # more than the half of all packets are lost: everybody stops now and then
         "agents": 8, "radio.loss": 0.6, "radio.loss_at": 0.1, "radio.delay": 0.2, "silence.rule": "stop",

@@ -11,6 +11,7 @@ from airflock.engine.generate import Source
 from airflock.engine.passes.driver import HEAD
 from airflock.engine.primitives import primitives
 from airflock.engine.store import load_driver
+from airflock.recordings.perception import packet_uniforms
 
 # Random123 (Salmon et al. 2011), kat_vectors, philox4x32 with 10 rounds: counter, key, answer
 ONES = 0xFFFFFFFF
@@ -95,10 +96,28 @@ def test_uniform_numbers_lie_strictly_inside_in_single_precision(word):
 
 
 def test_every_stream_has_a_number_of_its_own():
-    names = ("SENSOR", "OUTER", "START", "LOSS", "LINK", "GUST", "MODEL")
+    names = ("SENSOR", "OUTER", "START", "GUST", "MODEL", "PACKET")
     numbers = {getattr(random, name) for name in names}
     assert len(numbers) == len(names)
     assert all(0 < number < 256 for number in numbers)  # draws are counted above
+
+
+@pytest.mark.parametrize("agents", [1, 2, 3, 4, 5, 31, 32])
+def test_every_pair_of_a_flock_has_a_random_word_of_its_own(agents):
+    pairs = [(i, j) for i in range(agents) for j in range(agents)]
+    assert len({(random.pair_number(i, j, agents), i & 3) for i, j in pairs}) == len(pairs)
+    table = packet_uniforms(2**40 + 5, 3, 17, agents)
+    assert table.shape == (agents, agents)
+    for i, j in pairs:
+        assert table[i, j] == random.pair_uniform(2**40 + 5, random.PACKET, 3, 17, i, j, agents)
+
+
+def test_receivers_that_share_a_call_hear_independently(seed):
+    """Of 20,000 decisions: uniform numbers of the four receivers have mean 1/2 and no correlation, to 4.5 SD."""
+    table = np.array([packet_uniforms(seed, 0, decision, 4)[:, 0] for decision in range(20_000)])
+    assert np.abs(table.mean(axis=0) - 0.5).max() < 4.5 * math.sqrt(1 / 12 / len(table))
+    shared = np.corrcoef(table.T) - np.eye(4)
+    assert np.abs(shared).max() < 4.5 / math.sqrt(len(table))
 
 
 def test_draws_of_a_stream_meet_no_other_stream():

@@ -21,7 +21,7 @@ from airflock.engine.passes import build as building
 from airflock.engine.passes import driver
 from airflock.engine.simulate import plan_of
 from airflock.engine.specialise import values
-from airflock.engine.stages import move, neighbours, noise, perceive, receive, surfaces
+from airflock.engine.stages import decide, move, neighbours, noise, perceive, receive, scene, start, surfaces
 from airflock.scenarios.files import load, presets
 from flocks import ISLANDS, NOTCHED, SILENT, scenario
 from trees import digests
@@ -100,12 +100,15 @@ def test_stages_are_the_trees_on_record(name):
 
 
 CHANGES = (
-    (receive, "real(decision), k.fast_rate", "real(decision), k.slow_rate", "links"),
+    (receive, "real(decision), rate", "real(decision + 1), rate", "links"),
     (neighbours, "integer(j) != ii", "integer(j) == ii", "quiet"),
     (neighbours, "if plan.periodic:", "if plan.delayed:", "quiet"),
     (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
     (perceive, "flock.position[a][i] + flock.own_error", "flock.position[a][i] + flock.sent_error", "3-D"),
+    (decide, "flock.command[a][i] = o[a]", "flock.command[a][i] = o[0]", "quiet"),
+    (start, "return -(i + 1)", "return -i", "quiet"),
+    (scene, "later[r, 6] <= time", "later[r, 6] >= time", "kidger/city"),
     (noise, "step % 2 == 0", "step % 2 == 1", "links"),
 )
 

@@ -22,6 +22,10 @@ from reference.flight import fly_plainly  # noqa: E402
 
 COMMON = {"duration": 0.8, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}
 COMMON |= {"start.separation": 4.0, "agents": 5}
+GNSS = {
+    "sensors.kind": "gnss", "sensors.drift_time": 1.0, "sensors.bias": 1.0, "sensors.white": 0.3,
+    "sensors.jump_rate": 0.7, "sensors.jump_time": 0.3, "sensors.outage_rate": 0.7, "sensors.outage_time": 0.3,
+}  # fmt: skip
 # model or preset, keys, threads per agent, states in registers
 CASES = {
     "paper": ("vasarhelyi_2018", {
@@ -33,6 +37,7 @@ CASES = {
     }, 1, True),
     "split": ("vasarhelyi_2018", {
         "metrics.r_cluster": 12.0, "start.speed": 15.0, "agents": 7, "body.kind": "fixed_wing", "model.v_flock": 15.0,
+        "sensors.kind": "delayed", "sensors.lag": 0.3,
     }, 2, True),
     "storm": ("viragh_2014", {
         "world.obstacles": ISLANDS, "radio.loss": 0.7, "radio.delay": 0.47, "wind.gust": 2.0, "start.speed": 3.0,
@@ -50,7 +55,7 @@ CASES = {
         "world.arena": "polygon", "world.corners": NOTCHED, "sensors.noise": 0.0, "radio.delay": 0.31,
         "sensors.period": 0.25, "metrics.period": 0.5, "agents": 4,
     }, 1, True),
-    "silo": ("viragh_2014", {key: value for key, value in IDEAL.items() if key != "body.noise"} | {
+    "silo": ("viragh_2014", {key: value for key, value in IDEAL.items() if not key.endswith(".noise")} | GNSS | {
         "world.dimensions": "3", "world.arena": "circle", "world.floor": 5.0, "world.obstacles": ISLANDS[:1],
         "world.heights": [[0.0, 18.0]], "body.kind": "quadrotor", "dt": 0.04, "duration": 0.6, "wind.east": 3.0,
         "wind.kind": "dryden",

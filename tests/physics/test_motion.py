@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from airflock.body import jostled, motion, sensors, wind
+from airflock.body import jostled, motion, wind
 from airflock.core import random
 from airflock.engine.place import Place
 from airflock.scenarios.files import load
+from airflock.sensors import langevin
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario
 from reference.begin import begin
@@ -16,10 +17,10 @@ from reference.begin import begin
 
 def error_statistics(h, **settings):
     """Stationary covariance of (q, u) of the sensor error: the rule is linear, so its moments are known exactly."""
-    s = sensors.Parameters(**settings)
-    columns = [sensors.langevin(1.0, 0.0, 0.0, h, s), sensors.langevin(0.0, 1.0, 0.0, h, s)]
+    s = langevin.Parameters(**settings)
+    columns = [langevin.error(1.0, 0.0, 0.0, h, s), langevin.error(0.0, 1.0, 0.0, h, s)]
     step = np.array(columns).T
-    push = np.array(sensors.langevin(0.0, 0.0, 1.0, h, s))
+    push = np.array(langevin.error(0.0, 0.0, 1.0, h, s))
     # C = A C Aᵀ + b bᵀ, solved as linear equations
     return np.linalg.solve(np.eye(4) - np.kron(step, step), np.outer(push, push).ravel()).reshape(2, 2)
 
@@ -27,7 +28,7 @@ def error_statistics(h, **settings):
 @pytest.mark.parametrize("settings", [{}, {"noise": 0.08}, {"damping": 0.3}, {"scale": 1.0, "noise": 0.02}])
 def test_sensor_error_has_its_stationary_deviations(settings):
     """SD(u) = sqrt(S) and SD(q) = sqrt(S / D) with D = sqrt(2 damping S) / scale, as the period goes to zero."""
-    s = sensors.Parameters(**settings)
+    s = langevin.Parameters(**settings)
     spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale
     for h, margin in ((0.2, 0.12), (0.002, 0.0012)):
         found = error_statistics(h, **settings)
@@ -38,13 +39,13 @@ def test_sensor_error_has_its_stationary_deviations(settings):
 
 def test_sensor_error_in_random_numbers(seed):
     """The exact covariance is what random numbers give: 400 errors, 10 decay times after they began at zero."""
-    s, h = sensors.Parameters(damping=1.0), 0.2
+    s, h = langevin.Parameters(damping=1.0), 0.2
     ends = []
     for agent in range(400):
         q = u = 0.0
         for step in range(100):
             g, _ = random.normal_pair(*random.words(seed, random.SENSOR, 0, step, agent)[:2])
-            q, u = sensors.langevin(q, u, g, h, s)
+            q, u = langevin.error(q, u, g, h, s)
         ends.append((q, u))
     expected = error_statistics(h, damping=1.0)
     np.testing.assert_allclose(

@@ -7,7 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airflock.body.radio import Parameters, lost, packets, received
+from airflock.body.radio import (
+    FEW,
+    Parameters,
+    either,
+    lost,
+    missed,
+    missed_few,
+    packets,
+    power,
+    received,
+    thrice,
+    unheard,
+)
 
 K = Parameters(loss=0.3)
 
@@ -34,6 +46,29 @@ def test_a_farther_agent_is_never_heard_better(r, s):
     near, far = sorted((r, s))
     assert received(far, 0.0, K) <= received(near, 0.0, K) + 1e-12
     assert lost(near, K) <= lost(far, K)
+
+
+@given(st.floats(0.0, 1.0), st.integers(0, 65535))
+def test_powers_by_products_are_powers(x, n):
+    assert power(x, n) == pytest.approx(x**n, rel=1e-9, abs=1e-300)
+    assert thrice(x, n & 3) == pytest.approx(x ** (n & 3), rel=1e-12)
+
+
+@given(st.floats(0.0, 500.0), st.integers(0, FEW), st.integers(0, FEW))
+def test_nothing_arrives_where_every_packet_is_missed(distance, fast, slow):
+    each = [1.0 - received(distance, 0.0, K)] * fast + [1.0 - received(distance, 1.0, K)] * slow
+    assert missed(distance, fast, slow, K) == pytest.approx(math.prod(each), rel=1e-9)
+    assert missed_few(distance, fast, slow, K) == pytest.approx(math.prod(each), rel=1e-9)
+
+
+@given(st.floats(0.0, 500.0), st.integers(0, 2000))
+def test_nothing_arrives_where_one_of_two_mishaps_happens(distance, step):
+    assert unheard(distance, step, 0.2, K) == lost(distance, K)  # a constant radio sends once
+    linked = Parameters(kind="links", loss=0.3)
+    sent = packets(step, linked.fast_rate, 0.2), packets(step, linked.slow_rate, 0.2)
+    arrives = (1.0 - lost(distance, linked)) * (1.0 - missed(distance, *sent, linked))
+    assert unheard(distance, step, 0.2, linked) == pytest.approx(1.0 - arrives, abs=1e-12)
+    assert either(0.4, 1.0) == pytest.approx(1.0) and either(0.0, 0.4) == 0.4
 
 
 @given(st.floats(0.1, 50.0), st.floats(0.02, 2.0), st.integers(1, 2000))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import dryden, radio, sensors, wind
+from airflock.body import dryden, radio, wind
 from airflock.checking.flock import of_model
 from airflock.core import random
 from airflock.core.agent import State, answer
@@ -37,7 +37,7 @@ class Agent:
     """One agent in the air.
 
     state      : true position (m) and velocity (m/s)
-    pilot      : what decides; b: the numbers of its body, kept: the body's Memory
+    pilot      : what decides; b: the numbers of its body, kept: the body's Memory; sensed: the sensor's
     command    : what it flies by: its pilot's last command, if no fault has overruled it
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
@@ -48,6 +48,7 @@ class Agent:
     pilot: Pilot
     b: Any = None
     kept: Any = None
+    sensed: Any = None
     command: Vector = ZERO
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
@@ -98,7 +99,7 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
         course.advance(step * dt, dt, states(flock, None if scenario.goals.kind == "own" else there))
         place.appear(step * dt, states(flock, there))
         if (step + delay) % every == 0:
-            past[(step + delay) // every] = states(flock)
+            past[(step + delay) // every] = told_of(scenario, flock)
         if step % every == 0 and scenario.flight.update == "synchronous":
             number = step // every
             shared = dict(zip(there, solve(states(flock, there)), strict=True)) if solve else None
@@ -136,7 +137,8 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
         told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
     )  # fmt: skip
-    return Agent(state, pilot, b, scenario.vehicle.Memory() if scenario.vehicle.Memory else None)
+    kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
+    return Agent(state, pilot, b, kept, sensed)
 
 
 def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
@@ -165,6 +167,11 @@ def states(flock: Sequence[Agent], who: Sequence[int] | None = None) -> list[Sta
     return [agent.state for agent in flock] if who is None else [flock[i].state for i in who]
 
 
+def told_of(scenario: Scenario, flock: Sequence[Agent]) -> list[State]:
+    """What agents send: the true state, or that with the errors of the last measurement."""
+    return states(flock) if scenario.sensor.measure is None else [plus(agent.state, agent.own) for agent in flock]
+
+
 def components(flock: Sequence[Agent], dims: int) -> NDArray[np.float64]:
     """Position, velocity and command, (component, agent), only the axes that are flown."""
     rows = [
@@ -187,9 +194,9 @@ def decisions(
     time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
-    if scenario.sensors.noise > 0.0:
+    if not scenario.sensor.is_exact(scenario.sensors):
         for i, agent in enumerate(flock):
-            drift(scenario, seed, number, i, agent)
+            drift(scenario, seed, number, i, agent, time)
     times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
     sent = (number * times["decide_every"] - times["delay"]) * dt
     said = [
@@ -221,19 +228,41 @@ def fading(scenario: Scenario, seed: int, number: int, i: int, n: int) -> dict[i
     return {j: random.normal_pair(*found[:2])[0] for j, found in words.items()}
 
 
-def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent) -> None:
-    """Advance both errors of one agent by one sensor period."""
+def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> None:
+    """Advance both errors of one agent by one sensor period, or have it measure."""
+    if scenario.sensor.measure is not None:
+        agent.own, agent.sensed = sensed(scenario, seed, number, i, agent, time)
+        return
     s, period = scenario.sensors, clock(scenario)["decide_every"] * scenario.flight.dt
     own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
     own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
-    agent.own = swing(agent.own, (own_x, own_y, own_z), period, s)
-    agent.sent = swing(agent.sent, (sent_x, sent_y, sent_z), period, s)
+    rule = scenario.sensor.error
+    agent.own = swing(rule, agent.own, (own_x, own_y, own_z), period, s)
+    agent.sent = swing(rule, agent.sent, (sent_x, sent_y, sent_z), period, s)
 
 
-def swing(error: State, g: Vector, period: float, s: sensors.Parameters) -> State:
+def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time: float) -> tuple[State, Any]:
+    """How far what an agent measures is off, and what its sensor remembers."""
+    sensor, period = scenario.sensor, clock(scenario)["decide_every"] * scenario.flight.dt
+    drawn = [g for block in (8, 9, 10) for g in normals(seed, random.SENSOR, number, i, draw=block)]
+    chances = [random.uniform(word) for word in random.words(seed, random.SENSOR, 0, number, i, draw=11)]
+    given = agent.state._asdict() | {f"g{c}": g for c, g in enumerate(drawn)}
+    given |= {f"u{c}": u for c, u in enumerate(chances)}
+    given |= {"memory": agent.sensed, "time": time, "period": period, "s": scenario.sensors}
+    found = answer(sensor.measure, "measure", given, sensor.name)
+    off = [a - b for a, b in zip(found[:6], agent.state, strict=True)]
+    if scenario.dimensions == 2:
+        off[2] = off[5] = 0.0
+    return State(*off), found[6] if sensor.Memory else None
+
+
+def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
     """One step of an error on all axes."""
-    steps = [sensors.langevin(error[c], error[3 + c], g[c], period, s) for c in range(3)]
-    return State(*(q for q, _ in steps), *(u for _, u in steps))
+    steps = [
+        answer(rule, "error", {"dx": error[c], "dv": error[3 + c], "g": g[c], "period": period, "s": s})
+        for c in range(3)
+    ]
+    return State(*(dx for dx, _ in steps), *(dv for _, dv in steps))
 
 
 def hear(
@@ -251,25 +280,13 @@ def hear(
         carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
         carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
-        pair = i * len(flock) + j
-        arrives = k.loss == 0.0 or random.uniform(random.words(seed, random.LOSS, 0, number, pair)[0]) >= radio.lost(
-            distance, k
-        )
+        period = clock(scenario)["decide_every"] * scenario.flight.dt
+        u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
         if in_range:
             found.add(j)
-        arrives = arrives and in_range and carries
-        if arrives and (k.kind == "constant" or linked(scenario, seed, number, pair, distance)):
+        if in_range and carries and u >= radio.unheard(distance, number, period, k):
             flock[i].pilot.hear(j, said[j], time - late + theirs, time + mine)
     return found
-
-
-def linked(scenario: Scenario, seed: int, number: int, pair: int, distance: float) -> bool:
-    """Whether at least one packet arrives on the fast or the slow link of a pair in this period."""
-    k, period = scenario.radio, clock(scenario)["decide_every"] * scenario.flight.dt
-    missed = 1.0
-    for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
-        missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, period)
-    return bool(random.uniform(random.words(seed, random.LINK, 0, number, pair)[0]) >= missed)
 
 
 # --------------------------------------------------------------------------------------------------------- motion

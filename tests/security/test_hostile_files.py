@@ -31,7 +31,13 @@ def packed(tmp_path):
     (tmp_path / "set.toml").write_text(
         'scenario = "vasarhelyi_2018/4ms"\n[set]\n"model.kind" = "EVIL"\n'.replace("EVIL", str(tmp_path / "evil.py"))
     )
-    for section in ("body", "metrics"):
+    evil = str(tmp_path / "evil.py")
+    for name, entry in {
+        "several": '"evil.toml"',
+        "several_set": '{ scenario = "vasarhelyi_2018/4ms", set = { "model.kind" = "EVIL" } }'.replace("EVIL", evil),
+    }.items():
+        (tmp_path / f"{name}.toml").write_text(f'scenarios = ["vasarhelyi_2018/4ms", {entry}]\n')
+    for section in ("body", "sensors", "metrics"):
         text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
         (tmp_path / f"{section}.toml").write_text(text)
     text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
@@ -110,6 +116,7 @@ WAYS = {
         CONSENT,
     ),
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
+    "sensor of a scenario": (python('airflock.load("sensors.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),
     "fault of an event": (
@@ -134,6 +141,8 @@ WAYS = {
     "simulate": (python('airflock.simulate("evil.toml")'), CONSENT),
     "study of own fitness": (python('load_study("own.toml")'), CONSENT),
     "study of a scenario with a law": (python('load_study("study.toml")'), CONSENT),
+    "study of several with a law": (python('load_study("several.toml")'), CONSENT),
+    "study of several that sets a law": (python('load_study("several_set.toml")'), CONSENT),
     "study that sets a law": (python('load_study("set.toml")'), CONSENT),
     "score of a recording": (python('airflock.score(airflock.load_recording("evil.nc"))'), ""),
     "validate": (command("validate", "evil.toml"), ""),

@@ -12,13 +12,16 @@ from airflock.checking.bodies import check_body
 from airflock.checking.metrics import check_metric
 from airflock.checking.models import check_model
 from airflock.checking.report import CheckError
+from airflock.checking.sensors import check_sensor
 from airflock.checking.units import Units, factor
 from airflock.core.contract import body, metric, model
+from airflock.core.sensor import sensor
 from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import METRICS, SETS
 from airflock.models import vasarhelyi_2018, viragh_2014
 from airflock.models.vasarhelyi_2018 import Sums
 from airflock.scenarios.laws import MODELS, find_model
+from airflock.sensors.registry import SENSORS
 
 
 @pytest.mark.parametrize("name", [name for name in MODELS if name != "dimock_2003"])
@@ -50,6 +53,11 @@ def test_every_body_keeps_the_standing_list(name):
     assert not check_body(name).broken
 
 
+@pytest.mark.parametrize("name", SENSORS)
+def test_every_sensor_keeps_the_standing_list(name):
+    assert not check_sensor(name).broken
+
+
 def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
     assert not check_model(str(Path(__file__).parents[2] / "examples" / "own_rule.py")).broken
 
@@ -59,6 +67,7 @@ def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
     [
         (check_model, "vasarhely", "did you mean vasarhelyi_2018"),
         (check_body, "multirotr", "did you mean multirotor"),
+        (check_sensor, "gns", "did you mean gnss"),
         (check_metric, "ordr", "did you mean order"),
         (check_metric, "nowhere.py", "no such file"),
     ],
@@ -192,3 +201,29 @@ def test_units_are_products_of_powers():
     ]  # fmt: skip
     with pytest.raises(RuleError, match="'ft'"):
         factor("ft/s", twice)
+
+
+def skewed(x, y, z, vx, vy, vz):
+    return x + 0.3, y, z, vx, vy, vz
+
+
+def beacon(x, y, z, vx, vy, vz, g0):
+    return 1.01 * x, y, z, vx, vy, vz
+
+
+def drifting(dx, dv, g, period):
+    return 1.1 * dx + g * period * dv, dv + g
+
+
+def liar(s):
+    return True
+
+
+@pytest.mark.parametrize(
+    ("rules", "truth"),
+    [({"measure": skewed}, "units"), ({"measure": beacon}, "place"), ({"error": drifting}, "bounded"),
+     ({"measure": skewed, "exact": liar}, "exact")],
+)  # fmt: skip
+def test_what_is_planted_in_a_sensor_is_found(rules, truth):
+    with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
+        check_sensor(sensor(rules, "planted"))

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.body import radio, sensors
+from airflock.body import radio
 from airflock.core import random
 from airflock.errors import RecordingError, ScenarioError
 from airflock.identify import body, packets, periods, synthetic
@@ -17,6 +17,7 @@ from airflock.identify import sensors as standing
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
 from airflock.identify.run import HARDER, UNITS, Number, identify
+from airflock.sensors import langevin
 
 STEP = 0.05
 
@@ -98,7 +99,7 @@ def test_words_of_arrays_are_the_words_of_the_engine():
 
 
 def test_the_error_of_navigation_comes_back_from_drones_that_stand():
-    truth = sensors.Parameters(noise=0.02, damping=0.15, scale=4.0)
+    truth = langevin.Parameters(noise=0.02, damping=0.15, scale=4.0)
     g = np.random.default_rng(5)
     logs = synthetic.stand(11, 10, 300.0, truth, synthetic.Disturbed(white=0.05), g)
     found = standing.fit_sensors(logs, truth.period)

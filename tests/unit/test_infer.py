@@ -60,8 +60,8 @@ def brief(monkeypatch):
     """Little searching: enough for two laws of a few numbers."""
     for module, name, value in (
         (fit, "DRAWN", 40), (fit, "STARTS", 3), (select, "SEARCHES", 0), (select, "DEEP", 0),
-        (fit, "SMALL", 120), (select, "HOPS", 0),
-        (select, "FEW_HOPS", 0), (bootstrap, "ROUNDS", (2, 5)), (bootstrap, "LADDER", (-1.0, 0.0, 1.0)),
+        (select, "HOPS", 0), (select, "FEW_HOPS", 0), (bootstrap, "ROUNDS", (2, 5)),
+        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 

@@ -37,7 +37,9 @@ def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(m
     cells.crowd(plan)
     meet, add = grid.neighbours, CudaBuilder.function
     monkeypatch.setattr(
-        grid, "neighbours", lambda build, lines, before, inner, sums: meet(build, lines, before, respelled(inner), sums)
+        grid,
+        "neighbours",
+        lambda build, lines, before, inner, sums, met: meet(build, lines, before, respelled(inner), sums),
     )
     monkeypatch.setattr(
         CudaBuilder,

@@ -40,7 +40,7 @@ def unrolled(flock, i, *, plan):
 
 
 def asking(flock, i, *, rule):
-    flock.position[0][i] = ask(rule, near=flock.age[i], far=flock.heard[i])
+    flock.position[0][i] = ask(rule, near=flock.clock[i], far=flock.rays[i])
 
 
 def far_only(far):
@@ -60,11 +60,11 @@ def sought(flock, i, *, plan):
     if plan.dimensions == 3:
         return 7
     for attempt in repeat(1000):
-        while flock.age[i] > ZERO:
+        while flock.clock[i] > ZERO:
             if plan.sequential:
                 break
-            flock.age[i] = flock.age[i] - attempt
-        if flock.heard[i] > ZERO:
+            flock.clock[i] = flock.clock[i] - attempt
+        if flock.rays[i] > ZERO:
             return attempt
     return -1
 
@@ -99,8 +99,8 @@ def test_axes_are_unrolled_and_what_nobody_reads_is_dropped():
 
 def test_a_rule_is_given_what_it_asks_for_and_nothing_else_is_bound():
     found = made(asking, rule=far_only)
-    assert found.lines[-1].endswith("far_only(heard[i])")
-    assert not any(line.startswith("age") for line in found.lines)
+    assert found.lines[-1].endswith("far_only(rays_[i])")
+    assert not any(line.startswith("clock") for line in found.lines)
 
 
 FAULTS = (
@@ -120,8 +120,8 @@ def test_a_fault_names_file_line_and_stage(stage, said):
 def test_loops_that_search_stay_loops_and_may_be_left():
     found = made(sought)
     assert found.lines == [
-        "age = work[0]", "heard = work[1]", "for attempt in range(1000):", "    while age[i] > ZERO:",
-        "        age[i] = age[i] - attempt", "    if heard[i] > ZERO:", "        return attempt",
+        "clock = work[0]", "rays_ = work[1]", "for attempt in range(1000):", "    while clock[i] > ZERO:",
+        "        clock[i] = clock[i] - attempt", "    if rays_[i] > ZERO:", "        return attempt",
     ]  # fmt: skip
     assert found.answer == "-1"
 

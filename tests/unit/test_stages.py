@@ -102,7 +102,7 @@ class World:
             "work": rng.uniform(-12.0, 12.0, (len(self.build.rows), n)),
             "ring": rng.uniform(-12.0, 12.0, (2, 2 * dims, n)),
             "words": np.zeros((4, n), np.uint32).astype(object),
-            "store": np.concatenate([rng.uniform(-9.0, 9.0, (n, 2 * dims, n)), np.full((n, 1, n), -1e9)], 1),
+            "store": np.concatenate([rng.uniform(-9.0, 9.0, (2 * dims, n, n)), np.full((1, n, n), -1e9)]),
             "gust": np.array([0.3, -0.2, 0.1, 0.5, -0.4])[: 5 if self.plan.dryden else 3],
         }  # fmt: skip
         whole = dict(zip(WHOLE, self.tables.whole.tolist(), strict=True))
@@ -116,6 +116,7 @@ class World:
         held |= {name: float(getattr(words, name)) for name in ("ZERO", "HALF", "ONE", "TINY", "FAR", "LIMIT", "AWAY")}
         held |= {name: getattr(random, name) for name in random.PRIMITIVES}
         held |= {"math": math, "np": np, "namedtuple": namedtuple, "JIT": {}, "wide_vectors": lambda: None}
+        held["apart"] = lambda: None
         held["njit"] = lambda *_, **__: lambda function: function
         exec("\n\n".join([*self.build.source.blocks, *self.build.functions]), held)
         return held
@@ -127,7 +128,7 @@ class World:
         made["snapshot"](1, n, state["work"], state["ring"])
         made["perceive"](step, 0, n, *common, state["ring"], state["words"])
         around = (self.rest[name] for name in perceive.around(self.plan))
-        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], *around)
+        made["neighbours"](step, n, n, 0.7, 0.2, *common, state["store"], state["words"], *around)
         made["boundaries"](n, *common, *self.rest.values())
         made["decide"](step, n, 0.7, *common, None, *list(self.rest.values())[1:])
         state["fastest"] = made["move"](step, n, n, *common, state["words"], state["gust"])
@@ -146,6 +147,8 @@ class World:
         def take(name):
             if name[0] == "u" and name[1:].isdigit():
                 return state["words"][int(name[1:])]
+            if name.startswith("packet"):
+                return state["store"][int(name[len("packet") :])]
             # a row that no driver has holds what nobody asks for
             return state["work"][self.build.row(name)] if self.build.row(name) < len(state["work"]) else np.zeros(n)
 
@@ -153,8 +156,8 @@ class World:
         measuring.snapshot(flock, 1, n, state["ring"], plan=plan)
         measuring.perceive(flock, numbers, whole, step, 0, n, state["ring"], plan=plan)
 
-        def hear(i):
-            receive.receive(flock, numbers, whole, i, step, n, 0.7, 0.2, state["store"], plan=plan)
+        def draw(i):
+            receive.draw(range(n), flock, whole, i, step, n, plan=plan)
 
         fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
@@ -164,8 +167,8 @@ class World:
             meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan)
 
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, 0.2, hear, pick, plan=plan, model=model, sums=sums,
-            images=plan.periodic,
+            range(n), range(n), flock, numbers, step, 0.7, 0.2, state["words"], draw, None, pick, plan=plan,
+            model=model, sums=sums, images=plan.periodic,
         )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
         deciding.decide(

@@ -113,10 +113,11 @@ def logs(tmp_path_factory):
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "_rate", lambda *_: 300.0)
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
-    how = {"like": make(MINE, "mine"), "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
+    how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
     tau = load(tmp_path / "a" / "identified.toml").body.tau
     assert tau == pytest.approx(0.5, rel=0.1) and found.scenario.body.tau == tau != make(MINE, "mine").body.tau
+    assert tomllib.loads((tmp_path / "a" / "study" / "study.toml").read_text())["search"]["start"] == "scenario"
     told = {number["key"]: number for number in found.document()["identified"]["numbers"]}
     assert told["body.tau"]["low"] < 0.5 < told["body.tau"]["high"] and "reason" in told["radio.delay"]
     page = (tmp_path / "a" / "report.html").read_text()

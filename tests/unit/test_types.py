@@ -99,7 +99,8 @@ def test_every_word_of_the_vocabulary_has_a_type():
         text = f"def {kind}({', '.join(words)}): pass\n"
         text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
-        beside = {"limits": ["move"]} | dict.fromkeys(("decide", "meet", "move", "sample", *FAULT), [])
+        beside = {"limits": ["move"], "exact": ["measure"], "bounds": ["measure"]}
+        beside |= dict.fromkeys(("decide", "meet", "move", "sample", "measure", "error", *FAULT), [])
         text += "".join(f"def {name}(): pass\n" for name in beside.get(kind, ["decide", "sample"]))
         (rule,) = [
             node

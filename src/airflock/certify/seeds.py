@@ -10,6 +10,7 @@ from typing import Any
 
 from airflock.errors import StudyError
 from airflock.scenarios.scenario import Scenario
+from airflock.sensors.registry import USUAL
 
 FIRST = 1 << 62
 BITS = 30  # numbers of flights within one part
@@ -29,6 +30,8 @@ def identity(scenario: Scenario) -> str:
     stands = hashlib.sha256(scenario.stands().shapes.tobytes()).hexdigest() if scenario.scene.draw == "once" else ""
     told["scene"] = {**told["scene"], "file": "", "stands": stands}
     told["laws"] = [scenario.model.name, scenario.vehicle.name]
+    if scenario.sensor.name != USUAL:  # so that certificates from before there were others stay what they are
+        told["laws"].append(scenario.sensor.name)
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 

@@ -30,7 +30,8 @@ HALVINGS = 3  # after a value that is safe and one that is not are known
 # number of the environment → which way is worse; where it is zero there is no factor to move it by
 WORSE = {
     "radio.delay": 1, "radio.range": -1, "radio.far": -1, "radio.received_far": -1, "radio.loss": 1,
-    "sensors.noise": 1, "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.a_max": -1, "wind.gust": 1,
+    "sensors.noise": 1, "sensors.sd": 1, "sensors.jump_rate": 1, "sensors.outage_rate": 1, "sensors.lag": 1,
+    "sensors.period": 1, "body.noise": 1, "body.tau": 1, "body.a_max": -1, "wind.gust": 1,
     "agents": 1,
 }  # fmt: skip
 WHOLE = ("agents",)

@@ -1,7 +1,7 @@
 """Typed copies of rule files: the same text, in which every argument that the vocabulary knows has its type.
 
 A rule's argument names are its declaration, so a type checker need not be told them by hand. `typed_copy` writes them
-into a copy: numbers are floats, `p`, `q` and `b` the records of parameters, `own`, `sums` and the others what the
+into a copy: numbers are floats, `p`, `q`, `b` and `s` the records of parameters, `own`, `sums` and the others what the
 contract says. Choices become the literal words that they may be. Nothing else of the text changes.
 """
 
@@ -169,6 +169,8 @@ def _result(item: ast.FunctionDef, kind: str, names: _Names, scalar: bool) -> st
     found = RESULTS.get(kind, "")
     if "Memory" in names.bound and kind in ("decide", "move"):
         return 'tuple[float, float, float, "Memory"]'
+    if "Memory" in names.bound and kind == "measure":
+        return f'tuple[{", ".join(["float"] * 6)}, "Memory"]'
     if "Memory" in names.bound and kind == "agent":
         return 'tuple["Agent", "Memory"]'
     if not found or found[0].islower() or found == "None":

@@ -209,7 +209,7 @@ def _time_step(law: Law, seed: int) -> str:
 def _quiet(scenario: Scenario) -> Scenario:
     """The scenario without noise."""
     noise = {"noise": 0.0} if hasattr(scenario.body, "noise") else {}
-    return replace(scenario, sensors=replace(scenario.sensors, noise=0.0), body=replace(scenario.body, **noise))
+    return replace(scenario.unerring, body=replace(scenario.body, **noise))
 
 
 def _units(law: Law, scenes: Sequence[Scene], seed: int) -> str:

@@ -12,7 +12,7 @@ Found = TypeVar("Found")
 
 
 class CheckError(AirflockError, AssertionError):
-    """A law, an order parameter or a body breaks a truth that it does not declare (VIOLATES)."""
+    """A law, an order parameter, a body or a sensor breaks a truth that it does not declare (VIOLATES)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Report:
-    """What was checked of one law, order parameter or body."""
+    """What was checked of one law, order parameter, body or sensor."""
 
     name: str
     truths: tuple[Truth, ...]

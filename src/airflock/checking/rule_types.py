@@ -3,6 +3,7 @@
 LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
 MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
+SENSOR = ("measure", "error", "exact", "bounds")
 FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
 COLUMNS = "MutableSequence[float]"
 
@@ -24,7 +25,7 @@ KNOWN = {
 RECORDS = {
     "own": "Own", "percept": "Percept", "sums": "Sums", "walls": "Walls", "memory": "Memory", "shared": "Shared",
     "pair": "Pair", "agents": "Agent", "members": "Member", "clusters": "Cluster", "mean": "Mean", "wing": "Wing",
-    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters", "f": "Parameters",
+    "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters", "s": "Parameters", "f": "Parameters",
 }  # fmt: skip
 OF_FLOCK = {
     **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
@@ -39,7 +40,8 @@ SPECIAL = {
     "fitness": {"values": "Mapping[str, float]", "agents": "int"},
     "faults": {"edges": "str"},
 }
-LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "f": FAULT}  # of the record of parameters, by owner
+# of the record of parameters, by owner
+LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "s": SENSOR, "f": FAULT}
 STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
@@ -49,7 +51,8 @@ RESULTS = {
     "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
-    "radio": "tuple[float, float]",
+    "radio": "tuple[float, float]", "measure": STATE, "error": "tuple[float, float]", "exact": "bool",
+    "bounds": "list[str]",
 }  # fmt: skip
 
 
@@ -64,6 +67,8 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
         kinds |= {name: name for name in (*MEASURES, "workspace", "total")}
     if "meet" in functions:
         kinds |= {"meet": "meet"}
+    if not kinds and functions & {"measure", "error"}:
+        kinds = {name: name for name in SENSOR}
     if not kinds:  # elsewhere these are names of helpers
         kinds = {name: name for name in FAULT}
     return {name: kind for name, kind in kinds.items() if name in functions}

@@ -86,7 +86,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.tune("mine.toml", "tuned")', "tune",
         {
             "scenario": "scenario", "out": "out", **SETTINGS, **TABLE,
-            **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "resume", "threads", "trust")},
+            **{name: name for name in ("budget", "limit", "confidence", "like", "heard", "warm", "resume")},
+            "threads": "threads", "trust": "trust",
         },
     ),
     "plot": Counterpart(
@@ -191,5 +192,5 @@ COUNTERPARTS: dict[str, Counterpart] = {
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
-    "metric", "metric_set", "check_model", "check_body", "check_metric", "quantity", "choice",
+    "sensor", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor", "quantity", "choice",
 )  # fmt: skip

@@ -126,7 +126,7 @@ def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, 
             tables.say(f"{time:8.2f} s  drone {member:3d}  {note}")
     if departed:
         tables.say("largest distance to the simulated flight, m; and of the simulation itself after a nudge of 1 cm")
-        if found.sensors.noise > 0.0:
+        if found.errs and found.sensor.error is not None:
             tables.say("(a drone sends the position that it flies by; a simulated one has two errors: they part)")
         for t, ours, theirs in zip(*departed, strict=True):
             tables.say(f"  after {t:g} s: {ours:.4f}   {theirs:.4f}")

@@ -31,6 +31,9 @@ def tune(
     heard: Annotated[
         Path | None, typer.Option(metavar="FILE.csv", help="Packets of the logs, as identify takes them.")
     ] = None,
+    warm: Annotated[
+        bool, typer.Option("--warm", help="Search from the scaled numbers on, not from the middle of all ranges.")
+    ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue what is in the folder.")] = False,
     changes: options.Set = None,
     trust: options.Trust = False,
@@ -66,7 +69,7 @@ def tune(
     assert found is not None
     options.compile_aloud(found, 32, "cpu")
     what: Any = found if like is None else scenario
-    how: dict[str, Any] = {"confidence": confidence, "resume": resume, "threads": threads, "trust": trust}
+    how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
         how |= {"like": found, "heard": heard}
     with _stages(as_json) as (watch, note):

@@ -8,18 +8,18 @@ device binds its own form of the same arithmetic (`airflock.engine.primitives`).
 
 import math
 
-# Every stream of the project. Numbers are never reused; a stream may draw 256 times per step.
+# Every stream of the project. Numbers are never reused; a stream may draw 256 times per step. 4 and 5 were packets lost
+# and packets received on links, one call for each pair, until PACKET replaced them.
 SENSOR = 1  # Langevin noise of own and of sent measurements
 OUTER = 2  # white outer noise on the acceleration
 START = 3  # where the agents start
-LOSS = 4  # packets lost between one pair
-LINK = 5  # packets received on one link between one pair
 GUST = 6  # wind gusts, common to the flock
 MODEL = 7  # noise that a model asks for through percept.normal and percept.uniform
 SCENE = 8  # the scene of a flight, where each flight has its own
 SHOW = 9  # seeds of the parts of a show: step is the leg, agent the segment
 FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent the entry or the one who may be hit
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
+PACKET = 12  # whether anything of what one agent sends another arrives: agent is the number of the pair, `pair_number`
 FADE = 16  # strength of the signal between one pair, the same both ways
 
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
@@ -78,6 +78,16 @@ def draw(c0, c1, c2, c3, k0, k1):
 def words(seed, stream, world, step, agent, draw=0):
     """Four random words of 32 bits for one consumer; seed may use 64 bits, the others 32, draw 8."""
     return philox(agent, step, stream + 256 * draw, world, seed, seed >> 32)
+
+
+def pair_number(receiver, sender, agents):
+    """Number of a pair among so many agents. Four receivers share one: the word of each is receiver & 3 of the four."""
+    return (receiver >> 2) * agents + sender
+
+
+def pair_uniform(seed, stream, world, step, receiver, sender, agents):
+    """Uniform number of one receiver and one sender, strictly between 0 and 1, in one step."""
+    return uniform(words(seed, stream, world, step, pair_number(receiver, sender, agents))[receiver & 3])
 
 
 def uniform(word):

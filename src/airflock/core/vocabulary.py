@@ -121,6 +121,25 @@ STATE = {
     "vy": "the same, north, m/s",
     "vz": "the same, up, m/s",
 }
+SENSED = {
+    "x": "true position, east, m",
+    "y": "the same, north, m",
+    "z": "the same, up, m",
+    "vx": "true velocity, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "memory": "the sensor's Memory of this agent",
+    **{f"g{k}": "normal random number, new at each measurement" for k in range(12)},
+    **{f"u{k}": "uniform random number between 0 and 1, new at each measurement" for k in range(4)},
+    "time": "time of the measurement, s",
+    "period": "time between two measurements, s",
+}
+AXIS_ERROR = {
+    "dx": "error of the position along one axis at the last measurement, m",
+    "dv": "error of the velocity along this axis at the last measurement, m/s",
+    "g": "normal random number of this axis",
+    "period": "time between two measurements, s",
+}
 MEET = {
     "n": "number of others",
     "dx": "offsets to the others as believed, east, m; dx[j] is that to number j",
@@ -170,6 +189,10 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "flock": {**FLOCK, "p": "the model's parameters"},
     "decide": {**AGENT, "p": "the model's parameters"},
     "move": {**BODY, "b": "the body's parameters"},
+    "measure": {**SENSED, "s": "the sensor's parameters"},
+    "error": {**AXIS_ERROR, "s": "the sensor's parameters"},
+    "exact": {"s": "the sensor's parameters"},
+    "bounds": {"s": "the sensor's parameters", "period": "time between two measurements, s", "dt": "time step, s"},
     "pair": {name: PAIR[name] for name in ("dx", "dy", "dz", "r", "r2", "lower")} | {"q": "metric parameters"},
     "linked": {"r": "distance of two agents, m", "r2": "its square, m²; cheaper than r", "q": "metric parameters"},
     "agent": {**MEASURED, "q": "metric parameters"},

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
+from airflock.engine.plan import Plan
 from airflock.engine.state import BEGUN, State
 
 
@@ -22,8 +23,8 @@ def carry(old: State, new: State, step: int) -> None:
     new.arrays["past"][...] = _under_way(old, new, step, lanes)
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
-    if old.plan.links and new.plan.links:
-        new.arrays["store"][...] = old.arrays["store"][lanes[: old.agents]][..., lanes]
+    if old.plan.packets and new.plan.packets:
+        new.arrays["store"][...] = old.arrays["store"][:, lanes[: old.agents]][..., lanes]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
         new.arrays["mem"][...] = old.arrays["mem"][:, lanes]
     _remembered(old, new, lanes)
@@ -55,16 +56,21 @@ def _lanes(old: State, new: State) -> NDArray[np.int64]:
 def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
     """Rows of the work table, whole lanes."""
     work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
-    other = {f"body{c}" for c in range(len(new.plan.body.beginnings))} if new.plan.body != old.plan.body else set()
+    other = {name for name in new.plan.beginnings if not _goes_on(name, old.plan, new.plan)}
     truth = {*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)}
     for name, place in new.driver.ROWS.items():
-        if name in other:  # another body begins to remember anew
+        if name in other:  # another body or sensor begins to remember anew
             continue
         source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in truth else None
         if source is not None:
             work[place] = before[had[source]][lanes]
     if new.has_slots and "order" not in had:
         new.order[:] = np.arange(new.agents)
+
+
+def _goes_on(row: str, old: Plan, new: Plan) -> bool:
+    """Whether a row of what a body or a sensor remembers means the same in both plans."""
+    return old.body == new.body if row.startswith("body") else old.senses and old.sensor == new.sensor
 
 
 def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> NDArray[Any]:

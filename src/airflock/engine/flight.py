@@ -156,7 +156,7 @@ class Flight:
     @property
     def sent(self) -> NDArray[Any]:
         """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
-        stamps = self._state.arrays["store"][:, 2 * self._state.plan.dimensions, : self.agents].astype(float)
+        stamps = self._state.arrays["store"][2 * self._state.plan.dimensions, :, : self.agents].astype(float)
         return np.where(stamps > NEVER / 10.0, stamps, np.nan)
 
     @property

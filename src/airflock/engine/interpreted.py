@@ -105,6 +105,7 @@ PLAIN: Mapping[str, Any] = {
     "most": most,
     "choose": _choose,
     "wide_vectors": lambda: None,
+    "apart": lambda: None,
     **{name: getattr(random, name) for name in random.PRIMITIVES},
 }
 

@@ -51,7 +51,7 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     plan, model = state.plan, scenario.model
     every = state.whole("decide_every")
     number = step // every
-    measured, said = [motion(state, prefix) for prefix in ("m", "eh" if plan.links else "h")]
+    measured, said = [motion(state, prefix) for prefix in ("m", "h")]
     truth = motion(state, "")
     own = measured[agent]
     heard = tuple(_heard(scenario, state, agent, number, truth, said, seed, world))
@@ -95,8 +95,6 @@ def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
 def motion(state: State, prefix: str) -> list[Motion]:
     """States of all agents from the rows with a prefix, or the true ones where the plan keeps no such rows."""
     axes, had = state.plan.axes, state.driver.ROWS
-    if prefix == "eh":  # a row of one agent's ear at a time: the packets themselves are in the store
-        prefix = "h"
     names = [f"{prefix}{name}" for name in (*axes, *(f"v{axis}" for axis in axes))]
     rows = state.rows([name if name in had else name[len(prefix) :] for name in names]).astype(float)
     flat = [0.0] * (3 - len(axes))
@@ -130,7 +128,7 @@ def _heard(
         pair = min(i, j) * n + max(i, j)
         fade = random.normal_pair(*random.words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
         if plan.links:
-            packet = state.arrays["store"][_slot(state, i), :, _slot(state, j)].tolist()
+            packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             if stamp <= NEVER / 10.0:
                 continue
@@ -139,9 +137,9 @@ def _heard(
             yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age, fade)
         elif distance * distance > reach[j]:
             continue
-        elif not plan.lossy or random.uniform(
-            random.words(seed, random.LOSS, world, number, i * n + j)[0]
-        ) >= radio.lost(distance, k):
+        elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(
+            distance, k
+        ):
             yield Heard(j, said[j], late + clocks[i] - clocks[j], fade)
 
 

@@ -8,7 +8,9 @@ from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import choices
+from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
+from airflock.sensors.registry import SENSORS, USUAL
 from airflock.world import arena, edges, excursion, rays
 from airflock.world.place import obstacle_rule, raised
 
@@ -51,6 +53,8 @@ class Plan:
     excursion : how far outside a position is
     ray       : free distance along a direction
     body      : what turns commands into motion; body_choices its compile-time constants
+    sensor    : what agents measure of themselves by; sensor_choices its compile-time constants
+    noisy     : it errs
     edge      : what happens to a coordinate beyond the arena's faces, if anything
     start     : region in which agents start
     scene     : something stands in the world that agents see with rays, feel, or must not touch
@@ -59,6 +63,7 @@ class Plan:
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
+    few       : each of two lossy links sends at most `radio.FEW` packets in a decision
     silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
@@ -75,6 +80,8 @@ class Plan:
     ray: Callable[..., float] = rays.to_nothing
     body: Body = BODIES["multirotor"]
     body_choices: tuple[tuple[str, str], ...] = ()
+    sensor: Sensor = SENSORS[USUAL]
+    sensor_choices: tuple[tuple[str, str], ...] = ()
     edge: Callable[..., Any] | None = None
     start: str = "arena"
     scene: bool = False
@@ -91,6 +98,7 @@ class Plan:
     delayed: bool = True
     lossy: bool = False
     links: bool = False
+    few: bool = True
     silent: bool = False
     windy: bool = False
     dryden: bool = False
@@ -195,7 +203,20 @@ class Plan:
         """Choices and usual numbers by record name, inlined as constants."""
         wing: dict[str, str | float] = dict(self.wing_choices)
         aero: dict[str, str | float] = dict(self.aero_choices)
-        return {"p": dict(self.model_choices), "b": dict(self.body_choices), "wing": wing, "aero": aero}
+        body: dict[str, str | float] = dict(self.body_choices)
+        sensor: dict[str, str | float] = dict(self.sensor_choices)
+        return {"p": dict(self.model_choices), "b": body, "s": sensor, "wing": wing, "aero": aero}
+
+    @property
+    def senses(self) -> bool:
+        """Whether the sensor makes of the true state the one that is believed; else its errors are added."""
+        return self.noisy and self.sensor.measure is not None
+
+    @property
+    def beginnings(self) -> dict[str, float]:
+        """Rows of what bodies and sensors remember, by name, and what they hold before an agent has flown."""
+        kept = {"body": self.body.beginnings, "sense": self.sensor.beginnings if self.senses else ()}
+        return {f"{row}{c}": value for row, values in kept.items() for c, value in enumerate(values)}
 
     @property
     def periodic(self) -> bool:

@@ -60,16 +60,17 @@ def _set(state: "State", here: int) -> None:
     order = work[rows["order"], lanes].copy()
     work[:, lanes] = 0.0
     work[rows["order"], lanes] = order
-    for c, begin in enumerate(plan.body.beginnings if "body0" in rows else ()):
-        work[rows[f"body{c}"], lanes] = begin
+    for name, begin in plan.beginnings.items():
+        if name in rows:
+            work[rows[name], lanes] = begin
     state.arrays["past"][:, :, lanes] = 0.0
     for c, axis in enumerate(plan.axes):
         work[rows[axis], lanes] = AWAY
         state.arrays["past"][:, c, lanes] = AWAY
     if plan.packets:
-        for part in (state.arrays["store"][lanes], state.arrays["store"][:, :, lanes]):
-            part[...] = 0.0
-        state.arrays["store"][lanes, -1] = state.arrays["store"][:, -1, lanes] = NEVER
+        store = state.arrays["store"]
+        store[:, lanes] = store[:, :, lanes] = 0.0
+        store[-1, lanes] = store[-1, :, lanes] = NEVER
     count, real = state.agents - here, work.dtype
     state.arrays["mem"][:, lanes] = beginning(plan.model.Memory, count, real)
     state.arrays["memory"][:, lanes] = memories(plan, count, real)
@@ -85,5 +86,5 @@ def _put(state: "State", places: list[int]) -> None:
     for name in ("work", "past", "mem", "memory"):
         arrays[name][..., : state.agents] = arrays[name][..., at]
     if state.plan.packets:
-        arrays["store"][...] = arrays["store"][at]
+        arrays["store"][...] = arrays["store"][:, at]
         arrays["store"][..., : state.agents] = arrays["store"][..., at]

@@ -10,6 +10,7 @@ from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.contract import Model
 from airflock.core.fault import RULES, Fault
+from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
 from airflock.engine import law
 from airflock.engine.passes.flock import shapes_of
@@ -67,6 +68,23 @@ def probe_fault(kind: Fault) -> None:
         found = len(answer) if isinstance(answer, tuple) else 1
         if found != count:
             raise RuleError(f"{_place(rule)}: {kind.name}.{name} returns {found} of {count} numbers: {what}")
+
+
+@cache
+def probe_sensor(sensor: Sensor) -> None:
+    """The same for the rule of a sensor."""
+    kind = "measure" if sensor.error is None else "error"
+    rule = sensor.measure or sensor.error
+    assert rule is not None
+    law.check(rule)
+    given: dict[str, Any] = {name: 0.5 + 0.01 * k for k, name in enumerate(VOCABULARY[kind])}
+    given["s"], given["memory"] = sensor.Parameters(), sensor.Memory() if sensor.Memory is not None else None
+    answer = _call(rule, kind, given, sensor.name)
+    shape = "dx, dv" if kind == "error" else ", ".join((*COMPONENTS, *(["Memory(...)"] if sensor.Memory else [])))
+    if not isinstance(answer, tuple) or len(answer) != len(shape.split(", ")):
+        raise RuleError(f"{_place(rule)}: {sensor.name}.{kind} must return {shape}")
+    if sensor.Memory is not None:
+        _same_length(rule, answer[-1], sensor.Memory, sensor.name)
 
 
 def _shared(model: Model, given: dict[str, Any]) -> Any:

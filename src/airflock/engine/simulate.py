@@ -7,13 +7,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from airflock.body import radio
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, Plan, make_plan
-from airflock.engine.probe import probe, probe_fault
+from airflock.engine.probe import probe, probe_fault, probe_sensor
 from airflock.engine.state import State
 from airflock.engine.tables import tables
 from airflock.errors import FlightError, ScenarioError
@@ -47,6 +48,8 @@ def plan_of(
     wind, kinds = scenario.wind, scenario.fault_kinds
     for kind in kinds:
         probe_fault(kind)
+    if scenario.errs:
+        probe_sensor(scenario.sensor)
     return make_plan(
         scenario.model,
         scenario.parameters,
@@ -62,6 +65,7 @@ def plan_of(
         ),
         body=scenario.vehicle,
         body_choices=tuple(sorted(choices(scenario.body).items())),
+        **_sensing(scenario),
         start=scenario.start.kind,
         scene=scenario.scene.draw == "flight" or bool(len(scenario.stands().shapes)),
         meshed=scenario.scene.kind == "mesh",
@@ -69,13 +73,13 @@ def plan_of(
         herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
         own=scenario.goals.kind == "own",
         sequential=scenario.flight.update == "sequential",
-        noisy=scenario.sensors.noise > 0.0,
         delayed=clock(scenario)["delay"] > 0,
         lossy=scenario.radio.loss > 0.0,
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
         links=scenario.radio.kind == "links",
+        few=_few_packets(scenario),
         silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
@@ -84,6 +88,23 @@ def plan_of(
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )
+
+
+def _sensing(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
+    if not scenario.errs:
+        return {"noisy": False}
+    chosen = tuple(sorted(choices(scenario.sensors).items()))
+    return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": chosen}
+
+
+def _few_packets(scenario: Scenario) -> bool:
+    """Whether each of two lossy links sends at most `radio.FEW` packets between two decisions; True without links."""
+    k = scenario.radio
+    if k.kind != "links":
+        return True
+    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    return max(k.fast_rate, k.slow_rate) * period <= radio.FEW - 0.1  # rounding may make it one packet more
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
@@ -323,7 +344,7 @@ GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flight
 
 def _pays(scenario: Scenario) -> bool:
     """Whether neighbours are found by cells: many agents, a model of finite reach, perception as things are."""
-    perfect = scenario.sensors.noise == 0.0 and clock(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
+    perfect = not scenario.errs and clock(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
     return (
         scenario.agents >= GRID_FROM
         and scenario.model.reach is not None

@@ -49,8 +49,9 @@ class State:
         self.buffer, self.arrays = layout.filled()
         own = self.arrays
         own["row"][:], own["whole"][:] = tables.row, tables.whole
-        for c, begin in enumerate(plan.body.beginnings if "body0" in driver.ROWS else ()):
-            own["work"][driver.ROWS[f"body{c}"]] = begin
+        for name, begin in plan.beginnings.items():
+            if name in driver.ROWS:
+                own["work"][driver.ROWS[name]] = begin
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
         self.fill_own()
@@ -312,13 +313,13 @@ def _layout(
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
     m, dims = lanes(agents), plan.dimensions
     label = np.int32 if plan.bits == 32 else np.int64
-    packets = (agents, 2 * dims + 1, m) if plan.packets else (1, 2 * dims + 1, 1)
+    packets = (2 * dims + 1, agents, m) if plan.packets else (2 * dims + 1, 1, 1)
     values, sums = sums_of(plan)
     beginnings = {
         "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,
         "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
-    beginnings["store"][:, 2 * dims] = NEVER
+    beginnings["store"][2 * dims] = NEVER
     columns = sum(map(len, plan.records.values()))
     gusts = (5 if plan.dryden else 3,)
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {

@@ -5,7 +5,9 @@ not one by the comparison that Numba makes of min (2.4 times on the nearest-neig
 expression without a branch: of two branches on one test LLVM makes two ways through a loop, and the extremes at their
 ends are then no reductions any more (9 times on the same loop). `copy_block` copies a few neighbours in a row of one
 contiguous table to another one, plus a shift, as one vector. `wide_vectors` asks for 512-bit vectors in the function
-that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones.
+that calls it: LLVM takes 256 bits by default, for processors whose clock falls with wider ones. `apart` promises that
+the arguments of the function that calls it lie apart in memory: else LLVM compares the places of all rows before each
+loop, and gives up on a loop that writes many.
 """
 
 from functools import cache
@@ -36,6 +38,15 @@ def choose(typing_context, test, a, b):
 def wide_vectors(typing_context):
     def emit(context, builder, signature, arguments):
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')  # llvmlite knows names without values only
+        return context.get_dummy_value()
+    return types.void(), emit
+
+@intrinsic
+def apart(typing_context):
+    def emit(context, builder, signature, arguments):
+        for argument in builder.function.args[2:]:  # behind the two by which results and errors go back
+            if isinstance(argument.type, ir.PointerType):
+                argument.add_attribute("noalias")
         return context.get_dummy_value()
     return types.void(), emit
 """

@@ -66,23 +66,15 @@ class Ether:
 
     def _passes(self, now: float, number: int, who: int, to: int, distance: float) -> bool:
         """Whether a packet over this distance (m) gets through."""
-        k, pair = self._k, to * len(self._members) + who
+        k = self._k
         if distance > k.range or self._cut(now, who, to):
             return False
         if self._reach is not None and distance > self._reach(who, to, now):
             return False
         if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
             return False
-        if k.loss > 0.0:
-            u = random.uniform(random.words(self._seed, random.LOSS, 0, number, pair)[0])
-            if u < radio.lost(distance, k):
-                return False
-        if k.kind == "constant":
-            return True
-        missed = 1.0
-        for slow, rate in ((0.0, k.fast_rate), (1.0, k.slow_rate)):
-            missed *= (1.0 - radio.received(distance, slow, k)) ** radio.packets(number, rate, self._period)
-        return bool(random.uniform(random.words(self._seed, random.LINK, 0, number, pair)[0]) >= missed)
+        u = random.pair_uniform(self._seed, random.PACKET, 0, number, to, who, len(self._members))
+        return bool(u >= radio.unheard(distance, number, self._period, k))
 
     def _cut(self, now: float, who: int, to: int) -> bool:
         if self._of("outage", who, now) or self._of("outage", to, now):

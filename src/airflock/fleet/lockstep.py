@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import sensors
-from airflock.core import random
 from airflock.core.agent import State
 from airflock.core.parameters import number_names
+from airflock.core.sensing import Sensing
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
@@ -62,7 +61,8 @@ class Fleet:
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
         self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach)
-        self._errors = [State(*(0.0,) * 6)] * len(card.members)
+        found = scenario.sensor, scenario.sensors
+        self._sensing = [Sensing(*found, seed, i, flat=card.flat) for i in range(len(card.members))]
         self._given = 0
         self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
         if start is not None:
@@ -185,20 +185,10 @@ class Fleet:
 
     def _err(self, number: int) -> None:
         """Advance the error of each drone's navigation by one period, with the simulator's numbers."""
-        s = self.scenario.sensors
-        if s.noise == 0.0:
+        if not self.scenario.errs:
             return
-        for i, vehicle in enumerate(self.vehicles):
-            words = random.words(self.seed, random.SENSOR, 0, number, i)
-            g = [*random.normal_pair(words[0], words[1])]
-            if not self.card.flat:
-                high = random.words(self.seed, random.SENSOR, 0, number, i, 1)
-                g.append(random.normal_pair(high[0], high[1])[0])
-            e = self._errors[i]
-            steps = [sensors.langevin(e[c], e[3 + c], g[c], self.card.period, s) for c in range(len(g))]
-            steps += [(0.0, 0.0)] * (3 - len(steps))
-            self._errors[i] = State(*(q for q, _ in steps), *(u for _, u in steps))
-            vehicle.error = self._errors[i]
+        for sensing, vehicle in zip(self._sensing, self.vehicles, strict=True):
+            vehicle.error = sensing.measure(number, State(*vehicle.state), self.card.period)
 
     # --------------------------------------------------------------------------------------------------- recording
 

@@ -102,7 +102,7 @@ def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
 
     dt   : motion step of the scenario that the numbers are for, s; 0 for continuous time
     walk : what the sensor's own error adds to the noise of logged velocities, m²/s³: damping times noise of
-           `body.sensors`; it is taken off the outer noise
+           `sensors.langevin`; it is taken off the outer noise
     """
     flying = logs.flying()
     if len(flying.time) < FEW:

@@ -19,6 +19,7 @@ from airflock.recordings.imports.track import Findings, Options
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.sensors import langevin
 
 # key → whether a larger number makes a flight harder
 HARDER = {
@@ -148,7 +149,7 @@ def identify(
     Raises
     ------
     AirflockError
-        If the body is not the multirotor that this knows, or the logs lack what it needs.
+        If body or sensor are not the multirotor and the langevin that this knows, or the logs lack what it needs.
 
     Examples
     --------
@@ -164,6 +165,8 @@ def identify(
     scenario = loaded(like)
     if not isinstance(scenario.body, motion.Parameters):
         raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
+    if not isinstance(scenario.sensors, langevin.Parameters):
+        raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
     findings = Findings(frozenset(accept))
     logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
     if heard is not None:

@@ -1,6 +1,6 @@
 """Error of satellite navigation from drones that stand: likelihood of the model's own error process.
 
-`body.sensors.langevin` in steps of the sensor's period is a linear system of two states, position error q and velocity
+`sensors.langevin.error` in steps of the sensor's period is a linear system of two states, position error q and velocity
 error u. The place where a drone stands is unknown and is a third state; logged velocities may have white noise.
 """
 
@@ -41,7 +41,7 @@ def _kernel() -> Any:
         a10, a11 = -spring * h, 1.0 - damping * h
         a00, a01 = 1.0 + h * a10, h * a11
         push = 2.0 * damping * h * noise
-        # stationary variances (body.sensors): of u the noise, of q scale sqrt(noise / (2 damping))
+        # stationary variances (sensors.langevin): of u the noise, of q scale sqrt(noise / (2 damping))
         still = scale * np.sqrt(noise / (2.0 * damping))
         rq, ru, total = grain * grain, white * white + 1e-12, 0.0
         x0, x1, x2 = 0.0, 0.0, 0.0
@@ -77,7 +77,7 @@ def _kernel() -> Any:
 
 
 def fit_sensors(logs: Logs, period: float) -> SensorFit:
-    """Fit the error of `body.sensors` to the rows on the ground; `period` (s) is that of the sensor."""
+    """Fit the error of `sensors.langevin` to the rows on the ground; `period` (s) is that of the sensor."""
     ground = logs.grounded()
     nan = float("nan")
     nothing = dict.fromkeys(NAMES, nan)

@@ -11,11 +11,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.body import radio, sensors
+from airflock.body import radio
 from airflock.core import random
 from airflock.identify.logs import MISSING, Logs
 from airflock.recordings.flights import simulate
+from airflock.recordings.perception import packet_uniforms
 from airflock.scenarios.scenario import Scenario
+from airflock.sensors import langevin
 
 Array = NDArray[np.float64]
 
@@ -73,7 +75,7 @@ def own_errors(seed: int, decisions: int, agents: int, period: float, s: Any) ->
         w = words(seed, random.SENSOR, k, np.arange(agents))
         drawn = normal_pair(w[0], w[1])
         for axis in (0, 1):
-            q[axis], u[axis] = sensors.langevin(q[axis], u[axis], drawn[axis], period, s)
+            q[axis], u[axis] = langevin.error(q[axis], u[axis], drawn[axis], period, s)
         found[k, :2], found[k, 2:] = q, u
     return found
 
@@ -132,7 +134,7 @@ def _packets(
         fast, slow = (radio.packets(step, rate, period) for rate in (k_.fast_rate, k_.slow_rate))
         grid = np.round(d, 2)
         missed = (1.0 - arrives(grid, 0.0, k_)) ** fast * (1.0 - arrives(grid, 1.0, k_)) ** slow
-        drawn = random.uniform(words(seed, random.LINK, step, i * n + j)[0])
+        drawn = packet_uniforms(seed, 0, step, n)[i, j]
         got = (d <= k_.range) & (drawn >= missed)
         now, sent = step * period, step * period - k_.delay
         jitter = generator.normal(0.0, disturbed.stamp_jitter, len(i)) if disturbed.stamp_jitter else 0.0

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import Model, climb
+from airflock.infer.fit import climb
+from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, ENTERS, Tracks, restated
 from airflock.infer.walk import Walk
 

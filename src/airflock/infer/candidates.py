@@ -28,7 +28,7 @@ STEP = 0.025  # s; longest motion step
 LONG = 1e5  # s; a flight that outlasts any span
 DECADES = 100.0  # a number whose unit says nothing of its size is sought this far from its default
 RATES = (0.01, 20.0)  # 1/s, of gains
-QUIET = {"sensors.noise": 0.0, "wind.gust": 0.0, "radio.loss": 0.0}
+QUIET = {"sensors.kind": "perfect", "wind.gust": 0.0, "radio.loss": 0.0}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import Model
+from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, COUNTED
 
 Array = NDArray[np.float64]

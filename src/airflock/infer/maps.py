@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import Model
+from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, Scale
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.bootstrap import Noise
-from airflock.infer.fit import Model
+from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT
 
 Array = NDArray[np.float64]

@@ -15,8 +15,9 @@ from airflock.errors import AirflockError, RecordingError
 from airflock.infer import select
 from airflock.infer.bootstrap import Again, Noise, again
 from airflock.infer.candidates import Candidate, candidate, scenarios_of
-from airflock.infer.fit import Fit, Model
+from airflock.infer.fit import Fit
 from airflock.infer.leftover import left_over
+from airflock.infer.likelihood import Model
 from airflock.infer.maps import Maps, maps
 from airflock.infer.predictive import Check, posterior
 from airflock.infer.tracks import Scale, Tracks, scale_of, tracks_of
@@ -121,7 +122,7 @@ class Inferred:
         document = self.document()
         assert self.best is not None
         own = self.best.candidate.scenario
-        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle)
+        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle, sensor=own.sensor)
 
 
 def infer(

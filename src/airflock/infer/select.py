@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import Fit, Model, climb, drawn, hop, scan, search, simplify, telling
+from airflock.infer.fit import Fit, climb, drawn, hop, scan, search, simplify, telling
+from airflock.infer.likelihood import Model
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]

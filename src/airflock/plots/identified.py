@@ -148,7 +148,7 @@ def _standing(panel: Axes, found: Identified) -> None:
             seen.append(0.5 * float(((ground.velocity[k + lag] - ground.velocity[k]) ** 2).mean()))
     spring = np.sqrt(2.0 * value["damping"] * value["noise"]) / value["scale"]
     line = np.geomspace(step, max(lags), 80)
-    # stationary covariance of the velocity of a damped oscillator, as body.sensors draws it
+    # stationary covariance of the velocity of a damped oscillator, as sensors.langevin draws it
     root = np.sqrt(complex(value["damping"] ** 2 / 4.0 - spring))
     root = root if abs(root) > 1e-9 else complex(1e-9)
     swing = np.exp(-0.5 * value["damping"] * line) * (

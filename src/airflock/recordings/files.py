@@ -21,6 +21,7 @@ from airflock.recordings.opened import Opening
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
+from airflock.sensors.registry import SENSORS
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -133,7 +134,7 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
             f"recording: was flown with a law of its own, {name!r}, which is not in the file; give it with "
             "--law FILE.py (in Python: law=...)"
         )
-    for section, known in (("body", BODIES), ("metrics", SETS)):
+    for section, known in (("body", BODIES), ("sensors", SENSORS), ("metrics", SETS)):
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:
             raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")

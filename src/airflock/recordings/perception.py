@@ -88,6 +88,17 @@ def _variables(measured: list[Array], ages: list[Array], dimensions: int) -> dic
     return found
 
 
+def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
+    """Uniform number of each pair (receiver, sender) in a decision: `core.random.pair_uniform` for a whole flock."""
+    fours, senders = -(-agents // 4), np.arange(agents, dtype=np.uint64)
+    first = random.pair_number(4 * np.arange(fours, dtype=np.uint64)[:, None], senders, agents)
+    zero = np.zeros_like(first)
+    drawn = random.philox(
+        first, zero + np.uint64(decision), zero + np.uint64(random.PACKET), zero + np.uint64(world), seed, seed >> 32
+    )
+    return np.asarray(random.uniform(np.stack(drawn, axis=1).reshape(4 * fours, agents)[:agents]))
+
+
 def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
     """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
     k, n = flight.scenario.radio, flight.agents
@@ -103,12 +114,6 @@ def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float)
     heard = (apart <= min(k.range, FARTHEST)) & ~np.eye(n, dtype=bool)
     if k.loss > 0.0:
         i, j = np.nonzero(heard)
-        counters = (i * n + j).astype(np.uint64)
-        zero = np.zeros_like(counters)
-        drawn = random.philox(
-            counters, zero + np.uint64(number), zero + np.uint64(random.LOSS), zero + np.uint64(flight.world),
-            flight.seed, flight.seed >> 32,
-        )  # fmt: skip
         lost = np.array([radio.lost(float(d), k) for d in apart[i, j]])
-        heard[i, j] = random.uniform(drawn[0]) >= lost
+        heard[i, j] = packet_uniforms(flight.seed, flight.world, number, n)[i, j] >= lost
     return np.where(heard, now - late, stamps)

@@ -31,6 +31,7 @@ from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
+from airflock.sensors.registry import SENSORS
 
 
 def score(
@@ -243,6 +244,8 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
     if not _in_file(_kind(document, "body"), BODIES):
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
+    if not _in_file(_kind(document, "sensors"), SENSORS):
+        document = {**document, "sensors": {k: v for k, v in document["sensors"].items() if k == "period"}}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)

@@ -11,15 +11,18 @@ from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.sensors.registry import SENSORS
 
+# what a scenario holds beside a section, that section, and the kinds that are ours
+KINDS = (("measures", "metrics", SETS), ("vehicle", "body", BODIES), ("sensor", "sensors", SENSORS))
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
 
 def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """The scenario with keys set anew, checked as a whole as if it came from a file.
 
-    Its law, its body and its order parameters stay those that it has where they are no names of ours, unless their
-    kind is set anew. Raises ScenarioError with one line per fault.
+    Its law, its body, its sensor and its order parameters stay those that it has where they are no names of ours,
+    unless their kind is set anew. Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}
     if scenario.scene.kind == "mesh":  # which was looked for beside the scenario file
@@ -29,7 +32,7 @@ def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
     own = {
         name: getattr(scenario, name)
-        for name, section, known in (("measures", "metrics", SETS), ("vehicle", "body", BODIES))
+        for name, section, known in KINDS
         if f"{section}.kind" not in settings and document.get(section, {}).get("kind", "") not in ("", *known)
     }
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}

@@ -7,11 +7,14 @@ from typing import Any
 
 from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Body, Metric, MetricSet, Model, body
+from airflock.core.sensor import Sensor, sensor
 from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
 from airflock.metrics.registry import SETS, USUAL, metric_set
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
+from airflock.sensors.registry import SENSORS
+from airflock.sensors.registry import USUAL as USUAL_SENSOR
 from airflock.topology.registry import TOPOLOGIES
 
 
@@ -58,6 +61,32 @@ def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) ->
     return carried.lacks(b=b, dt=flight.dt, speed=speed, start=begin.speed, wing=wing)
 
 
+def sensor_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Sensor, list[str]]:
+    """Sensor of the section sensors, by its key kind; and what is wrong with it."""
+    usual = SENSORS[USUAL_SENSOR]
+    kind = table.get("kind", usual.name) if isinstance(table, Mapping) else usual.name
+    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
+    if isinstance(kind, str) and kind in SENSORS:
+        return SENSORS[kind], []
+    if isinstance(kind, str) and kind.endswith(".py"):
+        try:
+            return sensor(own_code("sensors.kind", kind, folder, trust=trust), Path(kind).stem), []
+        except AirflockError as fault:
+            return usual, str(fault).splitlines()
+    near = get_close_matches(str(kind), SENSORS, n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(SENSORS)}, or a file that ends in .py"
+    return usual, [f"sensors.kind = {kind!r}: unknown sensor; {hint}"]
+
+
+def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:
+    """What of a scenario its sensor cannot measure."""
+    s, flight = parts["sensors"], parts["flight"]
+    if s is None or flight is None:
+        return []
+    period = max(1, round(s.period / flight.dt)) * flight.dt
+    return found.lacks(s=s, period=period, dt=flight.dt)
+
+
 def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:
     """Metric set of the section metrics, by its key kind; and what is wrong with it."""
     kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL
@@ -74,13 +103,16 @@ def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) 
     return SETS[USUAL], [f"metrics.kind = {kind!r} is none of {', '.join(SETS)}, or a file that ends in .py{hint}"]
 
 
-def order_faults(flight: Any, sensors: Any, radio: Any) -> list[str]:
+IDEAL = {"radio.kind": "'constant'", "sensors.kind": "'perfect'"}  # what is not ideal at 0
+
+
+def order_faults(flight: Any, found: Sensor, sensors: Any, radio: Any) -> list[str]:
     """Sequential update is for agents that see each other as they are, at every step."""
     if flight.update == "synchronous" or sensors is None or radio is None:
         return []
     late = sensors.period if round(sensors.period / flight.dt) > 1 else 0.0
     ideal = {
-        "sensors.noise": sensors.noise,
+        "sensors.kind": 0.0 if found.is_exact(sensors) else found.name,
         "sensors.period": late,
         "radio.delay": radio.delay,
         "radio.loss": radio.loss,
@@ -88,7 +120,7 @@ def order_faults(flight: Any, sensors: Any, radio: Any) -> list[str]:
     }
     return [
         f"{key} = {value}: update = 'sequential' needs ideal perception at every step; set {key} = "
-        + ("'constant'" if key == "radio.kind" else "0")
+        + IDEAL.get(key, "0")
         for key, value in ideal.items()
         if value != 0.0
     ]

@@ -8,15 +8,16 @@ from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
 LONGEST = 10  # files in a chain of extends
-KINDS = ("model", "body", "scene", "goals", "start")  # sections in which another kind means other keys
+KINDS = ("model", "body", "sensors", "scene", "goals", "start")  # sections in which another kind means other keys
+SHARED = {"sensors": ("period",)}  # but for these, which every kind has
 Read = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
 
 
 def extended(document: Mapping[str, Any], where: str, folder: Path | None, read: Read) -> tuple[dict[str, Any], str]:
     """A document with everything of the file that it extends, and which file that was ("" for none).
 
-    Keys of the document go before those of the file. Where it names another kind of model, body, scene, goals or
-    start, that section's other keys are not taken over. What a paper published of the file is not either.
+    Keys of the document go before those of the file. Where it names another kind of model, body, sensor, scene, goals
+    or start, that section's other keys are not taken over. What a paper published of the file is not either.
 
     where  : name of the document, for faults
     folder : where the names of files are looked for
@@ -50,7 +51,8 @@ def _section(key: str, base: Any, own: Any) -> Any:
     if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
         return own
     other = key in KINDS and "kind" in own and _plain(own["kind"]) != _plain(base.get("kind"))
-    return dict(own) if other else {**base, **own}
+    kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
+    return {**kept, **own}
 
 
 def _plain(value: Any) -> Any:
@@ -58,9 +60,10 @@ def _plain(value: Any) -> Any:
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A document whose own files (a law, a body, order parameters, a mesh) are named from anywhere."""
+    """A document whose own files (a law, a body, a sensor, order parameters, a mesh) are named from anywhere."""
     result = dict(document)
-    for section, key in (("model", "kind"), ("body", "kind"), ("metrics", "kind"), ("scene", "file")):
+    kinds = [(section, "kind") for section in ("model", "body", "sensors", "metrics")]
+    for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None
         if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):

@@ -10,6 +10,8 @@ from typing import Any
 from airflock.core.contract import Body
 from airflock.core.contract import body as gathered_body
 from airflock.core.fault import Fault, fault
+from airflock.core.sensor import Sensor
+from airflock.core.sensor import sensor as gathered_sensor
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import as_set
@@ -46,6 +48,7 @@ def load(
     *,
     metrics: Any = None,
     body: Any = None,
+    sensor: Any = None,
     faults: Any = None,
     trust: bool = False,
 ) -> Scenario:
@@ -67,11 +70,14 @@ def load(
         ours, or a namespace such as globals(); likewise the name of a set or a file.
     body : optional
         A body of your own carries the agents: a `Body`, a namespace, or a name or file.
+    sensor : optional
+        A sensor of your own by which agents know themselves: a `Sensor`, a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
     trust : bool
-        Whether code that the file names, or a file that it extends, may run: a law, a body, order parameters.
+        Whether code that the file names, or a file that it extends, may run: a law, a body, a sensor, order
+        parameters.
 
     Returns
     -------
@@ -98,7 +104,7 @@ def load(
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
-        document, own = _given(document, metrics, body)
+        document, own = _given(document, metrics, body, sensor)
         own["kinds"] = _kinds(faults)
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, told = with_ground(document, settings or {}, folder)
@@ -126,8 +132,8 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
-def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics and the body which the caller gives, and these themselves for `make`.
+def _given(document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A document that names the metrics, the body and the sensor which the caller gives, and these for `make`.
 
     Giving them is consent to run them. Raises ScenarioError.
     """
@@ -147,6 +153,14 @@ def _given(document: Mapping[str, Any], metrics: Any, body: Any) -> tuple[dict[s
         own["vehicle"] = body if isinstance(body, Body) else gathered_body(body)
     if body is not None:
         document["body"] = {"kind": own["vehicle"].name}
+    if isinstance(sensor, (str, os.PathLike)):
+        own["sensor"], more = checks.sensor_of({"kind": str(sensor)}, trust=True)
+        faults = [*faults, *more]
+    elif sensor is not None:
+        own["sensor"] = sensor if isinstance(sensor, Sensor) else gathered_sensor(sensor)
+    if sensor is not None:
+        period = {key: value for key, value in document.get("sensors", {}).items() if key == "period"}
+        document["sensors"] = {**period, "kind": own["sensor"].name}
     if faults:
         raise ScenarioError(faults)
     return document, own

@@ -9,6 +9,7 @@ from airflock.core.parameters import Choice, Points, Quantity, Text, declaration
 from airflock.errors import ScenarioError
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import SENSORS
 
 TOP = "top"  # the keys before the first section
 
@@ -17,7 +18,7 @@ class Key(NamedTuple):
     """One key of a scenario file.
 
     name    : as it is written after --set, for instance "radio.delay"
-    of      : the model or body that the key belongs to; "" where it is always there
+    of      : the model, body or sensor that the key belongs to; "" where it is always there
     kind    : "number", "choice", "points" or "text"
     default : None means "derived from the rest of the scenario"
     unit    : SI unit; "1" for a plain number, "" for what has none
@@ -52,11 +53,14 @@ class Key(NamedTuple):
 
 
 def records() -> dict[str, type]:
-    """Section → record of its parameters: the top, every model and every body by its name, and the other sections."""
+    """Section → record of its parameters: the top, every model, body and sensor by its name, and the other
+    sections.
+    """
     result: dict[str, type] = {TOP: Flight}
     result |= {name: find_model(name).Parameters for name in MODELS}
     result |= {name: body.Parameters for name, body in BODIES.items()}
-    return result | {name: record for name, record in SECTIONS.items() if name != "body"}
+    result |= {name: sensor.Parameters for name, sensor in SENSORS.items()}
+    return result | {name: record for name, record in SECTIONS.items() if name not in ("body", "sensors")}
 
 
 def about(section: str) -> str:
@@ -71,8 +75,9 @@ def keys(section: str | None = None) -> list[Key]:
     Parameters
     ----------
     section : str, optional
-        A section ("radio"), "model" or "body" for all models or bodies, one of them by its name ("couzin_2002",
-        "multirotor"), "top" for the keys before the first section, or a key ("radio.delay", "delay"). By default all.
+        A section ("radio"), "model", "body" or "sensors" for all models, bodies or sensors, one of them by its name
+        ("couzin_2002", "multirotor", "gnss"), "top" for the keys before the first section, or a key ("radio.delay",
+        "delay"). By default all.
 
     Returns
     -------
@@ -102,17 +107,18 @@ def keys(section: str | None = None) -> list[Key]:
     found = [key for key in every if section in (key.name, key.name.rpartition(".")[2], key.name.partition(".")[0])]
     if not found:
         words = {key.name: key.name for key in every} | {key.name.rpartition(".")[2]: key.name for key in every}
-        words |= {name: name for name in (*known, "model", "body")}
+        words |= {name: name for name in (*known, "model", "body", "sensors")}
         near = get_close_matches(section, words, n=1, cutoff=0.5)
-        hint = f"did you mean {words[near[0]]}?" if near else f"sections: model, body, {', '.join(known)}"
+        hint = f"did you mean {words[near[0]]}?" if near else f"sections: model, body, sensors, {', '.join(known)}"
         raise ScenarioError([f"{section}: unknown section or key; {hint}"])
     return found
 
 
 def _of(section: str, record: type) -> Sequence[Key]:
     """Keys of one record."""
-    before = "model" if section in MODELS else "body" if section in BODIES else "" if section == TOP else section
-    owner = section if before in ("model", "body") else ""
+    owners = {**dict.fromkeys(MODELS, "model"), **dict.fromkeys(BODIES, "body"), **dict.fromkeys(SENSORS, "sensors")}
+    before = "" if section == TOP else owners.get(section, section)
+    owner = section if section in owners else ""
     found = []
     for name, declared, default in declarations(record):
         whole = f"{before}.{name}".lstrip(".")

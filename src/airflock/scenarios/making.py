@@ -8,6 +8,7 @@ from typing import Any
 
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.fault import Fault
+from airflock.core.sensor import Sensor
 from airflock.doors import is_file
 from airflock.errors import AirflockError, ScenarioError
 from airflock.scenarios import (
@@ -28,8 +29,10 @@ from airflock.scenarios.ground import file_faults
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import USUAL as USUAL_SENSOR
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+KINDS = {"body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",))}  # usual kind; keys of every kind
 
 
 def make(
@@ -41,6 +44,7 @@ def make(
     law: Model | None = None,
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
+    sensor: Sensor | None = None,
     kinds: Mapping[str, Fault] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
@@ -48,13 +52,13 @@ def make(
     """Scenario from a nested dict.
 
     where : names it in faults; notes : what is known of it already
-    law, measures, vehicle : a model, a metric set, a body given directly, not by name
+    law, measures, vehicle, sensor : a model, a metric set, a body, a sensor given directly, not by name
     kinds : kinds of fault given directly, by name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
-    document, left_out = _with_body(document, settings or {})
+    document, left_out = _with_kinds(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
     faults += more
@@ -76,14 +80,18 @@ def make(
     if measures is None:
         measures, more = checks.metrics_set(merged.get("metrics", {}), folder, trust=trust)
         faults += more
-    own = SECTIONS | {"body": vehicle.Parameters, "metrics": measures.Parameters}
+    if sensor is None:
+        sensor, more = checks.sensor_of(merged.get("sensors", {}), folder, trust=trust)
+        faults += more
+    own = SECTIONS | {"body": vehicle.Parameters, "sensors": sensor.Parameters, "metrics": measures.Parameters}
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, measures) + checks.body_faults(vehicle, parts, found)
+    faults += more + _faults_between(parts, found, sensor, measures)
+    faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
     single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
     faults += more
     if faults or found is None:
@@ -91,8 +99,8 @@ def make(
     published = _published(merged.get("published", {}))
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
-        name=where, model=found, vehicle=vehicle, measures=measures, published=published, document=merged, **parts,
-        **single,
+        name=where, model=found, vehicle=vehicle, sensor=sensor, measures=measures, published=published,
+        document=merged, **parts, **single,
     )  # fmt: skip
     faults = places.place_faults(scenario)
     if faults:
@@ -127,15 +135,18 @@ def _beside(scene: Any, folder: Path | None) -> Any:
     return replace(scene, file=str(folder / scene.file))
 
 
-def _with_body(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """A document without the numbers of its body, where the settings name a body of another kind; and a note of it."""
-    given = document.get("body", {})
-    if "body.kind" not in settings or not isinstance(given, Mapping) or settings["body.kind"] == given.get("kind"):
-        return document, ()
-    known = set(given) - {"kind"}
-    kind = given.get("kind", "multirotor")
-    note = f"body.kind = {settings['body.kind']!r}: the numbers of the file's {kind} are left out"
-    return {**document, "body": {}}, (note,) if known else ()
+def _with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body or sensor, where the settings name another kind; and notes of it."""
+    notes: list[str] = []
+    for section, (usual, shared) in KINDS.items():
+        given, key = document.get(section, {}), f"{section}.kind"
+        if key not in settings or not isinstance(given, Mapping) or settings[key] == given.get("kind"):
+            continue
+        if set(given) - {"kind", *shared}:
+            kind = given.get("kind", usual)
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
+        document = {**document, section: {name: given[name] for name in shared if name in given}}
+    return document, tuple(notes)
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -172,7 +183,7 @@ def _parts(
     faults: list[str] = []
     for section, record in records.items():
         given = merged.get(section, {})
-        if section == "body" and isinstance(given, Mapping):
+        if section in KINDS and isinstance(given, Mapping):
             given = {key: value for key, value in given.items() if key != "kind"}
         parts[section], more = schema.check(section, given, record)
         faults += more
@@ -186,7 +197,7 @@ def _parts(
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -> list[str]:
+def _faults_between(parts: Mapping[str, Any], found: Model | None, sensor: Sensor, measures: MetricSet) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight = parts["flight"]
@@ -203,7 +214,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, measures: Met
         faults += geometry.faults(parts["world"], count, separation or 0.0, begin)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += timing.faults(flight, parts["sensors"].period, parts["metrics"])
-        faults += checks.order_faults(flight, parts["sensors"], parts["radio"])
+        faults += checks.order_faults(flight, sensor, parts["sensors"], parts["radio"])
         faults += checks.silence_faults(parts["silence"].rule, flight, found) if parts["silence"] is not None else []
         faults += checks.metric_faults(measures, parts["metrics"], parts["world"])
         faults += wings.faults(parts, found, measures)

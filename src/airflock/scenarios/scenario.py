@@ -7,11 +7,12 @@ from typing import Any
 
 from airflock.aero import descent
 from airflock.aero import wing as wings
-from airflock.body import radio, sensors, wind
+from airflock.body import radio, wind
 from airflock.core import random
 from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
+from airflock.core.sensor import Sensor
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete
 from airflock.core.topology import Topology
@@ -22,6 +23,7 @@ from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
+from airflock.sensors.registry import SENSORS
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena, goals, scenery, start
@@ -34,7 +36,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
-    vehicle   : the body that `body` holds the numbers of; measures: the metric set that `metrics` does
+    vehicle, sensor, measures : body, sensor and metric set that `body`, `sensors` and `metrics` hold the numbers of
     groups    : agents that share numbers; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
@@ -51,7 +53,7 @@ class Scenario:
     model: Model
     parameters: Any
     body: Any
-    sensors: sensors.Parameters
+    sensors: Any
     radio: radio.Parameters
     wind: wind.Parameters
     world: arena.Parameters
@@ -65,6 +67,7 @@ class Scenario:
     topology: topologies.Parameters
     flight: Flight
     vehicle: Body
+    sensor: Sensor
     measures: MetricSet
     groups: tuple[Group, ...] = ()
     faults: tuple[Entry, ...] = ()
@@ -88,6 +91,17 @@ class Scenario:
     def dimensions(self) -> int:
         """2 or 3."""
         return int(self.world.dimensions)
+
+    @property
+    def errs(self) -> bool:
+        """Whether agents measure themselves with errors."""
+        return not self.sensor.is_exact(self.sensors)
+
+    @property
+    def unerring(self) -> "Scenario":
+        """The same scenario with agents that know their own states as they are."""
+        exact = SENSORS["perfect"]
+        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period))
 
     @property
     def descends(self) -> bool:

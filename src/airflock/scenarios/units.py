@@ -26,7 +26,7 @@ UNITS: dict[str, dict[str, float]] = {
         "kn": NAUTICAL_MILE / 3600.0,
     },
     "m/s^2": {"cm/s^2": 1e-2, "ft/s^2": FOOT, "g": 9.80665},
-    "1/s": {"Hz": 1.0, "kHz": 1e3, "1/ms": 1e3, "1/min": 1.0 / 60.0},
+    "1/s": {"Hz": 1.0, "kHz": 1e3, "1/ms": 1e3, "1/min": 1.0 / 60.0, "1/h": 1.0 / 3600.0},
     "rad": {"deg": DEGREE, "mrad": 1e-3, "turn": 2.0 * math.pi},
     "deg": {"rad": 1.0 / DEGREE, "mrad": 1e-3 / DEGREE, "turn": 360.0},
     "rad/s": {"deg/s": DEGREE, "rpm": 2.0 * math.pi / 60.0},

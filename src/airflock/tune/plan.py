@@ -20,7 +20,7 @@ class Plan:
     rate   : flights per second that the plan was made with
     """
 
-    search: dict[str, int]
+    search: dict[str, Any]
     seeds: int
     seconds: float
     rate: float
@@ -30,8 +30,11 @@ class Plan:
         return {"airflock": __version__, **asdict(self)}
 
 
-def plan_of(budget: float, rate: float) -> Plan:
-    """A plan for a budget (s) at a rate (flights per second). StudyError where nothing sensible fits into it."""
+def plan_of(budget: float, rate: float, *, warm: bool = False) -> Plan:
+    """A plan for a budget (s) at a rate (flights per second), searching from the start's own numbers if `warm`.
+
+    StudyError where nothing sensible fits into it.
+    """
     flights = budget * SEARCH * rate
     finals = flights / 4.0
     top = 4
@@ -46,7 +49,9 @@ def plan_of(budget: float, rate: float) -> Plan:
             f"the budget of {budget:g} s is too small: a flight takes {1.0 / rate:.2g} s here; give at least "
             f"{1.1 * flown / rate:.2g} s, or shorten the flights with --duration"
         )
-    search = {
+    search: dict[str, Any] = {
         "population": POPULATION, "generations": generations, "pool": pool, "top": top, "final_seeds": final_seeds,
     }  # fmt: skip
+    if warm:
+        search["start"] = "scenario"
     return Plan(search, seeds, budget * CERTIFY, rate)

@@ -93,6 +93,7 @@ def tune(
     confidence: float = 0.95,
     like: Scenario | str | os.PathLike[str] | None = None,
     heard: str | os.PathLike[str] | None = None,
+    warm: bool = False,
     resume: bool = False,
     settings: Mapping[str, Any] | None = None,
     threads: int | None = None,
@@ -120,6 +121,8 @@ def tune(
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
         Table of packets of these logs, as `airflock identify --heard` takes it.
+    warm : bool
+        Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
         Continue what is in the folder.
     settings : mapping, optional
@@ -154,7 +157,7 @@ def tune(
     start, notes = start_of(mine)
     limits = list(limit) or [usual_limit(start)]
     campaign_of(start, limits, confidence)  # refused before anything flies
-    plan = _planned(folder, start, budget, resume, threads)
+    plan = _planned(folder, start, budget, resume, threads, warm=warm)
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
     _say(note, "search")
@@ -208,7 +211,9 @@ def _say(note: Note | None, text: str) -> None:
         note(text)
 
 
-def _planned(folder: Path, start: Scenario, budget: float, resume: bool, threads: int | None) -> Plan:
+def _planned(
+    folder: Path, start: Scenario, budget: float, resume: bool, threads: int | None, *, warm: bool = False
+) -> Plan:
     """The plan of the folder, made where there is none. Raises StudyError for a folder of something else."""
     if (folder / PLAN).is_file():
         if not resume:
@@ -221,7 +226,7 @@ def _planned(folder: Path, start: Scenario, budget: float, resume: bool, threads
         raise StudyError(f"{folder}: holds no tuning to resume ({PLAN} is missing)")
     if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
         raise StudyError(f"{folder}: is not empty and holds no {PLAN}; give a new folder")
-    plan = plan_of(budget, _rate(start, threads))
+    plan = plan_of(budget, _rate(start, threads), warm=warm)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write(folder / START, _document(start), "Where tuning starts.")

@@ -16,7 +16,7 @@ from airflock.engine.cuda.rows import Context, parse
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder, branch, in_place
 from airflock.engine.plan import Plan
-from airflock.engine.replace import ReplacementError, must_replace
+from airflock.engine.replace import must_replace
 
 STAGES = (
     "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
@@ -47,6 +47,9 @@ class Stage:
 class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
+    apart = False
+    by_pairs = True
+
     def __init__(self, plan: Plan, shape: Shape):
         super().__init__(plan.built(grid=False))
         self.shape = shape
@@ -55,7 +58,6 @@ class CudaBuilder(Builder):
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
         self.within: dict[str, list[str]] = {}
-        self.receive: tuple[list[ast.stmt], list[ast.stmt]] | None = None
         self.forms = Forms(self.source.blocks, JIT)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
         self.head = head(plan.model.name, plan.bits, shape)
@@ -89,7 +91,9 @@ class CudaBuilder(Builder):
         """Never: a kernel takes one agent after another by its own loop."""
         return False
 
-    def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
+    def stage(
+        self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0", apart: bool = False
+    ) -> None:
         """One stage of a step."""
         self.function(f"{name}({arguments})", lines, body, f"return {answer}")
 
@@ -99,9 +103,7 @@ class CudaBuilder(Builder):
         lines: list[str] = []
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
-        if name == "receive":
-            self.receive = _split(parse(lines))
-        elif name in WITHIN:
+        if name in WITHIN:
             self.within[name] = lines
         elif name.startswith(STAGES):
             self._stage(name, lines)
@@ -109,7 +111,7 @@ class CudaBuilder(Builder):
             self.plain.add(name)
             self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
             return
-        if name not in ("receive", *WITHIN):
+        if name not in WITHIN:
             self.letters, self.bound = set(), set()
 
     def once(self, lines: Iterable[str]) -> list[str]:
@@ -167,8 +169,6 @@ class CudaBuilder(Builder):
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
         statements = parse(self.prepared(name, self._with_parts(lines) if name == "move" else lines))
-        if name == "neighbours" and self.receive is not None:
-            statements = _with_radio(statements, self.receive)
         turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
         context.cells, context.exact = self.cells(), name.startswith("measure_")
@@ -254,29 +254,3 @@ class _Renamed(ast.NodeTransformer):
         elif node.id.endswith("_i") and node.id[:-2] in self.build.names:
             node.id = f"{self.build.same(node.id[:-2])}_i"
         return node
-
-
-def _split(statements: list[ast.stmt]) -> tuple[list[ast.stmt], list[ast.stmt]]:
-    """What `receive` does once per agent, and for each pair."""
-    loop = next(s for s in statements if isinstance(s, ast.For))
-    return [s for s in statements if not isinstance(s, (ast.For, ast.Return))], loop.body
-
-
-def _with_radio(statements: list[ast.stmt], radio: tuple[list[ast.stmt], list[ast.stmt]]) -> list[ast.stmt]:
-    """The loop nest of `neighbours` with the reception of each pair in it, instead of a call that fills rows."""
-    replaced = 0
-    for outer in statements:
-        if isinstance(outer, ast.For):
-            kept: list[ast.stmt] = []
-            for s in outer.body:
-                if isinstance(s, ast.Expr) and isinstance(s.value, ast.Call):
-                    kept += radio[0]
-                    replaced += 1
-                    continue
-                if isinstance(s, ast.For):
-                    s.body = [*radio[1], *s.body]
-                kept.append(s)
-            outer.body = kept
-    if replaced != 1:
-        raise ReplacementError(f"neighbours calls receive {replaced} times instead of once")
-    return statements

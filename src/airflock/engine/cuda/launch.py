@@ -181,7 +181,7 @@ def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
 def _silent(flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
     """Packets of every pair before any was received."""
     found = np.zeros((flocks, *size), real)
-    found[:, :, -1] = -1e9
+    found[:, -1] = -1e9
     return found
 
 

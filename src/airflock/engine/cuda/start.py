@@ -33,8 +33,8 @@ def begin(build: CudaBuilder) -> list[str]:
         for table, width in tables(build).items():
             far = [f"{table}[e, {c}] = {'AWAY' if c < len(axes) else 'ZERO'}" for c in range(width)]
             lines += loop("e in range(tid, LANES, THREADS)", far)
-    if plan.body.Memory is not None:
-        lines += agents(build, [f"{own(build, f'body{c}')} = real({s})" for c, s in enumerate(plan.body.beginnings)])
+    if plan.beginnings:
+        lines += agents(build, [f"{own(build, name)} = real({start})" for name, start in plan.beginnings.items()])
     lines += ["cuda.syncthreads()"]
     names = [*axes, *(f"v{a}" for a in axes)]
     if plan.given_start:

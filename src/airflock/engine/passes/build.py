@@ -21,11 +21,15 @@ class Builder:
     """Names rules, rows of the work table and records of the parameter row for one plan.
 
     clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    apart    : whether the rows that a stage reads can be arguments of a function
+    by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     """
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
+    apart = True
+    by_pairs = False
 
     def __init__(self, plan: Plan):
         self.plan = plan
@@ -116,20 +120,31 @@ class Builder:
         """Loop over all agents (n) or lanes (m); with a sequential update the body alone, for the agent in turn."""
         return list(body) if self.in_turn else loop(f"i in range({lanes})", body)
 
-    def stage(self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0") -> None:
-        """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i."""
-        if not self.plan.sequential:
+    def stage(
+        self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0", apart: bool = False
+    ) -> None:
+        """One stage of a step: what it reads once, then its work for all agents or, sequentially, for agent i.
+
+        apart : the rows that it reads once become arguments, which the compiler then knows to lie apart in memory
+        """
+        if not self.plan.sequential and not (apart and self.apart):
             spread = self.plan.grid and name == "decide"
             body = must_replace(body, "i in range(n)", "i in prange(n)") if spread else body
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return
+        first = [] if self.plan.sequential else ["apart()"]
         read = [line.partition(" = ")[0] for line in lines if " = " in line and line[0] != " " and ";" not in line]
         several = [part.partition(" = ")[0] for line in lines if line[0] != " " for part in line.split("; ")]
         used = set(re.findall(r"\w+", "\n".join(body)))
         read += [name for name in several if name not in read and name in used]
-        given = ", ".join(dict.fromkeys(["i", *arguments.split(", "), *(w for w in read if w.isidentifier())]))
-        self.function(f"{name}_of({given})", body, f"return {answer}")
-        self.turns.append((lines, f"{name}_of({given})"))
+        turn = ["i"] if self.plan.sequential else []
+        asked = [w for w in arguments.split(", ") if self.plan.sequential or w in used]
+        given = ", ".join(dict.fromkeys([*turn, *asked, *(w for w in read if w.isidentifier() and w in used)]))
+        self.function(f"{name}_of({given})", first, body, f"return {answer}")
+        if self.plan.sequential:
+            self.turns.append((lines, f"{name}_of({given})"))
+        else:
+            self.function(f"{name}({arguments})", lines, f"return {name}_of({given})")
 
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that run once for the whole flock, and see all that came before."""

@@ -4,6 +4,7 @@ import ast
 
 from airflock.engine.passes import grid, perceive, percept
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.perceive import RECEIVE
 from airflock.engine.specialise.stage import Specialised, lines_of, specialise
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import decide as deciding
@@ -28,16 +29,18 @@ def neighbours(build: Builder) -> None:
         return
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
-    hear = Call("receive(i, k_, n, time, late, row, whole, work, store)")
+    draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)
     more = perceive.around(plan)
-    meet = Call(f"meet({', '.join(['i, k_, n, m, row, whole, work', *more])})")
+    meet = Call(f"meet({', '.join([perceive.MEET, *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image
-    made = specialise(build, meeting.neighbours, receive=hear, meet=meet, sums=sums, images=images)
+    made = specialise(
+        build, meeting.neighbours, decision=argument("k_"), draw=draw, drawn=drawn, meet=meet, sums=sums, images=images
+    )
     if plan.grid:
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
-    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store", *more])
-    build.stage("neighbours", arguments, made.once, made.body, made.answer)
+    arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
+    build.stage("neighbours", arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
 def _for_cells(

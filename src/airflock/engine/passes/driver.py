@@ -90,7 +90,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
     if plan.model.neighbour is not None:
         more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
-        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store', *more])})"]
+        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store, words', *more])})"]
         choose += slots.rearrange(build)
     if plan.model.boundary is not None:
         choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]

@@ -26,7 +26,7 @@ CHUNKS = 8  # parts of the flock that are counted side by side; their order is t
 BLOCK = 8  # candidates taken at once
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 SPARE = 8  # cells of the smallest periodic box
-FOUND = ("square", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, by `stages.meet`
+FOUND = ("square", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, where some are met
 OTHERS = "(integer(q) != me) & (integer(q) < many)"
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
@@ -106,7 +106,8 @@ def neighbours(
     ])  # fmt: skip
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = must_replace(lines, "CHUNKS", str(CHUNKS))
-    build.function("neighbours(k_, n, m, time, late, row, whole, work, store, cells)", lines, "return 0", parallel=True)
+    arguments = "k_, n, m, time, late, row, whole, work, store, words, cells"
+    build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
 def _found(each: list[str], last: list[str]) -> list[str]:

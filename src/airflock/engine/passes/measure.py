@@ -3,11 +3,13 @@
 from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Mean, asks
-from airflock.engine.passes import flock, scene
+from airflock.engine.passes import flock
 from airflock.engine.passes.build import Builder, branch, columns, loop
 from airflock.engine.passes.decide import START, combine
 from airflock.engine.passes.members import members
 from airflock.engine.passes.move import excursion
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.stages import scene
 
 CLOCKS = ("sample", "collision")
 
@@ -34,7 +36,7 @@ def measure(build: Builder, clock: str) -> None:
     lines += _pairs(build, metrics, clock == "collision")
     lines += _excursions(build, metrics)
     if any(build.wants(metric.agent, "agent", "touches") for metric in metrics):
-        lines += scene.contacts(build)
+        lines += specialise(build, scene.contacts).lines
     if any(build.wants(metric.agent, "agent", "rays") for metric in metrics):
         lines += build.bind(["rays_"])
     for metric in metrics:

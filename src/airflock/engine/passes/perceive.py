@@ -9,6 +9,12 @@ from airflock.engine.stages import meet as meeting
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages import receive as hearing
 
+MEET = "i, k_, n, m, row, whole, work"  # what the stage is called with
+RECEIVE = {  # whether each pair draws for itself: what stage draws
+    False: "receive(i, k_, n, m, whole, work, words)",
+    True: "receive(i, j, k_, n, world, seed_low, seed_high)",
+}
+
 
 def snapshot(build: Builder) -> None:
     """Function snapshot: the true states into a slot of the ring."""
@@ -34,7 +40,7 @@ def meet(build: Builder) -> None:
     plan = build.plan
     if plan.topology is not None and not plan.grid:
         made = specialise(build, meeting.meet, decision=argument("k_"))
-        build.function(f"meet({', '.join(['i, k_, n, m, row, whole, work', *around(plan)])})", made.lines, "return 0")
+        build.function(f"meet({', '.join([MEET, *around(plan)])})", made.lines, "return 0")
 
 
 def around(plan: Plan) -> tuple[str, ...]:
@@ -43,7 +49,8 @@ def around(plan: Plan) -> tuple[str, ...]:
 
 
 def receive(build: Builder) -> None:
-    """Function receive, where packets are lost: fills rows heard, age and, over two links, e*, for one agent."""
-    if build.plan.lossy or build.plan.packets:
-        made = specialise(build, hearing.receive, decision=argument("k_"))
-        build.function("receive(i, k_, n, time, late, row, whole, work, store)", made.lines, "return 0")
+    """Function receive, where packets are lost: random words of what is sent to four agents, or to one of a pair."""
+    if not (build.plan.lossy or build.plan.links):
+        return
+    made = specialise(build, hearing.word if build.by_pairs else hearing.draw, decision=argument("k_"))
+    build.function(RECEIVE[build.by_pairs], made.lines, f"return {made.answer}")

@@ -16,6 +16,7 @@ from airflock.engine.stages import words
 from airflock.engine.stages.state import SCENE, Flock
 from airflock.engine.stages.words import Itself
 
+TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
 UNROLLED = (range, tuple, list, enumerate, zip)
 
 
@@ -81,14 +82,14 @@ def lines_of(statements: list[ast.stmt]) -> list[str]:
 
 def _bindings(build: Builder, names: list[Any]) -> list[str]:
     """Lines that bind the rows, records and integers of these names."""
-    found: dict[str, list[str]] = {"row": [], "number": [], "record": [], "whole": [], "word": [], "scene": []}
+    found: dict[str, list[str]] = {kind: [] for kind in ("row", "number", "record", "whole", "scene", *TABLES)}
     for kind, name in dict.fromkeys((kind_of(node), node.id) for node in names):
         if kind in found:
             found[kind].append(name)
     lines = build.records(" ".join(found["record"])) + build.whole(*found["whole"]) + build.bind(found["row"])
     lines += build.scene(*found["scene"])
     lines += build.order() if found["number"] else []
-    return lines + [f"{name} = words[{name[1:]}]" for name in found["word"]]
+    return lines + [f"{name} = {table}[{name[len(kind) :]}]" for kind, table in TABLES.items() for name in found[kind]]
 
 
 class _Statements(Expressions):
@@ -108,7 +109,7 @@ class _Statements(Expressions):
 
         def take(name: str) -> ast.Name:
             if name not in rows:
-                rows[name] = given(name, "word" if name[0] == "u" and name[1:].isdigit() else "row")
+                rows[name] = given(name, next((kind for kind in TABLES if name.rstrip("0123456789") == kind), "row"))
             return rows[name]
 
         record, letters = self.build.source.record, dict.fromkeys(letter for letter, _ in plan.varied)

@@ -6,12 +6,16 @@ from typing import Any
 
 from airflock.core import random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import pair_number
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
 from airflock.world import bvh, polygon, rays
 
 FADE = random.FADE
+
+
+def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
+    """Number by which the signal between two agents is known, whoever else is there."""
+    return flock.number[i] * whole.born + flock.number[j] if plan.absence else i * n + j
 
 
 def hide(

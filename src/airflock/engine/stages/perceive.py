@@ -1,25 +1,68 @@
-"""Perceive: own state as measured, the others' as heard; the ring of past states behind the delay."""
+"""Perceive: own state as measured, the others' as heard; the ring of past states behind the delay.
 
+Of a sensor whose errors are added along each axis, those of what is measured and of what is sent are drawn apart. Any
+other measures once: what an agent sends is its state with the errors of its last measurement.
+"""
+
+from collections.abc import Iterable
 from typing import Any
 
-from airflock.body import sensors
 from airflock.core import random
+from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
-from airflock.engine.stages.noise import normals
+from airflock.engine.stages.noise import normals, uniforms
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import X, Y, Z, real
+from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
 SENSOR = random.SENSOR
 
 
 def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
-    """Put the true state into the slot of the ring from which it will be heard."""
+    """Put the state that is sent into the slot of the ring from which it will be heard."""
     for i in range(m):
         for a in range(plan.dimensions):
-            ring[slot, a, i] = flock.position[a][i]
+            ring[slot, a, i] = flock.position[a][i] + flock.own_error[a][i] if plan.senses else flock.position[a][i]
         for a in range(plan.dimensions):
-            ring[slot, a + plan.dimensions, i] = flock.velocity[a][i]
+            ring[slot, a + plan.dimensions, i] = (
+                flock.velocity[a][i] + flock.own_drift[a][i] if plan.senses else flock.velocity[a][i]
+            )
+
+
+def drawn(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan) -> None:
+    """Random numbers that a sensor asks for: g0 to g11, u0 to u3."""
+    if wants(plan.sensor.measure, "g0", "g1", "g2", "g3"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * FIRST, m, 0)
+    if wants(plan.sensor.measure, "g4", "g5", "g6", "g7"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 1), m, 4)
+    if wants(plan.sensor.measure, "g8", "g9", "g10", "g11"):
+        normals(flock, flock.errors, whole, decision, SENSOR + 256 * (FIRST + 2), m, 8)
+    if wants(plan.sensor.measure, "u0", "u1", "u2", "u3"):
+        uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST + 3), m)
+
+
+def recalled(i: int, flock: Flock, *, plan: Plan) -> Any:
+    """What the sensor of agent i remembers."""
+    return plan.sensor.Memory(*[flock.sense[c][i] for c in fields(plan.sensor.Memory)]) if plan.sensor.Memory else None
+
+
+def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> None:
+    """Own states by the rule of the sensor, and how far they are off."""
+    x, v, g, u = flock.position, flock.velocity, flock.errors, flock.chances
+    for i in lanes:
+        t = ask(
+            plan.sensor.measure, x=x[X][i], y=x[Y][i], z=x[Z][i], vx=v[X][i], vy=v[Y][i], vz=v[Z][i],
+            memory=recalled(i, flock, plan=plan), **{"g" + str(c): g[c][i] for c in range(12)},
+            **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period, s=numbers.s,
+        )  # fmt: skip
+        for a in range(plan.dimensions):
+            flock.measured_position[a][i] = t[a]
+            flock.own_error[a][i] = t[a] - x[a][i]
+        for a in range(plan.dimensions):
+            flock.measured_velocity[a][i] = t[a + 3]
+            flock.own_drift[a][i] = t[a + 3] - v[a][i]
+        for c in fields(plan.sensor.Memory):
+            flock.sense[c][i] = t[6][c]
 
 
 def perceive(  # noqa: C901 - tests of the plan leave one way through
@@ -29,14 +72,18 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
     axes, dims = range(plan.dimensions), plan.dimensions
     own, sent = (flock.own_error, flock.own_drift), (flock.sent_error, flock.sent_drift)
     errors = (((own, X), (own, Y), (sent, X), (sent, Y)), ((own, Z), (sent, Z)))
-    if plan.noisy:
+    if plan.senses:
+        drawn(flock, whole, decision, m, plan=plan)
+        measure(range(m), flock, numbers, real(decision) * numbers.c.period, plan=plan)
+    elif plan.noisy:
         for draw, kinds in enumerate(errors[: dims - 1]):
-            normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m)
+            normals(flock, flock.errors, whole, decision, SENSOR + 256 * draw, m, 0)
             for g, ((error, drift), a) in enumerate(kinds):
                 for i in range(m):
-                    error[a][i], drift[a][i] = sensors.langevin(
-                        error[a][i], drift[a][i], flock.errors[g][i], numbers.c.period, numbers.s
-                    )
+                    error[a][i], drift[a][i] = ask(
+                        plan.sensor.error, dx=error[a][i], dv=drift[a][i], g=flock.errors[g][i],
+                        period=numbers.c.period, s=numbers.s,
+                    )  # fmt: skip
         for a in axes:
             for i in range(m):
                 flock.measured_position[a][i] = flock.position[a][i] + flock.own_error[a][i]
@@ -46,12 +93,12 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.measured_position[a][i] = flock.position[a][i]
                 flock.measured_velocity[a][i] = flock.velocity[a][i]
-    if plan.noisy:
+    if plan.noisy and not plan.senses:
         for a in axes:
             for i in range(m):
                 flock.heard_position[a][i] = ring[slot, a, i] + flock.sent_error[a][i]
                 flock.heard_velocity[a][i] = ring[slot, a + dims, i] + flock.sent_drift[a][i]
-    elif plan.delayed:
+    elif plan.late:
         for a in axes:
             for i in range(m):
                 flock.heard_position[a][i] = ring[slot, a, i]

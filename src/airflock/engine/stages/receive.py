@@ -1,28 +1,46 @@
-"""Receive: which of the others an agent hears, and over two lossy links what it last heard."""
+"""Receive: which packets of the others arrive at an agent, and over two lossy links the newest that it has of each."""
 
 import math
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from airflock.body import radio
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, least, real, vector
-from airflock.world.edges import nearest_image
+from airflock.engine.stages.words import TINY, choose, integer, least, real
 
-LOSS, LINK = random.LOSS, random.LINK
-
-
-def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
-    """Number by which random numbers know the pair, whoever else is there."""
-    return flock.number[i] * whole.born + flock.number[j] if plan.absence else i * n + j
+PACKET = random.PACKET
 
 
-def drawn(i: int, j: int, n: int, decision: int, stream: int, flock: Flock, whole: Any, *, plan: Plan) -> Any:
-    """Random words of the pair."""
-    return random.draw(
-        pair_number(i, j, n, flock, whole, plan=plan), decision, stream, whole.world, whole.seed_low, whole.seed_high
+def first_of_four(i: int, flock: Flock) -> Any:
+    """Whether agent i is the first at hand of the four receivers that share random words."""
+    return (i == 0) | (flock.number[i] >> 2 != flock.number[i - 1] >> 2)
+
+
+def draw(
+    others: Iterable[int], flock: Flock, whole: Any, i: int, decision: int, n: int, *, plan: Plan
+) -> None:  # fmt: skip
+    """Random words of all that is sent to agent i and to the others of its four, in four rows, one for each of them."""
+    u = flock.words
+    for j in others:
+        u[0][j], u[1][j], u[2][j], u[3][j] = random.philox(
+            random.pair_number(flock.number[i], flock.number[j], whole.born if plan.absence else n), decision, PACKET,
+            whole.world, whole.seed_low, whole.seed_high,
+        )  # fmt: skip
+
+
+def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
+    """Random word of what agent j sends agent i, where it draws alone."""
+    w0, w1, w2, w3 = random.draw(
+        random.pair_number(i, j, n), decision, PACKET, whole.world, whole.seed_low, whole.seed_high
     )
+    return choose(i & 2 == 0, choose(i & 1 == 0, w0, w1), choose(i & 1 == 0, w2, w3))
+
+
+def word_of(i: int, j: int, lot: Any, drawn: Callable[[int, int], Any] | None) -> Any:
+    """Random word of what agent j sends agent i: of the row that was drawn for agent i, or drawn here."""
+    return lot[j] if drawn is None else drawn(i, j)
 
 
 def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
@@ -30,65 +48,52 @@ def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
     return time + flock.clock[i] if plan.suffers("clock") else time
 
 
-def receive(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, i: int, decision: int, n: int, time: float, late: float, store: Any,
-    *, plan: Plan,
+def sent(decision: int, rate: Any, numbers: Any) -> Any:
+    """Packets that a link of this rate (1/s) sends in a decision."""
+    return integer(radio.packets(real(decision), rate, numbers.c.period))
+
+
+def unheard(distance: Any, fast: Any, slow: Any, k: Any, *, plan: Plan) -> Any:
+    """Probability that nothing of what one agent sends another arrives, in range."""
+    return (
+        radio.either(radio.lost(distance, k), _missed(distance, fast, slow, k, plan=plan))
+        if plan.lossy and plan.links
+        else (_missed(distance, fast, slow, k, plan=plan) if plan.links else radio.lost(distance, k))
+    )
+
+
+def _missed(distance: Any, fast: Any, slow: Any, k: Any, *, plan: Plan) -> Any:
+    return radio.missed_few(distance, fast, slow, k) if plan.few else radio.missed(distance, fast, slow, k)
+
+
+def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Square of how far packets of agent j carry to agent i, m²."""
+    return least(least(range2, flock.reach_in[i]), flock.reach_out[j]) if plan.suffers("radio") else range2
+
+
+def hear(
+    i: int, j: int, apart2: Any, carried2: Any, fast: Any, slow: Any, lot: Any,
+    drawn: Callable[[int, int], Any] | None, stamp: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Whom agent i hears now, and on two lossy links the newest packet of each, extrapolated.
+    """Where packets are kept: `packet` is then the newest that agent i has of agent j.
 
-    What has just come is kept, too, where agents mind whom they have lost.
-
-    late  : how old a packet is when it arrives, s
-    store : of each pair the last packet: position, velocity, time stamp
+    apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
+    fast, slow       : packets sent on each link; stamp : when, s
     """
-    axes, dims = range(plan.dimensions), plan.dimensions
-    k, w, x = numbers.k, numbers.w, flock.position
-    said = [*(flock.heard_position[a] for a in axes), *(flock.heard_velocity[a] for a in axes)]
-    if plan.links:
-        fast = real(radio.packets(real(decision), k.fast_rate, numbers.c.period))
-        slow = real(radio.packets(real(decision), k.slow_rate, numbers.c.period))
-    if plan.packets and plan.bits == 64:
-        farthest = math.sqrt(k.range * k.range + TINY)  # as d carries its guard
-    for j in range(n):
-        if plan.periodic:  # neighbours are met at their image
-            o = vector()
-            for a in axes:
-                o[a] = x[a][j] - x[a][i]
-            for a in axes:
-                o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-            d = math.sqrt(sum(o[a] * o[a] for a in axes) + TINY)
-        else:
-            d = math.sqrt(sum((x[a][j] - x[a][i]) * (x[a][j] - x[a][i]) for a in axes) + TINY)
-        if plan.lossy:
-            w0, w1, w2, w3 = drawn(i, j, n, decision, LOSS, flock, whole, plan=plan)
-            arrives = random.uniform(w0) >= radio.lost(d, k)
-        else:
-            arrives = True
-        if plan.links:
-            w0, w1, w2, w3 = drawn(i, j, n, decision, LINK, flock, whole, plan=plan)
-            miss_fast = (ONE - radio.received(d, ZERO, k)) ** fast
-            miss_slow = (ONE - radio.received(d, ONE, k)) ** slow
-            got = (
-                arrives
-                & (d <= (farthest if plan.bits == 64 else k.range))
-                & (random.uniform(w0) >= miss_fast * miss_slow)
-            )
-        elif plan.silent:
-            got = arrives & (d <= (farthest if plan.bits == 64 else k.range))
-        if plan.links or plan.silent:
-            if plan.suffers("radio"):
-                got = got & (d * d <= least(flock.reach_in[i], flock.reach_out[j]) + TINY)
-            if got:
-                for c, row in enumerate(said):
-                    store[i, c, j] = row[j]
-                store[i, 2 * dims, j] = by_clock(time - late, j, flock, plan=plan)
-        if plan.links:
-            flock.age[j] = by_clock(time, i, flock, plan=plan) - store[i, 2 * dims, j]
-            flock.heard[j] = ONE if store[i, 2 * dims, j] > -1e8 else ZERO
-            for a in axes:
-                flock.latest_position[a][j] = store[i, a, j] + store[i, a + dims, j] * flock.age[j]
-            for a in axes:
-                flock.latest_velocity[a][j] = store[i, a + dims, j]
-        else:
-            flock.heard[j] = ONE if arrives else ZERO
-            flock.age[j] = late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late
+    dims = plan.dimensions
+    got = apart2 <= carried2
+    if plan.lossy or plan.links:
+        miss = unheard(math.sqrt(apart2 + TINY), fast, slow, numbers.k, plan=plan)
+        got = got & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
+    for a in range(dims):
+        packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
+        packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
+    packet[2 * dims] = choose(got, by_clock(stamp, j, flock, plan=plan), flock.packet[2 * dims][i, j])
+    for c in range(2 * dims + 1):
+        flock.packet[c][i, j] = packet[c]
+
+
+def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
+    """Where packets are kept: `packet` is then the newest that agent i has of agent j."""
+    for c in range(2 * plan.dimensions + 1):
+        packet[c] = flock.packet[c][i, j]

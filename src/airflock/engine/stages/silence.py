@@ -12,23 +12,20 @@ from airflock.engine.stages.words import HALF, SIDES, TINY, ZERO, X, Y, Z, choos
 from airflock.world.edges import nearest_image
 
 
-def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float, store: Any, *, plan: Plan) -> None:
-    """Let stand still who has lost somebody that could be near by now.
-
-    store : of each pair the last packet: position, velocity, time stamp
-    """
+def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float, *, plan: Plan) -> None:
+    """Let stand still who has lost somebody that could be near by now."""
     axes, w, c = range(plan.dimensions), numbers.w, flock.command
     for i in agents:
         somebody = ZERO
         for j in range(n):
             d = vector()
             for a in axes:
-                d[a] = store[i, a, j] - flock.measured_position[a][i]
+                d[a] = flock.packet[a][i, j] - flock.measured_position[a][i]
             if plan.periodic:
                 for a in axes:
                     d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
             distance = math.sqrt(sum(d[a] * d[a] for a in axes) + TINY)
-            age = by_clock(time, i, flock, plan=plan) - store[i, 2 * plan.dimensions, j]
+            age = by_clock(time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
             near = silence.could_be_near(distance, age, numbers.silence)
             somebody = most(somebody, choose(integer(j) == integer(i), ZERO, near))
         at, o = flock.stop_position, vector()

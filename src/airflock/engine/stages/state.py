@@ -45,8 +45,8 @@ class Flock:
     position, velocity, command          : true state (m, m/s), and what was asked of the body
     measured_position, measured_velocity : own state as the agent believes it
     heard_position, heard_velocity       : its state as others hear it
-    latest_position, latest_velocity     : over two lossy links: from the newest packet, extrapolated, to one agent
-    heard, age                           : whether that agent hears each other one (1 or 0), and how old that is, s
+    packet                               : over two lossy links, the newest packet of each pair: packet[c][i, j] is
+                                           number c (position, velocity, time stamp) of what agent i has of agent j
     own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
@@ -57,10 +57,12 @@ class Flock:
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
-    body                                 : what the body remembers, by field of its Memory
-    goal                                 : where its own goal is, m
+    body, sense                          : what the body and the sensor remember, by field of their Memory
+    goal, departed                       : where its own goal is, and where it started, m
+    before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
-    errors, outer, words                 : normal numbers of the sensors and of the outer noise, and random words
+    errors, chances                      : normal and uniform numbers of the sensors
+    outer, words                         : normal numbers of the outer noise, and random words
 
     take       : the row of a name in the driver
     dimensions : 2 or 3
@@ -75,25 +77,21 @@ class Flock:
         self.position, self.velocity, self.command = axes(""), axes("v"), axes("c")
         self.measured_position, self.measured_velocity = axes("m"), axes("mv")
         self.heard_position, self.heard_velocity = axes("h"), axes("hv")
-        self.latest_position, self.latest_velocity = axes("eh"), axes("ehv")
         self.own_error, self.own_drift = axes("own_q"), axes("own_u")
         self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
         self.stop_position = axes("stop_")
         self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
         self.away = Columns("away", take)
         self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
-        self.goal = axes("goal_")
+        self.sense, self.chances = Columns("sense", take), Columns("chance", take)
+        self.packet = Columns("packet", take)
+        self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
         self._take = take
 
     @property
-    def heard(self) -> Row:
-        """Whether each other agent is heard, 1 or 0."""
-        return self._take("heard")
-
-    @property
-    def age(self) -> Row:
-        """How old that is, s."""
-        return self._take("age")
+    def touches(self) -> Row:
+        """Whether each agent touched the scene since it was last looked at, 1 or 0."""
+        return self._take("touches_")
 
     @property
     def rays(self) -> Row:

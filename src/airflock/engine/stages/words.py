@@ -27,6 +27,7 @@ class Named(float):
 
 ZERO, HALF, ONE = Named(0.0, "ZERO"), Named(0.5, "HALF"), Named(1.0, "ONE")
 TINY, FAR, LIMIT = Named(1e-12, "TINY"), Named(1e30, "FAR"), Named(1e8, "LIMIT")
+GONE = Named(-1.0, "-ONE")  # a time, or a square: not there
 AWAY = Named(1e9, "AWAY")  # m, along each axis: where agents are that only fill up vectors
 START = {"sum": ZERO, "min": FAR, "max": Named(-1e30, "-FAR")}  # a total before its first term
 
@@ -99,9 +100,9 @@ def ask(rule: Callable[..., Any] | None, **offered: Any) -> Any:
     return rule(*(offered[name] for name in inspect.signature(rule).parameters))
 
 
-def wants(rule: Callable[..., Any], *names: str) -> bool:
+def wants(rule: Callable[..., Any] | None, *names: str) -> bool:
     """Whether a rule asks for any of these names."""
-    return bool(set(names) & set(inspect.signature(rule).parameters))
+    return rule is not None and bool(set(names) & set(inspect.signature(rule).parameters))
 
 
 def reduced(how: str, total: Any, term: Any) -> Any:

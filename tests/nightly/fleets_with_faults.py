@@ -1,6 +1,6 @@
 """Flies fleets of ten with one fault each beside the same seeds without it, and says which faults the rules hold.
 
-    python tests/nightly/fleets.py FOLDER [SEEDS]
+    python tests/nightly/fleets_with_faults.py FOLDER [SEEDS]
 
 One line of FOLDER/flights.csv for each flight; flights that stand there are not flown again. FOLDER/table.csv has a row
 for each condition: the median of the smallest distance of any two drones in the air from the fault on is at least 5 m,

@@ -1,24 +1,21 @@
-"""Sensors: how often an agent measures, and how wrong it is."""
+"""Langevin: satellite navigation with slowly wandering errors, as Vásárhelyi et al. 2018 simulate it."""
 
 import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import quantity
+from airflock.core.sensor import Sampled
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 PROGRAM = "authors' program of Vásárhelyi et al. 2018"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(Sampled):
     """Satellite navigation with a slowly wandering error. Stationary per axis: SD of the velocity error sqrt(noise),
     of the position error sqrt(scale · sqrt(noise / (2 damping))), 0.69 m with the defaults.
     """
 
-    period: float = quantity(
-        0.2, "s", low=0.0, high=60.0, source=S5, meaning="time between decisions; 0: at every step dt"
-    )
     noise: float = quantity(
         0.005, "m^2/s^2", low=0.0, high=100.0, source=S5, meaning="variance of the velocity error (S5: noise level)"
     )
@@ -28,12 +25,17 @@ class Parameters(Record):
     )
 
 
-def langevin(q, u, g, h, s):
-    """One step h (s) of an error: position q (m), velocity u (m/s), normal number g → new q, u.
+def exact(s):
+    """Whether it tells the truth: without noise."""
+    return s.noise == 0.0
+
+
+def error(dx, dv, g, period, s):
+    """One period of an error along one axis: of the position dx (m), of the velocity dv (m/s), from a normal number g.
 
     A damped oscillator with a random push (authors' program; the paper says only "Langevin, parabolic potential").
     """
-    push = math.sqrt(2.0 * s.damping * h * s.noise)
+    push = math.sqrt(2.0 * s.damping * period * s.noise)
     spring = math.sqrt(2.0 * s.damping * s.noise) / s.scale
-    new_u = u + push * g - spring * h * q - s.damping * h * u
-    return q + h * new_u, new_u
+    new = dv + push * g - spring * period * dx - s.damping * period * dv
+    return dx + period * new, new

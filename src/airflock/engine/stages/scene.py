@@ -1,0 +1,119 @@
+"""Scene: goals on their way, shapes that appear, and who touches what stands there."""
+
+import math
+from typing import Any
+
+from airflock.engine.plan import Plan
+from airflock.engine.stages.state import Flock, tree
+from airflock.engine.stages.words import FAR, GONE, HALF, ONE, ZERO, X, Y, Z, most, real, repeat, vector
+from airflock.world import bvh, goals
+
+
+def apart(i: int, centre: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Squared distance of agent i from the centre of the flock, m²."""
+    return sum((flock.position[a][i] - centre[a]) * (flock.position[a][i] - centre[a]) for a in range(plan.dimensions))
+
+
+def aim(flock: Flock, numbers: Any, time: float, elapsed: float, n: int, scene: Any, *, plan: Plan) -> int:
+    """Send the goal on its way, for the flock's centre as it is.
+
+    time, elapsed : since the start, and since the goal last moved, s
+    """
+    x, w, at, axes = flock.position, numbers.w, scene.aim, range(plan.dimensions)
+    number = int(at[3])
+    if number >= len(scene.goals):
+        return 0
+    s = vector()
+    for a in axes:
+        s[a] = ZERO
+    for i in range(n):
+        for a in axes:
+            s[a] = s[a] + x[a][i]
+    centre = (s[X] / real(n), s[Y] / real(n), s[Z] / real(n))
+    target = (scene.goals[number, X], scene.goals[number, Y], scene.goals[number, Z])
+    if plan.herd:
+        c, f = vector(), vector()
+        c[X], c[Y], c[Z] = centre
+        stray = GONE
+        for a in (X, Y, Z):
+            f[a] = c[a]
+        for i in range(n):
+            if apart(i, c, flock, plan=plan) > stray:
+                stray = apart(i, c, flock, plan=plan)
+                for a in axes:
+                    f[a] = x[a][i]
+        g = goals.herd(
+            at[X], at[Y], at[Z], *target, *centre, f[X], f[Y], f[Z], w.goal_spread, w.goal_behind, w.goal_radius,
+            w.goal_speed * elapsed if w.goal_speed > ZERO else FAR,
+        )  # fmt: skip
+    else:
+        g = goals.pursue(
+            at[X], at[Y], at[Z], *target, *centre, w.goal_radius,
+            w.goal_speed * elapsed if w.goal_speed > ZERO else FAR,
+        )  # fmt: skip
+    for a in (X, Y, Z):
+        at[a] = g[a]
+    if g.reached > HALF:
+        scene.reached[number] = time
+        at[3] += ONE
+    return 0
+
+
+def glide(flock: Flock, numbers: Any, time: float, n: int, scene: Any, *, plan: Plan) -> int:
+    """Send each agent's own goal on its way from where the agent started.
+
+    aim[3] keeps how long all are under way, s: the longest way at goals.speed, which a smooth course exceeds by half.
+    """
+    x, w, at, axes = flock.position, numbers.w, scene.aim, range(plan.dimensions)
+    who = flock.number
+    if time <= ZERO:
+        far = ZERO
+        for i in range(n):
+            for a in axes:
+                flock.departed[a][i] = x[a][i]
+            far = most(far, sum((scene.goals[who[i], a] - x[a][i]) * (scene.goals[who[i], a] - x[a][i]) for a in axes))
+        at[3] = 1.5 * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO
+    for i in range(n):
+        for a in axes:
+            flock.goal[a][i] = goals.glide(flock.departed[a][i], scene.goals[who[i], a], time, at[3])
+    return 0
+
+
+def appear(flock: Flock, numbers: Any, time: float, n: int, scene: Any) -> int:
+    """Let stand what is due, as soon as nobody is in its place.
+
+    A shape waits until every agent is at start.clearance from its bounds, as nobody builds onto a drone in flight.
+    """
+    x, w, later = flock.position, numbers.w, scene.later
+    for r in range(len(later)):
+        if (later[r, 6] >= ZERO) and (later[r, 6] <= time):
+            free = True
+            for i in range(n):
+                if bvh.beside(x[X][i], x[Y][i], x[Z][i], later, r) <= w.clearance * w.clearance:
+                    free = False
+            if free:
+                shape = int(later[r, 7])
+                later[r, 6] = GONE
+                for c in repeat(6):
+                    scene.shapes[shape, c] = later[r, c]
+    return 0
+
+
+def contacts(flock: Flock, numbers: Any, n: int, scene: Any, *, plan: Plan) -> None:
+    """Find which agents have touched the scene since the positions were last looked at."""
+    x, before, axes = flock.position, flock.before, range(plan.dimensions)
+    if plan.scene:
+        if scene.counts[1] == 0:
+            for i in range(n):
+                for a in axes:
+                    before[a][i] = x[a][i]
+        scene.counts[1] = 1
+    for i in range(n):
+        if plan.scene:
+            flock.touches[i] = bvh.touches(
+                before[X][i], before[Y][i], before[Z][i], x[X][i], x[Y][i], x[Z][i], numbers.q.r_body, *tree(scene)
+            )
+            for a in axes:
+                before[a][i] = x[a][i]
+        else:
+            flock.touches[i] = ZERO

@@ -1,0 +1,20 @@
+"""Perfect: an agent knows its own position and velocity as they are."""
+
+from dataclasses import dataclass
+
+from airflock.core.sensor import Sampled
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Sampled):
+    """A sensor without errors; it only says how often an agent measures, and so decides."""
+
+
+def exact(s):
+    """Whether it tells the truth: always."""
+    return True
+
+
+def measure(x, y, z, vx, vy, vz):
+    """Position (m) and velocity (m/s) as they are."""
+    return x, y, z, vx, vy, vz
