@@ -4,6 +4,7 @@ import pytest
 
 import airflock
 from airflock.errors import ScenarioError
+from airflock.evolve.study import load_study
 
 OWN = "def error(g, s):\n    return g, 0.0\n"
 
@@ -64,3 +65,14 @@ def test_a_wrong_key_of_a_fault_names_the_right_ones(tmp_path):
 def test_numbers_by_which_everybody_is_met_are_told(settings, note):
     told = [line for line in airflock.load("vasarhelyi_2018/4ms", settings).notes if "topology" in line]
     assert bool(told) == bool(note) and all(line.startswith(note) for line in told)
+
+
+def test_a_key_of_the_search_that_stands_at_the_top_of_a_study_is_told_its_place(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text('scenario = "vasarhelyi_2018/4ms"\ngenerations = 3\ntitel = "mine"\n')
+    with pytest.raises(ScenarioError) as told:
+        load_study(file)
+    assert str(told.value).splitlines() == [
+        f"{file}: generations: unknown key; did you mean search.generations?",
+        f"{file}: titel: unknown key; did you mean title?",
+    ]

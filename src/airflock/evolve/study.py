@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -177,7 +177,8 @@ def make_study(
     document, faults = formats.current(document, where), []
     for key in document:
         if key not in KEYS:
-            near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
+            of_search = [f"search.{key}"] if key in {field.name for field in fields(Search)} else []
+            near = of_search or get_close_matches(key, KEYS, n=1, cutoff=0.5)
             faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
