@@ -5,13 +5,16 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from airflock.body.registry import BODIES
+from airflock.core import fault
 from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
 from airflock.errors import ScenarioError
+from airflock.scenarios import groups
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.sensors.registry import SENSORS
 
 TOP = "top"  # the keys before the first section
+LISTS = {"groups": groups.KEYS, "faults": fault.KEYS}
 
 
 class Key(NamedTuple):
@@ -105,6 +108,8 @@ def keys(section: str | None = None) -> list[Key]:
     if section in known:
         return list(_of(section, known[section]))
     found = [key for key in every if section in (key.name, key.name.rpartition(".")[2], key.name.partition(".")[0])]
+    if section in LISTS:
+        raise ScenarioError([f"{section}: a list of tables [[{section}]], with the keys {', '.join(LISTS[section])}"])
     if not found:
         words = {key.name: key.name for key in every} | {key.name.rpartition(".")[2]: key.name for key in every}
         words |= {name: name for name in (*known, "model", "body", "sensors")}
