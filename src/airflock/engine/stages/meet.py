@@ -6,7 +6,7 @@ from typing import Any
 
 from airflock.core import random
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import by_clock, carries, hear, sent, unheard
+from airflock.engine.stages.receive import by_clock, carried, carries, hear, on_record, sent, unheard
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import (
     FAR,
@@ -110,10 +110,10 @@ def meet(  # noqa: C901 - tests of the plan leave one way through
         if plan.packets:
             carried2 = carries(i, j, range_ * range_, flock, plan=plan)
             hear(i, j, apart2, carried2, fast, slow, lot, None, time - late, packet, flock, numbers, plan=plan)
-        if plan.links:
+        if plan.packets:
             age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
             for a in axes:
-                d[a] = packet[a] + packet[a + plan.dimensions] * age - own[a]
+                d[a] = carried(a, age, packet, plan=plan) - own[a]
         else:
             for a in axes:
                 d[a] = flock.heard_position[a][j] - own[a]
@@ -121,13 +121,13 @@ def meet(  # noqa: C901 - tests of the plan leave one way through
             for a in axes:
                 d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
         r2 = sum(d[a] * d[a] for a in axes) + TINY
-        if plan.links:
-            hears = (apart2 <= range2) & (packet[2 * plan.dimensions] > -1e8) & (integer(j) != ii)
+        if plan.packets:
+            hears = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
         elif plan.perturbed:
             hears = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
         else:
             hears = (r2 <= range2) & (integer(j) != ii)
-        if plan.lossy and not plan.links:
+        if plan.lossy and not plan.packets:
             distance = math.sqrt(apart2 + TINY if plan.perturbed else r2)
             hears = hears & (random.uniform(lot[j]) >= unheard(distance, ZERO, ZERO, k, plan=plan))
         if plan.meeting("dx") or plan.hides:
