@@ -1,12 +1,14 @@
 """Whom agents meet in flight: by drivers and reference, as `look` tells, late, absent, in boxes, on board, by cells."""
 
 from dataclasses import dataclass
+from random import Random
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import airflock
+from against_reference import interpreted_flight
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters
 from airflock.engine import cpu
@@ -20,6 +22,7 @@ from airflock.scenarios.files import make
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted
 from reference.flight import fly_plainly
+from scenarios_drawn import Draw
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +120,43 @@ def test_look_tells_whom_an_agent_meets(kind, seed):
         assert not any(any(term) for term, met in zip(view.terms, view.met, strict=True) if not met)
         np.testing.assert_allclose(np.sum([*view.terms, [0.0] * len(view.sums)], axis=0), view.sums, atol=1e-9)
     assert fewer > 3
+
+
+RADIOS = (
+    {"radio.loss": 0.4, "radio.loss_at": 20.0},
+    {"radio.kind": "links", "radio.near": 5.0, "radio.far": 25.0, "radio.slow_rate": 4.0},
+    {"silence.rule": "stop", "silence.patience": 0.1, "silence.keep": 15.0},
+    {"faults": [
+        {"kind": "radio_deaf", "at": 0.1, "agents": [1]}, {"kind": "radio_silent", "at": 0.15, "agents": [2]},
+        {"kind": "radio_range", "at": 0.0, "agents": [0, 3], "share": 0.5}, {"kind": "clock", "at": 0.0, "agents": [4]},
+    ]},
+    {"world.edges": "periodic", "world.obstacles": []},
+    {"radio.delay": 0.1},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["nearest", "voronoi", "visible", "strongest"])
+def test_whatever_the_radio_the_same_are_met_as_in_the_reference(kind, seed):
+    """Each trait is that of half of the flights. Every line of a driver runs in every other one."""
+    rng, flights, fewer = Random(f"{seed} {kind}"), 4, 0
+    halves = [rng.sample(range(flights), flights // 2) for _ in RADIOS]
+    for number in range(flights):
+        keys = {
+            "agents": 7, "duration": 0.2, "dt": 0.05, "sensors.period": 0.1, "world.side": 40.0, "radio.range": 28.0,
+            "radio.delay": 0.0, "start.separation": 4.0, "topology.kind": kind, "topology.k": 1, "metrics.period": 0.1,
+            "topology.radius": 4.0, "topology.fading": 4.0, "world.obstacles": ISLANDS,
+        }  # fmt: skip
+        for trait, half in zip(RADIOS, halves, strict=True):
+            keys |= trait if number in half else {}
+        found, plain = (
+            make({"model": {"kind": "counting"}}, "test", keys | more, law=COUNTING)
+            for more in ({}, {"topology.kind": "range"})
+        )
+        world = rng.randrange(2**32)
+        text = interpreted(found, world) if number % 2 else interpreted_flight(Draw(found, world, None, keys))
+        np.testing.assert_allclose(text.frames, fly_plainly(found, world).frames, atol=1e-9, err_msg=f"{world} {keys}")
+        fewer += not np.array_equal(text.frames, interpreted(plain, world).frames)
+    assert fewer > 1
 
 
 def test_a_change_in_flight_takes_effect():

@@ -164,10 +164,7 @@ class World:
         around = [self.rest[name] for name in ("edges", "spans", "scene")]
 
         def pick(i):
-            meet.meet(
-                flock, numbers, whole, i, range(n), n, n, step, 0.7, 0.2, state["words"], *around, plan=plan,
-                images=plan.periodic,
-            )  # fmt: skip
+            meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan)
 
         neighbours.neighbours(
             range(n), range(n), flock, numbers, step, 0.7, 0.2, state["words"], draw, None, pick, plan=plan,

@@ -37,16 +37,20 @@ def neighbours(build: Builder) -> None:
         build, meeting.neighbours, decision=argument("k_"), draw=draw, drawn=drawn, meet=meet, sums=sums, images=images
     )
     if plan.grid:
-        met = None if plan.topology is None else _met_in_cells(build)
-        grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums], met)
+        grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
     arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
     build.stage("neighbours", arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
-def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str], list[str]]:
-    """Of `neighbours`: what is done once, for an agent, and for each candidate, for the grid's own loops."""
-    axes = build.plan.axes
+def _for_cells(
+    build: Builder, made: Specialised
+) -> tuple[list[str], list[str], list[str], tuple[list[str], list[str]] | None]:
+    """Of `neighbours`: what is done once, for an agent, and for each candidate, for the grid's own loops.
+
+    And where an agent meets but some of whom it hears, what finds out: for each candidate, and at last.
+    """
+    plan, axes = build.plan, build.plan.axes
     found = {f"{kind}{a}" for kind in ("m", "mv", "h", "hv") for a in axes}  # the grid lays them out in its own way
     found |= set(grid.FOUND)
     lines = [line for line in made.once if line.partition(" = ")[0] not in found]
@@ -56,18 +60,14 @@ def _for_cells(build: Builder, made: Specialised) -> tuple[list[str], list[str],
     at = next(k for k, statement in enumerate(agents.body) if isinstance(statement, ast.For))
     candidates = agents.body[at]
     assert isinstance(candidates, ast.For)
-    before = [line for line in lines_of(agents.body[:at]) if not line.startswith("meet(")]
-    return lines, before, lines_of(candidates.body)
-
-
-def _met_in_cells(build: Builder) -> tuple[list[str], list[str], list[str], list[str]]:
-    """Of `meet`: what is read, done for an agent, for each candidate and at last, for the grid's own loops."""
-    made = specialise(build, meeting_whom.meet, m=argument("padded"), images=False)
-    at = next(k for k, statement in enumerate(made.first) if isinstance(statement, ast.For))
-    candidates = made.first[at]
-    assert isinstance(candidates, ast.For)
-    read = [line for line in made.bindings if " = work[" not in line]
-    return read, lines_of(made.first[:at]), lines_of(candidates.body), lines_of(made.first[at + 1 :])
+    before = lines_of(agents.body[:at])
+    if plan.topology is None:
+        return lines, before, lines_of(candidates.body), None
+    made_of = specialise(build, meeting_whom.meet, m=argument("padded"))
+    again = agents.body[at + 2]
+    assert isinstance(again, ast.For)
+    lines += [line for line in made_of.bindings if " = work[" not in line]
+    return lines, before, lines_of(again.body), (lines_of(candidates.body), lines_of(made_of.first))
 
 
 def boundaries(build: Builder) -> None:

@@ -26,7 +26,7 @@ CHUNKS = 8  # parts of the flock that are counted side by side; their order is t
 BLOCK = 8  # candidates taken at once
 STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
 SPARE = 8  # cells of the smallest periodic box
-FOUND = ("apart", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, by `stages.meet`
+FOUND = ("square", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, where some are met
 OTHERS = "(integer(q) != me) & (integer(q) < many)"
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
 
@@ -64,13 +64,12 @@ def opened(build: Builder) -> list[str]:
 
 
 def neighbours(
-    build: Builder, lines: list[str], before: list[str], inner: list[str], sums: list[int],
-    met: tuple[list[str], list[str], list[str], list[str]] | None = None,
+    build: Builder, lines: list[str], before: list[str], inner: list[str],
+    met: tuple[list[str], list[str]] | None, sums: list[int],
 ) -> None:  # fmt: skip
     """Function `neighbours` over a grid: `before`, then `inner` for each candidate j, for each agent; sums to rows.
 
-    met : where an agent meets but some of whom it hears, lines that find out: what is read, done once, for each
-          candidate, at last
+    met : where an agent meets but some of whom it hears, lines before `inner` that find out: of each candidate, at last
     """
     axes = build.plan.axes
     build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
@@ -78,15 +77,13 @@ def neighbours(
     for c, name in enumerate(names):
         before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
-    if met is None or who:
-        before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
+    before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
     if met is None:
         inner = must_replace(inner, "integer(j) != ii", OTHERS)
     inner = must_replace(inner, "integer(j) < ii", "who[j] < ii") if who else inner
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     if met is not None:
-        lines = list(dict.fromkeys([*met[0], *lines]))
-        meet += _found(build, *met[1:])
+        meet += _found(*met)
         inner = must_replace(inner, "met[j]", "met[q]")
     # an unsigned index cannot count from the end, which would turn loads of whole vectors into gathers
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
@@ -113,16 +110,12 @@ def neighbours(
     build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
-def _found(build: Builder, once: list[str], each: list[str], last: list[str]) -> list[str]:
+def _found(each: list[str], last: list[str]) -> list[str]:
     """Lines that find whom an agent meets of the candidates of its cell: `met`, by number of the candidate."""
-    for c, a in enumerate(build.plan.axes):
-        once = must_replace(once, f"m{a}[i]", f"packed[e, {c}]")
-    once = [line for line in once if line != "ii = integer(i)"]
     each = must_replace(each, "integer(j) != ii", OTHERS)
-    each = must_replace(each, "(r2 <= range2)", "(r2 <= range2) & (r2 <= near2)")  # nobody farther decides anything
     for name in FOUND:
         each = [line.replace(f"{name}[j]", f"{name}[q]") for line in each]
-    return [*once, *loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]
+    return [*loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]
 
 
 def _box(build: Builder) -> list[str]:

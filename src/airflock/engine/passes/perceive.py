@@ -9,7 +9,7 @@ from airflock.engine.stages import meet as meeting
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages import receive as hearing
 
-MEET = "i, k_, n, m, time, late, row, whole, work, store, words"  # what the stage is called with
+MEET = "i, k_, n, m, row, whole, work"  # what the stage is called with
 RECEIVE = {  # whether each pair draws for itself: what stage draws
     False: "receive(i, k_, n, m, whole, work, words)",
     True: "receive(i, j, k_, n, world, seed_low, seed_high)",
@@ -39,7 +39,7 @@ def meet(build: Builder) -> None:
     """Function meet, where agents meet but some of whom they hear: fills row met for one agent."""
     plan = build.plan
     if plan.topology is not None and not plan.grid:
-        made = specialise(build, meeting.meet, decision=argument("k_"), images=build.images)
+        made = specialise(build, meeting.meet, decision=argument("k_"))
         build.function(f"meet({', '.join([MEET, *around(plan)])})", made.lines, "return 0")
 
 

@@ -22,6 +22,7 @@ from airflock.engine.stages.receive import (
 )  # fmt: skip
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
+    FAR,
     HALF,
     LIMIT,
     ONE,
@@ -41,6 +42,10 @@ from airflock.engine.stages.words import (
     vector,
 )  # fmt: skip
 from airflock.world.edges import nearest_image
+
+# Where an agent meets but some of whom it hears, its others are gone through twice: who is heard, and, of those whom
+# it meets, what they say.
+BOTH, HEAR, ADD = "both", "hear", "add"
 
 
 def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
@@ -73,7 +78,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     if model.reach is not None and not plan.varies("p"):
         near = least(ask(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if exact else near * near
-    if plan.links and plan.topology is None:
+    if plan.links:
         fast = sent(decision, k.fast_rate, numbers)
         slow = sent(decision, k.slow_rate, numbers)
     for i in agents:
@@ -89,15 +94,13 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                 if first_of_four(i, flock):
                     draw(i)
             lot = words[flock.number[i] & 3]
-        if plan.topology is not None:
-            meet(i)
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
         for a in axes:
             own[a] = flock.measured_position[a][i]
             v[a] = flock.measured_velocity[a][i]
         if plan.dimensions == 2:
             v[Z] = ZERO
-        if (true_range or plan.packets) and plan.topology is None:
+        if true_range or plan.packets:
             for a in axes:
                 true[a] = flock.position[a][i]
         f = ONE / norm(v[X], v[Y], v[Z])
@@ -105,61 +108,72 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             h[a] = f * v[a]
         for c, how in sums:
             total[c] = START[how]
-        for j in others:
-            d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
-            age = heard_age(i, j, late, flock, plan=plan)
-            if (true_range or plan.packets) and plan.topology is None:
-                for a in axes:
-                    o[a] = flock.position[a][j] - true[a]
-                if plan.periodic:
+        for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
+            for j in others:
+                d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
+                age = heard_age(i, j, late, flock, plan=plan)
+                if (true_range or plan.packets) and part != ADD:
                     for a in axes:
-                        o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-                apart2 = sum(o[a] * o[a] for a in axes)
-            if plan.packets and plan.topology is None:
-                carried2 = carries(i, j, range_ * range_, flock, plan=plan)
-                hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
-            elif plan.packets:
-                newest(i, j, packet, flock, plan=plan)
-            if plan.packets:
-                age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
-                for a in axes:
-                    d[a] = carried(a, age, packet, plan=plan) - own[a]
-                    dv[a] = packet[a + plan.dimensions] - v[a]
-            else:
-                for a in axes:
-                    d[a] = flock.heard_position[a][j] - own[a]
-                    dv[a] = flock.heard_velocity[a][j] - v[a]
-            if images:
-                for a in axes:
-                    d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
-            if plan.dimensions == 2:
-                d[Z] = ZERO
-                dv[Z] = ZERO
-            r2 = sum(d[a] * d[a] for a in axes) + TINY
-            r = math.sqrt(r2)
-            speed = math.sqrt(sum(dv[a] * dv[a] for a in axes) + TINY)
-            g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
-            for a in (X, Y, Z):
-                nh[a] = g * (v[a] + dv[a])
-            if plan.topology is not None:
-                ok = flock.met[j] > HALF
-            elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
-                ok = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
-            elif true_range:
-                ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
-            else:
-                ok = (r2 <= range2) & (integer(j) != ii)
-            if model.reach is not None:
-                ok = ok & (r2 <= near2)
-            if plan.lossy and not plan.packets and plan.topology is None:
-                distance = math.sqrt(apart2 + TINY) if true_range else r
-                ok = ok & (random.uniform(word_of(i, j, lot, drawn)) >= unheard(distance, ZERO, ZERO, k, plan=plan))
-            t = ask(
-                model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z], dv=speed,
-                vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
-                age=age, lower=ONE if integer(j) < ii else ZERO, p=own_p,
-            )  # fmt: skip
-            for c, how in sums:
-                total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))
+                        o[a] = flock.position[a][j] - true[a]
+                    if plan.periodic:
+                        for a in axes:
+                            o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
+                    apart2 = sum(o[a] * o[a] for a in axes)
+                if plan.packets and part != ADD:
+                    carried2 = carries(i, j, range_ * range_, flock, plan=plan)
+                    hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
+                elif plan.packets:
+                    newest(i, j, packet, flock, plan=plan)
+                if plan.packets:
+                    age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
+                    for a in axes:
+                        d[a] = carried(a, age, packet, plan=plan) - own[a]
+                        dv[a] = packet[a + plan.dimensions] - v[a]
+                else:
+                    for a in axes:
+                        d[a] = flock.heard_position[a][j] - own[a]
+                        dv[a] = flock.heard_velocity[a][j] - v[a]
+                if images:
+                    for a in axes:
+                        d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+                if plan.dimensions == 2:
+                    d[Z] = ZERO
+                    dv[Z] = ZERO
+                r2 = sum(d[a] * d[a] for a in axes) + TINY
+                r = math.sqrt(r2)
+                speed = math.sqrt(sum(dv[a] * dv[a] for a in axes) + TINY)
+                g = ONE / norm(v[X] + dv[X], v[Y] + dv[Y], v[Z] + dv[Z])
+                for a in (X, Y, Z):
+                    nh[a] = g * (v[a] + dv[a])
+                if part == HEAR:
+                    flock.square[j] = FAR  # and so it stays where an interpreted driver goes on to the next one
+                if part == ADD:
+                    ok = flock.met[j] > HALF
+                elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
+                    ok = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
+                elif true_range:
+                    ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
+                else:
+                    ok = (r2 <= range2) & (integer(j) != ii)
+                if model.reach is not None and (part != HEAR or plan.grid):
+                    ok = ok & (r2 <= near2)
+                if plan.lossy and not plan.packets and part != ADD:
+                    distance = math.sqrt(apart2 + TINY) if true_range else r
+                    ok = ok & (random.uniform(word_of(i, j, lot, drawn)) >= unheard(distance, ZERO, ZERO, k, plan=plan))
+                if part == HEAR:
+                    if plan.meeting("dx") or plan.hides:
+                        for a in axes:
+                            flock.away[a][j] = d[a]
+                    flock.square[j] = choose(ok, r2, FAR)
+                else:
+                    t = ask(
+                        model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z],
+                        dv=speed, vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
+                        age=age, lower=ONE if integer(j) < ii else ZERO, p=own_p,
+                    )  # fmt: skip
+                    for c, how in sums:
+                        total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))
+            if part == HEAR:
+                meet(i)
         for c, _ in sums:
             flock.sums[c][i] = total[c]

@@ -52,7 +52,7 @@ class Flock:
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
     stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
-    away, apart                          : offsets of the others from one agent (m), and their squares (m²), FAR of
+    away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
@@ -99,9 +99,9 @@ class Flock:
         return self._take("rays_")
 
     @property
-    def apart(self) -> Row:
+    def square(self) -> Row:
         """Squared distance of each other agent, m²; FAR of whom one agent does not hear."""
-        return self._take("apart")
+        return self._take("square")
 
     @property
     def hidden(self) -> Row:
