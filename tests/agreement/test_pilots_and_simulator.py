@@ -19,7 +19,7 @@ from airflock.core.contract import model
 from airflock.core.parameters import choices
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete, could_be_near
+from airflock.core.silence import complete, could_be_near, counts
 from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
@@ -235,6 +235,25 @@ def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, ag
         assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
     assert not could_be_near(distance, s.forget, s)
     assert not could_be_near(distance, min(age, s.patience), s), "data younger than the patience stop nobody"
+
+
+@given(st.floats(0, 60), st.floats(0, 200))
+def test_a_neighbour_counts_as_heard_or_as_lost_but_never_as_both(age, distance):
+    s = complete(Silence(rule="stop"), 4.0, delay=1.0)
+    assert not (counts(age, s) and could_be_near(distance, age, s))
+    if age < s.forget:
+        assert counts(age, s) or could_be_near(0.0, age, s)
+
+
+def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
+    """With the rule of silence the law hears it until it is lost; without, it is gone at the next decision."""
+    hearing, own = Hearing.simulated(links=False), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    for rule, known in ((Silence(rule="stop", patience=1.5), True), (None, False)):
+        one = pilot(silence=rule, hearing=hearing)
+        one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 1.0)
+        assert one.heard(1.0)
+        one.decide(own, 1.0)
+        assert bool(one.heard(1.4)) is known and not one.heard(1.6)
 
 
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():

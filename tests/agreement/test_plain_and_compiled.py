@@ -41,8 +41,8 @@ FLIGHTS = {
         "sensors.drift_time": 3.0, "sensors.bias": 1.0, "sensors.white": 0.3, "sensors.jump_rate": 0.2,
         "sensors.jump_time": 1.0, "sensors.outage_rate": 0.2, "sensors.outage_time": 0.8,
     }),
-    "silence": ("vasarhelyi_2018", {  # more than the half of all packets are lost: everybody stops now and then
-        "agents": 8, "radio.loss": 0.6, "radio.loss_at": 0.1, "radio.delay": 0.2, "silence.rule": "stop",
+    "silence": ("vasarhelyi_2018", {  # near 15 m most packets are lost: everybody misses some, and stops now and then
+        "agents": 8, "radio.loss": 0.6, "radio.loss_at": 15.0, "radio.delay": 0.2, "silence.rule": "stop",
     }),
     "ideal": ("vasarhelyi_2018", IDEAL | {"agents": 7}),
     "ideal_3d": ("vasarhelyi_2018", IDEAL | {"agents": 6, "world.dimensions": "3", "duration": 8.0}),

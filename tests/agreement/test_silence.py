@@ -36,6 +36,23 @@ def test_who_hears_everybody_flies_as_without_the_rule():
     np.testing.assert_array_equal(interpreted(free, 1).frames, interpreted(bound, 1).frames)
 
 
+@pytest.mark.parametrize("kind", ["range", "nearest"])
+def test_look_tells_whom_an_agent_hears_until_they_are_lost(kind, seed):
+    """More than a half of all packets are lost; the terms of those who count add up to what the law was given."""
+    keys = {
+        "agents": 8, "world.side": 60.0, "radio.loss": 0.6, "radio.loss_at": 25.0, "radio.delay": 0.2,
+        "silence.rule": "stop", "topology.kind": kind, "duration": 20.0,
+    }  # fmt: skip
+    flight = airflock.open(airflock.load("vasarhelyi_2018/4ms", keys), seed, device="python")
+    flight.advance(steps=60).sense()
+    ages = []
+    for agent in range(8):
+        view = flight.look(agent)
+        ages += [other.age for other in view.heard]
+        np.testing.assert_allclose(np.sum([*view.terms, [0.0] * len(view.sums)], axis=0), view.sums, atol=1e-9)
+    assert max(ages) > 0.35 and max(ages) <= 0.7, "older than what came last, and younger than the patience"
+
+
 REFUSED = {
     "couzin_2002/torus": "commands a heading",
     "zapotecatl_2016/best": "commands an acceleration",

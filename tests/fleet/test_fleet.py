@@ -241,6 +241,13 @@ def test_silence_does_not_end_in_a_collision():
     assert lows[True] > 3.0 > lows[False]
 
 
+def test_whose_node_died_has_landed_before_the_others_forget_it():
+    """Its autopilot lands where setpoints end; the others stand still meanwhile, and then fly on."""
+    f = in_the_air(10, 30.0, 3, (Fault("node", (2,), 5.0),), noisy=True, silent=True)
+    assert f.vehicles[1].mode == "LAND" and not f.vehicles[1].armed
+    assert f.vehicles[1].state.z == 0.0
+
+
 def test_a_clock_that_is_half_a_second_off_never_starts():
     f = fleet(scenario(3, 300.0, **{"radio.delay": 0.2}), faults=[Fault("clock", (2,), amount=0.5)])
     f.advance(10.0)
@@ -281,7 +288,30 @@ def test_after_the_last_setpoint_a_vehicle_stops_within_its_time_out(kind, trave
     for k in range(1500):
         v.step(0.01 * k, 0.01)
     assert travels[0] < v.state.x < travels[1]
-    assert v.mode == ("HOLD" if kind == "px4" else "OURS")
+    assert v.mode == ("LAND" if kind == "px4" else "OURS")
+
+
+@pytest.mark.parametrize(("action", "mode"), [(3, "RTL"), (4, "LAND"), (5, "HOLD")])
+def test_px4_does_what_its_parameter_says_when_setpoints_end(action, mode):
+    v = vehicle()
+    v.parameters["COM_OBL_RC_ACT"] = action
+    v.state, v.armed, v.mode, v.target_at = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS", 0.0
+    v.step(0.9, 0.01)
+    assert v.mode == "OURS"
+    v.step(1.1, 0.01)
+    assert v.mode == mode
+
+
+def test_a_vehicle_whose_navigation_is_frozen_still_stops():
+    """Its controller keeps the velocity of inertial sensors; by the frozen one it would gain speed without end."""
+    v = vehicle()
+    v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), True, "OURS"
+    v.frozen = v.measured
+    for k in range(600):
+        v.target_at = 0.01 * k
+        v.step(0.01 * k, 0.01)
+    assert v.measured == State(0.0, 0.0, 20.0, 4.0, 0.0, 0.0), "what it tells stands still"
+    assert abs(v.state.vx) < 0.1 and 2.0 < v.state.x < 8.0
 
 
 def test_px4_takes_our_mode_only_after_a_second_of_setpoints():

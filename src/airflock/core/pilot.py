@@ -13,7 +13,7 @@ from airflock.core.agent import Decision, Heard, State, answer, decide, first_me
 from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import back, complete, could_be_near
+from airflock.core.silence import back, complete, could_be_near, counts
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
@@ -51,7 +51,7 @@ class Hearing:
     """What is done with neighbours' data.
 
     extrapolate : carry them forward with their own velocity to the moment of the decision
-    forget      : age (s) beyond which they say nothing; the rule of silence has its own
+    forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its patience
     once        : they say something at the one decision after they came, as over a radio of one constant delay
     early       : how far (s) in the future they may seem to be, by two clocks that differ
     in_order    : believe stamps: what is older than what is known says nothing
@@ -205,7 +205,8 @@ class Pilot:
         found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            if age <= rule.forget and not (rule.once and packet.came < self.decisions):
+            told = age <= rule.forget and not (rule.once and packet.came < self.decisions)
+            if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
                 found.append(Heard(who, level(state) if self.flat else state, age))
         return found

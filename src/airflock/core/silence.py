@@ -2,7 +2,8 @@
 
 Nobody heard is not nobody there. Flocks whose agents forget a silent neighbour fly into it. An agent that follows this
 rule stops as soon as a neighbour whose data have grown old could be near by now, and stays where it stopped until it
-hears of it again or gives it up. docs/decisions/0056 tells what was measured.
+hears of it again or gives it up. Until data are that old, they count as heard. docs/decisions/0056 tells what was
+measured.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +30,8 @@ class Parameters(Record):
     )
     patience: float | None = quantity(
         None, "s", low=0.0, high=600.0, source=OURS,
-        meaning="age of data below which a neighbour is not lost; by default 0.5 s more than radio.delay",
+        meaning="age of data up to which a neighbour is not lost: its last packet counts on; by default 0.5 s more "
+        "than radio.delay",
     )  # fmt: skip
     closing: float | None = quantity(
         None, "m/s", low=0.0, high=1000.0, source=OURS,
@@ -54,6 +56,14 @@ def complete(s: Parameters, speed: float, delay: float = 0.0, rule: str | None =
     closing = 2.0 * (speed or USUAL) if s.closing is None else s.closing
     patience = delay + SPARE if s.patience is None else s.patience
     return replace(s, closing=closing, patience=patience, rule=rule or s.rule)
+
+
+def counts(age, s):
+    """1.0 if what is known of a neighbour, data of this age (s), still counts as heard, else 0.0.
+
+    One missing packet says nothing of where its sender is; who forgot it at once would not be repelled by it.
+    """
+    return 1.0 if age <= s.patience else 0.0
 
 
 def could_be_near(distance, age, s):

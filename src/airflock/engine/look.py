@@ -7,7 +7,7 @@ from typing import Any
 
 from airflock.body import radio
 from airflock.core import agent as one
-from airflock.core import random
+from airflock.core import random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.topology import met_of
@@ -112,7 +112,7 @@ def _heard(
     seed: int,
     world: int,
 ) -> Iterator[Heard]:
-    """Everybody in range whose packet agent i has: as the driver drew it, from the same counters."""
+    """Everybody in range whose packet agent i has and still believes: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
     fades = plan.topology is not None and plan.topology.asks("fade")
     clocks, reach = _clocks(state), _reach(state, i)
@@ -127,14 +127,15 @@ def _heard(
             continue
         pair = min(i, j) * n + max(i, j)
         fade = random.normal_pair(*random.words(seed, random.FADE, world, number, pair)[:2])[0] if fades else 0.0
-        if plan.links:
+        if plan.packets:
             packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
-            if stamp <= NEVER / 10.0:
-                continue
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
+            if stamp <= NEVER / 10.0 or not (plan.links or silence.counts(age, scenario.silent_by())):
+                continue
             at, v = packet[:axes], packet[axes : 2 * axes]
-            yield Heard(j, Motion(*(a + b * age for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age, fade)
+            on = age if plan.links else 0.0
+            yield Heard(j, Motion(*(a + b * on for a, b in zip(at, v, strict=True)), *flat, *v, *flat), age, fade)
         elif distance * distance > reach[j]:
             continue
         elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(

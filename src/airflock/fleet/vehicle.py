@@ -31,9 +31,10 @@ MODES = {
     "ardupilot": {OURS: 4, LAND: 9, RTL: 6, HOLD: 17, PILOT: 5},
 }  # fmt: skip
 PARAMETERS: dict[str, dict[str, float | int]] = {
-    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 5, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
+    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 4, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
     "ardupilot": {"GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FS_GCS_ENABLE": 1, "SYSID_THISMAV": 1},
 }
+ON_LOSS = {3: RTL, 4: LAND, 5: HOLD}  # COM_OBL_RC_ACT of PX4
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED = 0x0007
 VELOCITY_IGNORED = 0x0038
@@ -81,7 +82,7 @@ class Vehicle:
         self.memory = body.Memory() if body.Memory is not None else None
         self.faults: Faults | None = None  # of the scenario, with its own place among the drones
         self.place = 0
-        self.frozen: State | None = None  # a navigation that stands still, if it does
+        self.frozen: State | None = None  # what a navigation that stands still tells, if it does
 
     def frame(self, message: Any) -> bytes:
         """Bytes of a message of the dialect."""
@@ -90,14 +91,15 @@ class Vehicle:
     @property
     def measured(self) -> State:
         """Own state as its navigation tells it."""
-        known = self.navigated
+        known = self.frozen or self.navigated
         return known if self.faults is None else self.faults.sensed(self.place, self.now, known)
 
     @property
     def navigated(self) -> State:
-        """Own state with the error of its navigation, by which its controller flies."""
-        if self.frozen is not None:
-            return self.frozen
+        """Own state with the error of its navigation, by which its controller flies.
+
+        Where the navigation stands still, the controller keeps the velocity of its inertial sensors.
+        """
         (x, y, z, vx, vy, vz), (ex, ey, ez, eu, ev, ew) = self.state, self.error
         return State(x + ex, y + ey, z + ez, vx + eu, vy + ev, vz + ew)
 
@@ -255,7 +257,7 @@ class Vehicle:
         """Velocity that the autopilot makes for now, m/s."""
         late = self.now - self.target_at
         if self.mode == OURS and self.kind == "px4" and late > self.parameters["COM_OF_LOSS_T"]:
-            self.mode = HOLD
+            self.mode = ON_LOSS.get(int(self.parameters["COM_OBL_RC_ACT"]), HOLD)
         if self.mode == LAND:
             return 0.0, 0.0, -SINK
         if self.mode == RTL:

@@ -78,7 +78,7 @@ AUTOPILOTS = {
         "px4", number=12, ours=px4_mode(6), land=px4_mode(4, 6), hold=px4_mode(4, 3), climbs=True, bytewise=True,
         guards=(
             Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts: 8 m at 4 m/s with 1 s"),
-            Guard("COM_OBL_RC_ACT", 3.0, 5.0, "on lost setpoints: 3 return, 4 land, 5 hold"),
+            Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; whoever holds is hit by those who forget it"),
             Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land"),
         ),
     ),

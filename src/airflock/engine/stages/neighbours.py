@@ -8,7 +8,18 @@ from airflock.core import random
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
-from airflock.engine.stages.receive import by_clock, carries, first_of_four, hear, newest, sent, unheard, word_of
+from airflock.engine.stages.receive import (
+    by_clock,
+    carried,
+    carries,
+    first_of_four,
+    hear,
+    newest,
+    on_record,
+    sent,
+    unheard,
+    word_of,
+)  # fmt: skip
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     FAR,
@@ -113,10 +124,10 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
                 elif plan.packets:
                     newest(i, j, packet, flock, plan=plan)
-                if plan.links:
+                if plan.packets:
                     age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
                     for a in axes:
-                        d[a] = packet[a] + packet[a + plan.dimensions] * age - own[a]
+                        d[a] = carried(a, age, packet, plan=plan) - own[a]
                         dv[a] = packet[a + plan.dimensions] - v[a]
                 else:
                     for a in axes:
@@ -138,15 +149,15 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     flock.square[j] = FAR  # and so it stays where an interpreted driver goes on to the next one
                 if part == ADD:
                     ok = flock.met[j] > HALF
-                elif plan.links:  # the newest packet is heard on and on, as long as its sender is in range
-                    ok = (apart2 <= range2) & (packet[2 * plan.dimensions] > -1e8) & (integer(j) != ii)
+                elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
+                    ok = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
                 elif true_range:
                     ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
                 else:
                     ok = (r2 <= range2) & (integer(j) != ii)
                 if model.reach is not None and (part != HEAR or plan.grid):
                     ok = ok & (r2 <= near2)
-                if plan.lossy and not plan.links and part != ADD:
+                if plan.lossy and not plan.packets and part != ADD:
                     distance = math.sqrt(apart2 + TINY) if true_range else r
                     ok = ok & (random.uniform(word_of(i, j, lot, drawn)) >= unheard(distance, ZERO, ZERO, k, plan=plan))
                 if part == HEAR:

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from airflock.body import radio
-from airflock.core import random
+from airflock.core import random, silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import TINY, choose, integer, least, real
+from airflock.engine.stages.words import HALF, TINY, choose, integer, least, real
 
 PACKET = random.PACKET
 
@@ -91,6 +91,19 @@ def hear(
     packet[2 * dims] = choose(got, by_clock(stamp, j, flock, plan=plan), flock.packet[2 * dims][i, j])
     for c in range(2 * dims + 1):
         flock.packet[c][i, j] = packet[c]
+
+
+def carried(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
+    """Where the sender of a packet is believed to be, along one axis: over two links it is carried forward, m."""
+    return packet[a] + packet[a + plan.dimensions] * age if plan.links else packet[a]
+
+
+def on_record(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
+    """Whether the newest packet that an agent has of another one, of this age (s), says something.
+
+    Over two links it does until the next one comes; where lost neighbours stop an agent, until they count as lost.
+    """
+    return packet[2 * plan.dimensions] > -1e8 if plan.links else silence.counts(age, numbers.silence) > HALF
 
 
 def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
