@@ -12,6 +12,8 @@ from cable import Cable
 from pixels import coloured, places, shot
 from test_watch import PATIENCE, flying, opened, until
 
+from processes import hear_interrupts
+
 pytestmark = pytest.mark.browser
 
 
@@ -54,7 +56,7 @@ def test_two_pages_see_one_flight_and_both_have_its_controls(browser, tab):
 def test_ctrl_c_in_mid_flight_ends_at_once_with_one_line(browser, tab, tmp_path, watched):
     command = [sys.executable, "-m", "airflock", "watch", "vasarhelyi_2018/4ms", "--agents", "20", "--port", "0"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=tmp_path,
-                               env={**os.environ, "PYTHONUNBUFFERED": "1"})  # fmt: skip
+                               env={**os.environ, "PYTHONUNBUFFERED": "1"}, preexec_fn=hear_interrupts)  # fmt: skip
     try:
         address = next(line for line in process.stdout if "watch at" in line).split()[2]
         if watched:

@@ -148,8 +148,9 @@ def studies():
     from airflock.evolve.study import shipped
 
     found = [doors.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
+    named = [document for document in found if "scenario" in document]
     return [{**document, "scenario": document["scenario"].replace("scenario.toml", "vasarhelyi_2018/4ms")}
-            for document in found]  # fmt: skip
+            for document in named] + [document for document in found if "scenario" not in document]  # fmt: skip
 
 
 def _written(rng, documents, path):
