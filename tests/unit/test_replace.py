@@ -39,7 +39,7 @@ def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(m
     monkeypatch.setattr(
         grid,
         "neighbours",
-        lambda build, lines, before, inner, sums, met: meet(build, lines, before, respelled(inner), sums),
+        lambda build, lines, before, inner, *rest: meet(build, lines, before, respelled(inner), *rest),
     )
     monkeypatch.setattr(
         CudaBuilder,
