@@ -116,8 +116,9 @@ class Scenario:
     @property
     def numbers(self) -> dict[str, tuple[str, ...]]:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
+        records = self.records
         return {
-            each.letter: each.derived._fields if each.derived else number_names(self.records[each.key])  # type: ignore[attr-defined]
+            each.letter: each.derived._fields if each.derived else number_names(records[each.key])  # type: ignore[attr-defined]
             for each in ORDER
             if each.letter
         }
