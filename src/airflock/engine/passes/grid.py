@@ -113,8 +113,9 @@ def neighbours(
 def _found(each: list[str], last: list[str]) -> list[str]:
     """Lines that find whom an agent meets of the candidates of its cell: `met`, by number of the candidate."""
     each = must_replace(each, "integer(j) != ii", OTHERS)
-    for name in FOUND:
-        each = [line.replace(f"{name}[j]", f"{name}[q]") for line in each]
+    written = set(re.findall(r"\w+", "\n".join(each)))
+    for name in (name for name in FOUND if name in written):  # which rows there are is a matter of the topology
+        each = must_replace(each, f"{name}[j]", f"{name}[q]")
     return [*loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]
 
 
