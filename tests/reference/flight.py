@@ -25,7 +25,7 @@ from airflock.engine.place import Course, Place, reach_of_walls
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from reference.begin import ZERO, Vector, begin, given, normals
-from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
+from reference.individuals import Suffering, ahead, begins, groups_of, law_of, misled, own_parameters, radio_of
 from reference.scores import Scores
 
 MOVING = ("vx", "vy", "vz", "cx", "cy", "cz")
@@ -127,11 +127,12 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
 
 def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -> Agent:
     """Agent i with its pilot, which carries the map, its own numbers, and its seed."""
-    p = own_parameters(scenario, "model", scenario.parameters, i, seed)
+    law = law_of(scenario, i)
+    p = own_parameters(scenario, "model", law[1], i, seed)
     b = own_parameters(scenario, "body", scenario.body, i, seed)
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
-        scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
+        law[0], p, place.seen(reach_of_walls(law[0], p)), index=i, period=period, groups=groups_of(scenario),
         hearing=Hearing.simulated(links=scenario.radio.kind == "links"), silence=scenario.silent_by(),
         body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,

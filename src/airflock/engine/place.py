@@ -23,7 +23,7 @@ class Place(Map):
         shapes, later = unbuilt(stands)
         super().__init__(
             scenario.world, Shapes(shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()),
-            look=reach_of_walls(scenario.model, scenario.parameters), casts=scenario.model.sight is not None,
+            look=reach_of_walls(scenario.model, scenario.parameters), casts=any(law.model.sight is not None for law in scenario.laws),
         )  # fmt: skip
         self.later, self.clearance = later.tolist(), scenario.start.clearance
         self.meshed = scenario.scene.kind == "mesh"

@@ -17,8 +17,8 @@ from airflock.engine.passes.flock import shapes_of
 from airflock.errors import RuleError
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
-    3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 7.0, 0.0,
-    1.0, 0.0,
+    3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 0.0, 1.0,
+    7.0, 0.0, 1.0, 0.0,
 ), strict=True))  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from airflock.scenarios import (
 )
 from airflock.scenarios.advice import advice
 from airflock.scenarios.ground import file_faults
+from airflock.scenarios.group_laws import Laws
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -47,6 +48,7 @@ def make(
     vehicle: Body | None = None,
     sensor: Sensor | None = None,
     kinds: Mapping[str, Fault] | None = None,
+    laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
@@ -54,7 +56,7 @@ def make(
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle, sensor : a model, a metric set, a body, a sensor given directly, not by name
-    kinds : kinds of fault given directly, by name
+    kinds : kinds of fault given directly, by name; laws : laws that groups may name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
@@ -95,7 +97,7 @@ def make(
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, sensor, measures)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
-    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
+    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, laws, trust)
     faults += more
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -115,14 +117,19 @@ def make(
 
 def _individuals(
     merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, vehicle: Body, folder: Path | None,
-    kinds: Mapping[str, Fault] | None, trust: bool,
+    kinds: Mapping[str, Fault] | None, laws: Mapping[str, Model] | None, trust: bool,
 ) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
     """Groups and faults of a scenario, notes, and what is wrong with them."""
     if not {"groups", "faults"} & set(merged) or parts["flight"] is None:
         return {}, [], []
     count, flight = int(parts["flight"].agents), parts["flight"]
     records = {"body": vehicle.Parameters} | ({"model": found.Parameters} if found else {})
-    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records)
+    named = None
+    if found is not None and parts.get("parameters") is not None:
+        kind, world = merged.get("model", {}).get("kind"), parts["world"]
+        walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
+        named = Laws(found, kind, parts["parameters"], laws or {}, folder, trust, walls)
+    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records, named)
     faults += groups.group_faults(flocks, found)
     sequential = flight.update == "sequential"
     made, told, more = faulty.entries(

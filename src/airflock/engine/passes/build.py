@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from textwrap import indent
 from typing import Any
 
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
 from airflock.engine import vectors
-from airflock.engine.generate import Source
+from airflock.engine.generate import Source, law_mark
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.stages.state import SCENE, own_row
@@ -52,6 +53,27 @@ class Builder:
         return self.rows.setdefault(name, len(self.rows))
 
     @property
+    def laws(self) -> list["Builder"]:
+        """Of each law of the flock the builder of its stages; they write into the same driver."""
+        if not self.plan.laws:
+            return [self]
+        found = []
+        for law, plan in enumerate(self.plan.every):
+            made = copy(self)
+            made.plan, made.source = plan, self.source.of(law, plan.constants)
+            found.append(made)
+        return found
+
+    @property
+    def mark(self) -> str:
+        """What functions and records end in that are of one law of several."""
+        return law_mark(self.plan.law)
+
+    def kind(self, letter: str, fields: tuple[str, ...]) -> str:
+        """Name of the record of numbers behind a letter."""
+        return self.source.record(letter.upper() * 2 + (self.mark if letter == "p" else ""), fields)
+
+    @property
     def in_turn(self) -> bool:
         """Whether a loop over all agents is the body alone, for the agent in turn."""
         return self.plan.sequential
@@ -75,7 +97,7 @@ class Builder:
         lines, offset = [], 0
         for letter, fields in self.plan.records.items():
             if letter in letters.split():
-                kind = self.source.record(letter.upper() * 2, fields)
+                kind = self.kind(letter, fields)
                 values = ", ".join(f"row[{offset + i}]" for i in range(len(fields)))
                 lines.append(f"{letter} = {kind}({values})")
             offset += len(fields)
@@ -86,7 +108,7 @@ class Builder:
         if not self.plan.varies(letter):
             return [], letter
         fields = self.plan.records[letter]
-        kind = self.source.record(letter.upper() * 2, fields)
+        kind = self.kind(letter, fields)
         values = [f"{own_row(letter, f)}[i]" if (letter, f) in self.plan.varied else f"{letter}.{f}" for f in fields]
         return [f"own_{letter} = {kind}({', '.join(values)})"], f"own_{letter}"
 

@@ -63,10 +63,13 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     perceive.tune(build)
     perceive.receive(build)
     perceive.meet(build)
-    decide.neighbours(build)
-    decide.boundaries(build)
+    for own in build.laws:
+        decide.neighbours(own)
+    for own in build.laws:
+        decide.boundaries(own)
     flock.flock(build)
-    decide.decide(build)
+    for own in build.laws:
+        decide.decide(own)
     decide.stop(build)
     decide.overrule(build)
     move.begin(build)
@@ -88,15 +91,17 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
-    if plan.model.neighbour is not None:
-        more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
-        choose += [f"neighbours({', '.join(['k, n, m, time, late, row, whole, work, store, words', *more])})"]
-        choose += slots.rearrange(build)
-    if plan.model.boundary is not None:
-        choose += ["boundaries(n, row, whole, work, faces, edges, spans, scene)"]
+    for own in build.laws:
+        if own.plan.model.neighbour is not None:
+            more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
+            given = ["k, n, m, time, late, row, whole, work, store, words", *more]
+            choose += [f"neighbours{own.mark}({', '.join(given)})", *slots.rearrange(build)]
+    for own in build.laws:
+        if own.plan.model.boundary is not None:
+            choose += [f"boundaries{own.mark}(n, row, whole, work, faces, edges, spans, scene)"]
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
-    choose += ["decide(k, n, time, row, whole, work, mem, edges, spans, scene)"]
+    choose += [f"decide{own.mark}(k, n, time, row, whole, work, mem, edges, spans, scene)" for own in build.laws]
     choose += ["stop(n, time, row, work, store)"] if plan.silent else []
     choose += ["overrule(n, time, row, work)"] if plan.suffers("overrule") else []
     step = ["time = real(step) * c.dt"]
