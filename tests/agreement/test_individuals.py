@@ -451,7 +451,7 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
         ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
         ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
         ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
-        ([{"model": {"kind": "couzin_2002"}}], "only numbers differ from group to group"),
+        ([{"body": {"kind": "direct"}}], "one body carries all; only its numbers differ from group to group"),
         ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
         ({"a": 1}, "groups is not a list of tables"),
     ],

@@ -131,7 +131,7 @@ def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
 
 
 def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
-    """What differs among agents, (number, agent): numbers of their groups with the tolerances of manufacture, law, group."""
+    """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
     made = np.zeros((len(plan.columns), scenario.agents))
     known = {"law": scenario.law_numbers, "group": scenario.group_numbers}
     for c, (letter, name) in enumerate(plan.columns):

@@ -324,7 +324,8 @@ def _layout(
     packets = (2 * dims + 1, agents, m) if plan.packets else (2 * dims + 1, 1, 1)
     values, sums = sums_of(plan)
     beginnings = {
-        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real), "values": values, "sums": sums,
+        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
+        "values": values, "sums": sums,
         "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
     beginnings["store"][2 * dims] = NEVER

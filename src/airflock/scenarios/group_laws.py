@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from airflock.core.contract import Model
+from airflock.core.contract import Body, Model
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
-from airflock.scenarios import schema
+from airflock.scenarios import checks, schema
 from airflock.scenarios.laws import find_model
 
 if TYPE_CHECKING:
@@ -116,6 +116,23 @@ class Laws:
         return record, []
 
 
+def misfits(groups: Sequence["Group"], parts: Mapping[str, Any], found: Model, vehicle: Body) -> list[str]:
+    """What of a scenario its groups cannot fly with their own numbers or law, one line each."""
+    faults: list[str] = []
+    for number, group in enumerate(groups):
+        law, base = group.law or (found, parts["parameters"])
+        own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in ("p", "b")}
+        if group.law is None and not any(own.values()):
+            continue
+        told: dict[str, Any] = {**parts, "parameters": replace(base, **own["p"])}
+        told["body"] = parts["body"] and replace(parts["body"], **own["b"])
+        more = checks.body_faults(vehicle, told, law)
+        if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
+            more += checks.silence_faults(parts["silence"].rule, parts["flight"], law)
+        faults += [f"groups[{number}]: {fault}" for fault in more]
+    return faults
+
+
 def laws_of(model: Model, parameters: Any, groups: Sequence["Group"], agents: int) -> tuple[Law, ...]:
     """Laws of a flock: that of all who have none of their own, then those of groups, one for each text."""
     found: dict[Any, list[Group]] = {}
@@ -129,7 +146,9 @@ def laws_of(model: Model, parameters: Any, groups: Sequence["Group"], agents: in
     for (law, _), members in found.items():
         first = members[0]
         assert first.law is not None
-        record = replace(first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"})
+        record = replace(
+            first.law[1], **{name: value for (letter, name), value in first.numbers.items() if letter == "p"}
+        )
         who = tuple(sorted(agent for group in members for agent in group.agents))
         made.append(Law(law, record, who, _varied(members, record)))
     return tuple(made)

@@ -17,6 +17,7 @@ from airflock.scenarios import (
     faulty,
     formats,
     geometry,
+    group_laws,
     groups,
     places,
     schema,
@@ -27,7 +28,6 @@ from airflock.scenarios import (
 )
 from airflock.scenarios.advice import advice
 from airflock.scenarios.ground import file_faults
-from airflock.scenarios.group_laws import Laws
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -128,9 +128,11 @@ def _individuals(
     if found is not None and parts.get("parameters") is not None:
         kind, world = merged.get("model", {}).get("kind"), parts["world"]
         walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
-        named = Laws(found, kind, parts["parameters"], laws or {}, folder, trust, walls)
+        named = group_laws.Laws(found, kind, parts["parameters"], laws or {}, folder, trust, walls)
     flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records, named)
     faults += groups.group_faults(flocks, found)
+    if found is not None and not faults:
+        faults += group_laws.misfits(flocks, parts, found, vehicle)
     sequential = flight.update == "sequential"
     made, told, more = faulty.entries(
         merged.get("faults", ()), count, flocks, sequential, folder, own=kinds, trust=trust

@@ -164,6 +164,8 @@ class Builder:
         given = ", ".join(dict.fromkeys([*turn, *asked, *(w for w in read if w.isidentifier() and w in used)]))
         self.function(f"{name}_of({given})", first, body, f"return {answer}")
         if self.plan.sequential:
+            if self.mark:  # the stages of all turns share their names
+                *lines, given = _marked([*lines, given], read, self.mark)
             self.turns.append((lines, f"{name}_of({given})"))
         else:
             self.function(f"{name}({arguments})", lines, f"return {name}_of({given})")
@@ -182,6 +184,12 @@ class Builder:
     def z(self, text: str) -> str:
         """A third coordinate, or a literal zero in a plane."""
         return text if self.plan.dimensions == 3 else "ZERO"
+
+
+def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:
+    """Lines in which some variables end in a mark."""
+    words = re.compile(rf"(?<![.\w])({'|'.join(names)})\b")
+    return [words.sub(rf"\1{mark}", line) for line in lines] if names else lines
 
 
 def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:

@@ -91,14 +91,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     choose = ["k = step // decide_every"]
     choose += ["perceive(k, k % ring, m, row, whole, work, past, words)"]
     choose += ["tune(k, m, row, work)"] if plan.suffers("radio", "clock") else []
-    for own in build.laws:
-        if own.plan.model.neighbour is not None:
-            more = (*perceive.around(plan), *(("cells",) if plan.grid else ()))
-            given = ["k, n, m, time, late, row, whole, work, store, words", *more]
-            choose += [f"neighbours{own.mark}({', '.join(given)})", *slots.rearrange(build)]
-    for own in build.laws:
-        if own.plan.model.boundary is not None:
-            choose += [f"boundaries{own.mark}(n, row, whole, work, faces, edges, spans, scene)"]
+    choose += _sensed(build)
     if plan.model.flock is not None:
         choose += ["flock(n, row, work, scratch)"]
     choose += [f"decide{own.mark}(k, n, time, row, whole, work, mem, edges, spans, scene)" for own in build.laws]
@@ -141,6 +134,20 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     )
     build.function(f"advance(first, last, half, held, {arguments})", lines, "return following")
     return build
+
+
+def _sensed(build: Builder) -> list[str]:
+    """Lines in which agents meet neighbours and surfaces, each by its own law."""
+    lines = []
+    for own in build.laws:
+        if own.plan.model.neighbour is not None:
+            more = (*perceive.around(build.plan), *(("cells",) if build.plan.grid else ()))
+            given = ", ".join(["k, n, m, time, late, row, whole, work, store, words", *more])
+            lines += [f"neighbours{own.mark}({given})", *slots.rearrange(build)]
+    for own in build.laws:
+        if own.plan.model.boundary is not None:
+            lines += [f"boundaries{own.mark}(n, row, whole, work, faces, edges, spans, scene)"]
+    return lines
 
 
 def _column(plan: Plan, name: str) -> int:
