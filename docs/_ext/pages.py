@@ -24,7 +24,7 @@ PAPERS = {
 PICTURES = {
     "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
     "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "kidger": "30_city", "formation": "40_display",
-    "dimock_2003": "51_formation_flight",
+    "dimock_2003": "51_formation_flight", "chen_2014": "25_predator_and_prey",
 }  # fmt: skip
 
 

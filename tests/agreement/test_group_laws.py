@@ -8,7 +8,9 @@ from against_reference import compared
 from airflock.engine.devices import no_cuda
 from airflock.engine.simulate import driver_text, fly, plan_of
 from airflock.errors import ScenarioError
+from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
+from airflock.scenarios.laws import find_model
 from scenarios_drawn import Draw
 
 PAPER = "vasarhelyi_2018/4ms"
@@ -74,8 +76,8 @@ def test_any_cuts_branches_and_snapshots_give_the_bits_of_the_whole():
     assert np.array_equal(cut.frames, whole.frames)
     twin.finish()
     assert np.array_equal(twin.frames, whole.frames)
-    again = airflock.Flight.restored(kept) if hasattr(airflock.Flight, "restored") else None
-    assert again is None or np.array_equal(again.finish().frames, whole.frames)
+    twin.restore(kept).finish()
+    assert np.array_equal(twin.frames, whole.frames)
 
 
 def test_an_agent_may_change_its_law_in_flight():
@@ -102,6 +104,89 @@ def test_what_is_shown_of_an_agent_is_of_its_law():
         live = [k for k, value in enumerate(view.sums) if value]
         summed = np.sum([term for term in view.terms], axis=0)
         assert live and np.allclose(np.array(view.sums)[live], summed[live])
+
+
+WARY = """
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import airflock
+
+COMMAND = "velocity"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    style: str = airflock.choice("flee", ("flee", "chase"), meaning="what strangers are to it")
+    k: float = airflock.quantity(1.0, "m/s", low=0.0, high=50.0, meaning="speed")
+
+
+class Sums(NamedTuple):
+    x: float
+    y: float
+    third: float
+
+
+class Memory(NamedTuple):
+    met: float = 7.0
+
+
+def neighbour(dx, dy, r, kin, group, p):
+    k = (1.0 - kin) / r * (-1.0 if p.style == "flee" else 1.0)
+    return Sums(k * dx, k * dy, 1.0 if group == 2.0 else 0.0)
+
+
+def decide(own, sums, memory, percept, p):
+    k = p.k * (1.0 + 0.1 * percept.normal(0))
+    x = 0.5 * own.vx + k * sums.x + 0.01 * memory.met
+    return x, 0.5 * own.vy + k * sums.y, 0.0, Memory(memory.met + sums.third)
+"""
+KINDS = [
+    {"name": "wary", "agents": [0, 3, 5], "model": {"k": {"value": 2.0, "spread": 0.3}}},
+    {"name": "bold", "agents": [1, 6], "model": {"style": "chase", "k": 3.0}},
+    {"name": "slow", "agents": [2], "model": {"k": 0.5}},
+]
+
+
+@pytest.fixture
+def wary(tmp_path):
+    """A file with a law that asks for groups, remembers, draws and chooses."""
+    (tmp_path / "wary.py").write_text(WARY)
+    return tmp_path / "wary.py"
+
+
+def test_a_law_of_ones_own_asks_for_groups_compiled_and_in_plain_python(wary):
+    """Three groups, two texts of one law with a memory and a choice; one agent is in no group."""
+    keys = {**DENSE, "radio.delay": 0.1, "metrics.kind": "order"}
+    scenario = load(PAPER, {**keys, "groups": KINDS}, law=wary)
+    assert [law.agents for law in scenario.laws] == [(0, 2, 3, 4, 5), (1, 6)]
+    verdict = compared(Draw(scenario, 3, None, {}))
+    assert verdict.agrees and not verdict.fault, verdict
+    plain = fly(scenario, 3, record=True, device="python").frames
+    np.testing.assert_allclose(fly(scenario, 3, precision=64, record=True).frames, plain, atol=1e-9)
+    alike = load(PAPER, keys, law=wary)  # without groups all are kin
+    assert not np.array_equal(fly(alike, 3, record=True, device="python").frames, plain)
+
+
+def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
+    group = 'agents = 2\nmodel = { kind = "wary.py", style = "chase" }\n'
+    text = f'extends = "{PAPER}"\nagents = 7\n[[groups]]\n{group}'
+    (tmp_path / "mine.toml").write_text(text)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "more.toml").write_text('extends = "../mine.toml"\nduration = 1.0\n')
+    for name in ("mine.toml", "folder/more.toml"):
+        with pytest.raises(ScenarioError, match="would run the code in"):
+            load(tmp_path / name)
+        assert load(tmp_path / name, trust=True).laws[1].parameters.style == "chase"
+    given = find_model("wary.py", tmp_path, trust=True)
+    group = [{"agents": 2, "model": {"kind": "wary", "k": 2.0}}]
+    scenario = load(PAPER, {**DENSE, "groups": group}, laws=given)
+    assert scenario.laws[1].model is given
+    flight = (
+        airflock.open(scenario, 1, device="python", record=True).advance(0.5).change({"radio.range": 20.0}).advance(0.2)
+    )
+    recording = airflock.recording_of(flight)
+    assert [group.agents for group in scenario_of(recording).groups] == [(0, 1)]  # though nobody knows how they fly
 
 
 @pytest.mark.parametrize(
