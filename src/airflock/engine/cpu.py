@@ -63,7 +63,7 @@ def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
 
 def is_loaded(driver: ModuleType) -> bool:
     """Whether a driver flies at once: it has been compiled or read in this process, or is interpreted."""
-    return bool(getattr(driver.advance, "signatures", True))
+    return bool(getattr(driver.advance, "overloads", True))
 
 
 def is_compiled(driver: ModuleType) -> bool:
