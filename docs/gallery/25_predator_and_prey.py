@@ -16,7 +16,7 @@ figure = Figure(figsize=(8, 4), layout="constrained")
 for axes, name in zip(figure.subplots(1, 2), ("ring", "hunt"), strict=True):
     scenario = airflock.load(f"chen_2014/{name}", {"duration": 30.0})
     x = airflock.simulate(scenario, seed=1).position.isel(keypoint=0).values
-    prey, hunter = x[-1, :, :100], x[-21:, :, 100]
+    prey, hunter = x[-1, :, 1:], x[-21:, :, 0]
     axes.plot(*prey, "o", color="tab:blue", ms=4, label="prey")
     axes.plot(*hunter.T, "-", color="tab:red", lw=1)
     axes.plot(*hunter[-1], "o", color="tab:red", ms=7, label="predator")
