@@ -137,8 +137,10 @@ def test_outer_noise_of_a_block_is_that_of_each_step(three):
 
 WEAK = [{"name": "slow", "agents": 1, "model": {"v_flock": 2.0}, "body": {"tau": {"value": 1.4, "spread": 0.1}}},
         {"name": "rest"}]  # fmt: skip
+OTHER = [{"name": "other", "agents": [1], "model": {"kind": "viragh_2014", "v_flock": 3.0}}, {"name": "rest"}]
 BEFALLEN = {
     "groups": {"groups": WEAK},
+    "law of a group": {"groups": OTHER},
     "weak motor": {"faults": [{"kind": "motor", "at": 1.0, "agents": [1]}]},
     "drift": {"faults": [{"kind": "gnss_drift", "at": 1.0, "agents": [0]}]},
     "deaf": {"faults": [{"kind": "radio_deaf", "at": 0.5, "lasts": 1.5, "agents": [2]}]},
@@ -167,6 +169,13 @@ def test_numbers_of_each_member_stand_on_the_card():
     assert real.pilot(1).b.tau == 1.4, "a real drone brings its own tolerance"
     with pytest.raises(ScenarioError, match=r"groups are of 3 agents, and 5 drones are to fly; set agents = 5"):
         card(scenario(3, groups=WEAK), members=range(1, 6))
+
+
+def test_laws_of_members_stand_on_the_card():
+    made = card(scenario(3, groups=OTHER))
+    assert [made.pilot(who).model.name for who in made.members] == ["vasarhelyi_2018", "viragh_2014", "vasarhelyi_2018"]
+    assert [made.pilot(who).p.v_flock for who in made.members] == [4.0, 3.0, 4.0]
+    assert made.groups == ()  # neither law asks for them
 
 
 @pytest.mark.parametrize("kind", ["pretender", "clock", "battery", "fails"])

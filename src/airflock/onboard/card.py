@@ -36,10 +36,11 @@ KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "own",
     "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
-OPTIONAL = ("topology",)  # left out where a drone meets all whom it hears
+OPTIONAL = ("topology", "groups")  # left out where a drone meets all whom it hears, where no law asks for groups
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
+PARTS = ("law", "body")  # of which members may have numbers of their own
 LARGEST_SYSTEM = 250  # system ids above are left to ground stations
 
 
@@ -50,7 +51,8 @@ class Card:
     mission  : number of the mission; expires: Unix time, s
     site     : origin of local coordinates; members: system ids, in the order of their layers
     operator : public key of who may give orders, 32 bytes; empty: nobody may
-    own      : numbers of law and body of each member, where they differ from one to another
+    own      : law, its numbers and those of the body of each member, where they differ from one to another
+    groups   : number of each member's group, -1 in none, where a law asks for it
     fence    : corners; low, high: heights above the site, m
     height   : at which the flock flies, m above the site; in space, of the arena's centre
     hash     : SHA-256 of the document without its own entry
@@ -67,7 +69,8 @@ class Card:
     parameters: Any
     body: Any
     body_parameters: Any
-    own: tuple[tuple[Any, Any], ...]
+    own: tuple[tuple[Model, Any, Any], ...]
+    groups: tuple[int, ...]
     place: Place
     hearing: Hearing
     delay: float
@@ -91,9 +94,9 @@ class Card:
     def pilot(self, member: int) -> Pilot:
         """The pilot of one member."""
         index = self.members.index(member)
-        p, b = self.own[index] if self.own else (self.parameters, self.body_parameters)
+        law, p, b = self.own[index] if self.own else (self.model, self.parameters, self.body_parameters)
         return Pilot(
-            self.model, p, self.place.seen(_look(self.model, p)), index=index, period=self.period,
+            law, p, self.place.seen(_look(law, p)), index=index, period=self.period, groups=self.groups,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
@@ -193,6 +196,10 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     silence = record(Silence, d["silence"], "silence", faults)
     topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
     safety = record(Safety, d["safety"], "safety", faults)
+    groups = d.get("groups", [])
+    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= LARGEST_SYSTEM for g in groups)
+    if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
+        faults.append(f"groups = {groups!r}: give the number of each member's group, -1 in none")
     rows = d["shapes"]
     if not are_shapes(rows):
         faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
@@ -200,13 +207,13 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         return None
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=_look(law, parameters), casts=law.sight is not None,
+        look=_look(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
     )  # fmt: skip
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
-        own=own,
+        own=own, groups=tuple(groups),
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
         silence=silence, topology=topology, safety=safety,
         fence=Fence(corners),
@@ -267,13 +274,13 @@ def find_law(name: str) -> Model:
         raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
 
 
-def _law(table: Any, faults: list[str]) -> tuple[Model | None, Any]:
+def _law(table: Any, faults: list[str], where: str = "law") -> tuple[Model | None, Any]:
     try:
         found = find_law(str(table["kind"]))
     except (AirflockError, KeyError, TypeError) as fault:
-        faults.append(str(fault) if isinstance(fault, AirflockError) else "law.kind is missing")
+        faults.append(str(fault) if isinstance(fault, AirflockError) else f"{where}.kind is missing")
         return None, None
-    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, "law", faults)
+    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, where, faults)
 
 
 def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
@@ -286,26 +293,30 @@ def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
     )  # fmt: skip
 
 
-def _own(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Any, Any], ...]:
-    """Numbers of law and body of each member; none where all are alike."""
+def _own(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Model, Any, Any], ...]:
+    """Law, its numbers and those of the body of each member; none where all are alike."""
     rows = d["own"]
-    parts = {"law": getattr(law, "Parameters", None), "body": getattr(body, "Parameters", None)}
-    if rows == [] or None in parts.values():
+    if rows == [] or law is None or body is None:
         return ()
     if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
         faults.append("own: give a table with law and body for each member, or an empty list")
         return ()
     found = []
     for number, row in enumerate(rows):
-        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in parts)
+        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in PARTS)
         if not sound:
             faults.append(f"own[{number}] = {row!r}: give the tables law and body")
             continue
-        made = []
-        for part, kind in parts.items():
-            usual = {key: value for key, value in d[part].items() if key != "kind"}
-            made.append(record(kind, usual | row[part], f"own[{number}].{part}", faults))
-        found.append((made[0], made[1]))
+        where, usual = f"own[{number}]", {part: {k: v for k, v in d[part].items() if k != "kind"} for part in PARTS}
+        b = record(body.Parameters, usual["body"] | row["body"], f"{where}.body", faults)
+        if "kind" in row["law"]:
+            other, p = _law(row["law"], faults, f"{where}.law")
+            if other is not None and other.command != law.command:
+                faults.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
+        else:
+            other, p = law, record(law.Parameters, usual["law"] | row["law"], f"{where}.law", faults)
+        if other is not None:
+            found.append((other, p, b))
     return tuple(found)
 
 
