@@ -96,6 +96,9 @@ def decide(
     }
     result = answer(model.decide, "decide", given, model.name)
     x, y, z = result[:3]
+    if model.added is not None:
+        more = answer(model.added.decide, "decide", given, model.added.name)
+        x, y, z = x + more[0], y + more[1], z + more[2]
     return Decision((x, y, z), result[3] if len(result) > 3 else memory)
 
 

@@ -168,9 +168,8 @@ class Pilot:
 
     def _check(self) -> None:
         """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
-        if not self.told and (
-            self.model.flock is not None or "shared" in asks(self.model.decide, "decide", self.model.name)
-        ):
+        asked = [name for rule in self.model.deciding for name in asks(rule, "decide", self.model.name)]
+        if not self.told and (self.model.flock is not None or "shared" in asked):
             raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
         if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
             raise RuleError(

@@ -47,6 +47,9 @@ def probe(model: Model, parameters: Any) -> None:
     if model.flock is not None:
         law.check(model.flock)
         given["shared"] = _shared(model, given)
+    if model.added is not None:
+        law.check(model.added.decide)
+        _call(model.added.decide, "decide", given, model.added.name)
     law.check(model.decide)
     answer = _call(model.decide, "decide", given, model.name)
     expected = 4 if model.Memory is not None else 3

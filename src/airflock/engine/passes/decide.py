@@ -11,7 +11,7 @@ from airflock.engine.stages import decide as deciding
 from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
-from airflock.engine.stages.words import live, wants
+from airflock.engine.stages.words import live
 
 EXTREME = {"min": "least", "max": "most"}
 START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
@@ -86,10 +86,10 @@ def decide(build: Builder) -> None:
     summed = live(model.Sums, plan.dimensions) if model.neighbour is not None else []
     made = specialise(
         build, deciding.decide, decision=argument("k_"), percept_of=argument(f"PERCEPT{build.mark}"),
-        summed=_asked(build, summed) if wants(model.decide, "sums") else [],
+        summed=_asked(build, summed) if deciding.asks(model, "sums") else [],
         walled=live(model.Walls, plan.dimensions) if model.boundary is not None else [],
     )  # fmt: skip
-    if wants(model.decide, "percept"):
+    if deciding.asks(model, "percept"):
         percept.record(build)
     percept.bind(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
