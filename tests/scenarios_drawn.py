@@ -110,9 +110,12 @@ def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
     law, body = find_model(kind), KNOWN_BODIES[keys["body.kind"]]
     for group in found:
         flown = other_law(rng, law) if rng.random() < 0.6 and "aero.k_d" not in keys else law
-        for section, record in (("model", flown.Parameters), ("body", body.Parameters)):
+        sections = {"model": flown.Parameters, "body": body.Parameters}
+        if keys["update"] == "synchronous":
+            sections["sensors"] = SENSORS[keys["sensors.kind"]].Parameters
+        for section, record in sections.items():
             own: dict[str, Any] = {}
-            sometimes(own, rng, record, section, 0.3, ("rays", "most"))
+            sometimes(own, rng, record, section, 0.3, ("rays", "most", "period"))
             numbers = {key.partition(".")[2]: value for key, value in own.items() if isinstance(value, float)}
             off = {name: {"value": value, "spread": 0.05 * abs(value)} for name, value in numbers.items()}
             group[section] = off if rng.random() < 0.5 else numbers

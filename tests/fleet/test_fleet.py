@@ -20,6 +20,7 @@ from airflock.fleet import compare
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import KINDS, Fault, read_faults
+from airflock.fleet.individuals import sensors_of
 from airflock.fleet.lockstep import KEY
 from airflock.fleet.vehicle import Vehicle
 from airflock.mavlink import dialect
@@ -169,6 +170,13 @@ def test_numbers_of_each_member_stand_on_the_card():
     assert real.pilot(1).b.tau == 1.4, "a real drone brings its own tolerance"
     with pytest.raises(ScenarioError, match=r"groups are of 3 agents, and 5 drones are to fly; set agents = 5"):
         card(scenario(3, groups=WEAK), members=range(1, 6))
+
+
+def test_each_drone_measures_by_the_numbers_of_its_group():
+    groups = [{"name": "poor", "agents": [1], "sensors": {"noise": {"value": 1.0, "spread": 0.1}}}]
+    found = scenario(3, groups=groups)
+    noise = [s.noise for s in sensors_of(found, 3, 5)]
+    assert noise == found.own_numbers("s", "noise", 5) and noise[0] == noise[2] != noise[1] != 1.0
 
 
 def test_laws_of_members_stand_on_the_card():

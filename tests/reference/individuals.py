@@ -95,14 +95,14 @@ def law_of(scenario: Scenario, agent: int) -> tuple[Any, Any]:
 
 def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, seed: int) -> Any:
     """Numbers of model or body of one agent: its group's, off them by its tolerance."""
-    letter, changed = {"model": "p", "body": "b"}[section], {}
+    letter, changed = {"model": "p", "body": "b", "sensors": "s"}[section], {}
     for place, (name, declared, _) in enumerate(declarations(record)):
         for group in scenario.groups:
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))
                 spread = group.spread.get((letter, name), 0.0)
                 if spread > 0.0:
-                    words = random.words(seed, random.SPREAD, 0, place, agent, "pb".index(letter))
+                    words = random.words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
                     value += spread * random.normal_pair(*words[:2])[0]
                 if value is not None:
                     changed[name] = min(max(value, declared.low), declared.high)

@@ -45,6 +45,13 @@ def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[A
     return [own(agent) for agent in range(count)]
 
 
+def sensors_of(scenario: Scenario, count: int, seed: int) -> list[Any]:
+    """Numbers of the sensor of each of the first `count` agents, with tolerances as a seed draws them."""
+    columns = {name: scenario.own_numbers("s", name, seed) for of, name in scenario.varied if of == "s"}
+    own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
+    return [replace(scenario.sensors, **numbers) for numbers in own]
+
+
 def refused(scenario: Scenario) -> list[str]:
     """Faults of a scenario that no fleet flies, one line each, with what to do instead."""
     return [

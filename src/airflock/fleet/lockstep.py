@@ -17,7 +17,7 @@ from airflock.core.sensing import Sensing
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
-from airflock.fleet.individuals import Faults, records_of
+from airflock.fleet.individuals import Faults, records_of, sensors_of
 from airflock.fleet.vehicle import OURS, PILOT, Vehicle
 from airflock.mavlink import orders
 from airflock.mavlink.coordinates import Geodetic
@@ -61,8 +61,8 @@ class Fleet:
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
         self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach)
-        found = scenario.sensor, scenario.sensors
-        self._sensing = [Sensing(*found, seed, i, flat=card.flat) for i in range(len(card.members))]
+        own = enumerate(sensors_of(scenario, len(card.members), seed))
+        self._sensing = [Sensing(scenario.sensor, s, seed, i, flat=card.flat) for i, s in own]
         self._given = 0
         self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
         if start is not None:

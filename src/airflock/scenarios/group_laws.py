@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from airflock.core.contract import Body, Model
 from airflock.core.parameters import Choice, Quantity, choices, declarations
+from airflock.core.sensor import Sensor
 from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
 from airflock.scenarios import checks, schema
@@ -116,17 +117,20 @@ class Laws:
         return record, []
 
 
-def misfits(groups: Sequence["Group"], parts: Mapping[str, Any], found: Model, vehicle: Body) -> list[str]:
+def misfits(
+    groups: Sequence["Group"], parts: Mapping[str, Any], found: Model, vehicle: Body, sensor: Sensor
+) -> list[str]:
     """What of a scenario its groups cannot fly with their own numbers or law, one line each."""
     faults: list[str] = []
     for number, group in enumerate(groups):
         law, base = group.law or (found, parts["parameters"])
-        own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in ("p", "b")}
+        own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
         if group.law is None and not any(own.values()):
             continue
         told: dict[str, Any] = {**parts, "parameters": replace(base, **own["p"])}
         told["body"] = parts["body"] and replace(parts["body"], **own["b"])
-        more = checks.body_faults(vehicle, told, law)
+        told["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
+        more = checks.body_faults(vehicle, told, law) + (checks.sensor_faults(sensor, told) if own["s"] else [])
         if group.law is not None and parts["silence"] is not None and parts["flight"] is not None:
             more += checks.silence_faults(parts["silence"].rule, parts["flight"], law)
         faults += [f"groups[{number}]: {fault}" for fault in more]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
@@ -12,8 +12,13 @@ from airflock.core.parameters import Choice, Quantity, declarations
 from airflock.scenarios import schema, units
 from airflock.scenarios.group_laws import Laws
 
-LETTERS = {"model": "p", "body": "b"}  # sections of which numbers may differ, and what drivers call them
+LETTERS = {
+    "model": "p",
+    "body": "b",
+    "sensors": "s",
+}  # sections of which numbers may differ, and what drivers call them
 KEYS = ("name", "agents", *LETTERS)
+ONE = {"body": "one body carries all", "sensors": "all measure by one sensor"}
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,11 @@ class Group:
     spread: Mapping[tuple[str, str], float] = field(default_factory=dict)
     law: tuple[Model, Any] | None = None
 
+    def without(self, letter: str) -> "Group":
+        """The same group without numbers of its own in one record."""
+        rest = [{key: v for key, v in part.items() if key[0] != letter} for part in (self.numbers, self.spread)]
+        return replace(self, numbers=rest[0], spread=rest[1])
+
 
 def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
     """Numbers of agents from a list of them; and what is wrong with it, one line."""
@@ -49,7 +59,7 @@ def groups_of(
 ) -> tuple[tuple[Group, ...], list[str], list[str]]:
     """Groups, notes of converted units, and everything that is wrong with them, one line each.
 
-    records : "model" and "body" → record of their parameters
+    records : "model", "body" and "sensors" → record of their parameters
     laws    : finds the law that a group's section model names
     """
     if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(g, Mapping) for g in given):
@@ -129,7 +139,9 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
         if where.endswith("model") and (key == "kind" or isinstance(known.get(key), Choice)):
             continue
         if key == "kind" or isinstance(known.get(key), Choice):
-            faults.append(f"{where}.{key}: one body carries all; only its numbers differ from group to group")
+            faults.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
+        elif key == "period" and where.endswith("sensors"):
+            faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
             spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]

@@ -97,7 +97,7 @@ def make(
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, sensor, measures)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
-    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, laws, trust)
+    single, told_of, more = _individuals(merged, parts, found, (vehicle, sensor), folder, kinds, laws, trust)
     faults += more
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -116,14 +116,17 @@ def make(
 
 
 def _individuals(
-    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, vehicle: Body, folder: Path | None,
-    kinds: Mapping[str, Fault] | None, laws: Mapping[str, Model] | None, trust: bool,
+    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, carried: tuple[Body, Sensor],
+    folder: Path | None, kinds: Mapping[str, Fault] | None, laws: Mapping[str, Model] | None, trust: bool,
 ) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
     """Groups and faults of a scenario, notes, and what is wrong with them."""
     if not {"groups", "faults"} & set(merged) or parts["flight"] is None:
         return {}, [], []
     count, flight = int(parts["flight"].agents), parts["flight"]
-    records = {"body": vehicle.Parameters} | ({"model": found.Parameters} if found else {})
+    vehicle, sensor = carried
+    records = {"body": vehicle.Parameters, "sensors": sensor.Parameters} | (
+        {"model": found.Parameters} if found else {}
+    )
     named = None
     if found is not None and parts.get("parameters") is not None:
         kind, world = merged.get("model", {}).get("kind"), parts["world"]
@@ -132,7 +135,7 @@ def _individuals(
     flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records, named)
     faults += groups.group_faults(flocks, found)
     if found is not None and not faults:
-        faults += group_laws.misfits(flocks, parts, found, vehicle)
+        faults += group_laws.misfits(flocks, parts, found, vehicle, sensor)
     sequential = flight.update == "sequential"
     made, told, more = faulty.entries(
         merged.get("faults", ()), count, flocks, sequential, folder, own=kinds, trust=trust

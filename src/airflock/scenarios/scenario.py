@@ -96,13 +96,15 @@ class Scenario:
     @property
     def errs(self) -> bool:
         """Whether agents measure themselves with errors."""
-        return not self.sensor.is_exact(self.sensors)
+        own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
+        spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
+        return spread or not all(self.sensor.is_exact(replace(self.sensors, **numbers)) for numbers in ({}, *own))
 
     @property
     def unerring(self) -> "Scenario":
         """The same scenario with agents that know their own states as they are."""
-        exact = SENSORS["perfect"]
-        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period))
+        exact, groups = SENSORS["perfect"], tuple(group.without("s") for group in self.groups)
+        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period), groups=groups)
 
     @property
     def descends(self) -> bool:
@@ -144,7 +146,7 @@ class Scenario:
     @property
     def varied(self) -> tuple[tuple[str, str], ...]:
         """Numbers that differ among agents, as (letter, name); of laws that groups fly by their own: `laws`."""
-        return self.laws[0].varied + varied(self.groups, {"b": self.body})
+        return self.laws[0].varied + varied(self.groups, {"b": self.body, "s": self.sensors})
 
     @cached_property
     def laws(self) -> tuple[Law, ...]:
@@ -175,7 +177,7 @@ class Scenario:
 
     def own_numbers(self, letter: str, name: str, seed: int) -> list[float]:
         """One number of every agent, with its tolerance as a seed draws it."""
-        record = self.parameters if letter == "p" else self.body
+        record = {"p": self.parameters, "b": self.body, "s": self.sensors}[letter]
         return own_numbers(self.groups, self.agents, letter, name, record, seed)
 
     def alike(self) -> "Scenario":
