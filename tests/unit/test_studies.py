@@ -23,8 +23,8 @@ from airflock.evolve.run import Interrupted, on_device, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
-from airflock.papers.dimock_2003.units import gains
-from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
+from airflock_papers.dimock_2003.units import gains
+from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
 
 
 def finished(folder, study=None, score=toys.bowl, **options):
