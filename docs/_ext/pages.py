@@ -268,21 +268,17 @@ def vocabulary() -> None:
 
 def keys() -> None:
     """Every key of a scenario file, and the units that values may carry."""
-    from airflock.scenarios.keys import about, records
-    from airflock.scenarios.keys import keys as keys_of
-    from airflock.scenarios.laws import MODELS
+    from airflock.scenarios.keys import sections
     from airflock.scenarios.units import UNITS
 
     pieces = [
         "# Every key of a scenario file\n\nThe same lists are printed by `airflock keys`, `airflock keys radio`, "
         "`airflock keys delay`, and with `--json` for machines. A dash means that the value comes from the rest of the "
-        "scenario. Four more keys stand at the top: `title`, `extends` (a preset or file to begin from), `published` "
-        "(what a paper reports), and `model.kind`, `body.kind` and "
-        "`sensors.kind` name the law, the body and the sensor.\n"
+        "scenario, or that there is none.\n"
     ]
-    for name in records():
-        head = f'model.kind = "{name}"' if name in MODELS else name
-        pieces.append(f"\n## {head}\n\n{plain(about(name))}\n\n{key_table(keys_of(name))}")
+    for name, section in sections().items():
+        pieces.append(f"\n({name})=\n## {plain(section.head)}\n\n{plain(section.about)}\n\n")
+        pieces.append(key_table(section.keys) if section.keys else "It has no numbers of its own.\n")
     pieces.append(
         '\n## Units\n\nA plain number is in the declared SI unit. A text such as `"400 ms"`, or a table with value '
         "and unit, is converted; a note tells every conversion.\n\n"
