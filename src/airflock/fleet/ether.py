@@ -10,7 +10,7 @@ import random as dice
 from collections.abc import Callable, Iterator, Sequence
 
 from airflock.body import radio
-from airflock.core import random
+from airflock.fleet.dice import PacketDice
 from airflock.fleet.faults import Fault
 
 SLACK = 1e-6  # s
@@ -28,8 +28,8 @@ class Ether:
         self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
         reach: Callable[[int, int, float], float] | None = None,
     ):  # fmt: skip
-        self._k, self._members, self._seed, self._period, self._faults = k, list(members), seed, period, faults
-        self._reach = reach
+        self._k, self._members, self._period, self._faults = k, list(members), period, faults
+        self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
@@ -67,14 +67,14 @@ class Ether:
     def _passes(self, now: float, number: int, who: int, to: int, distance: float) -> bool:
         """Whether a packet over this distance (m) gets through."""
         k = self._k
-        if distance > k.range or self._cut(now, who, to):
+        if distance > k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
-        if self._reach is not None and distance > self._reach(who, to, now):
+        if self._faults and (
+            self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
+        ):
             return False
-        if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
-            return False
-        u = random.pair_uniform(self._seed, random.PACKET, 0, number, to, who, len(self._members))
-        return bool(u >= radio.unheard(distance, number, self._period, k))
+        missed = radio.unheard(distance, number, self._period, k)
+        return bool(missed <= 0.0 or self._drawn(number, to, who) >= missed)
 
     def _cut(self, now: float, who: int, to: int) -> bool:
         if self._of("outage", who, now) or self._of("outage", to, now):

@@ -72,12 +72,11 @@ class Vehicle:
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.lifting = False
-        for name in asks(body.move, "move", body.name):
+        asked = asks(body.move, "move", body.name)
+        for name in asked:
             if name not in GIVEN:
                 raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
-        asked = asks(body.move, "move", body.name)
         self._take = itemgetter(*map(GIVEN.index, asked))
-        self._measures = not {"mx", "my", "mz"}.isdisjoint(asked)
         self._old = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
         self.faults: Faults | None = None  # of the scenario, with its own place among the drones
@@ -284,8 +283,8 @@ class Vehicle:
         command = c if self.motor else (vx, vy, vz - 5.0)
         if self.faults is not None:
             command = self.faults.overruled(self.place, now, command)
-        measured = self.navigated[3:] if self._measures else STILL
-        known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
+        eu, ev, ew = self.error[3:]
+        known = (vx, vy, vz, vx + eu, vy + ev, vz + ew, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
         moved = self.body.move(*self._take(known))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         if self.faults is not None:

@@ -161,7 +161,7 @@ def facts(
         due=operator.due(utc, s.start_step * card.members.index(member)),
         at_layer=own is not None and abs(own.z - layer) < 0.5, climbing=own is not None and own.vz > 0.2,
         neighbour_near=neighbour_near,
-        gathered=own is not None and all(
+        gathered=phase == Phase.GATHER and own is not None and all(
             now - p.heard_at <= FRESH and p.phase in GATHERED and p.state is not None and apart(own, p.state) < s.gather
             for p in peers.all.values()
         ),
