@@ -284,7 +284,8 @@ class Vehicle:
         if self.faults is not None:
             command = self.faults.overruled(self.place, now, command)
         eu, ev, ew = self.error[3:]
-        known = (vx, vy, vz, vx + eu, vy + ev, vz + ew, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
+        measured = vx + eu, vy + ev, vz + ew
+        known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
         moved = self.body.move(*self._take(known))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None
         if self.faults is not None:
