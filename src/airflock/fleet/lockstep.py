@@ -18,7 +18,8 @@ from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import Faults, records_of
-from airflock.fleet.vehicle import OURS, PILOT, Vehicle
+from airflock.fleet.modes import OURS, PILOT
+from airflock.fleet.vehicle import Vehicle
 from airflock.mavlink import orders
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do, Order
