@@ -13,10 +13,11 @@ class OuterNoise:
     """Normal random numbers of every drone at every motion step, to be asked in the order of time.
 
     seed : of the flight; count: of drones; three: in space, where a draw serves one step; in a plane it serves two
+    first : of the drones that are asked for, where not all are
     """
 
-    def __init__(self, seed: int, count: int, three: bool):
-        self._seed, self._count, self._three = seed, count, three
+    def __init__(self, seed: int, count: int, three: bool, first: int = 0):
+        self._seed, self._count, self._three, self._drone = seed, count, three, first
         self._first, self._rows = -BLOCK, []  # type: ignore[var-annotated]
 
     def __call__(self, step: int, drone: int) -> Vector:
@@ -24,7 +25,7 @@ class OuterNoise:
         if not self._first <= step < self._first + BLOCK:
             self._first = step - step % BLOCK
             self._rows = self._drawn(self._first)
-        row: Vector = self._rows[step - self._first][drone]
+        row: Vector = self._rows[step - self._first][drone - self._drone]
         return row
 
     def _drawn(self, first: int) -> list[list[Vector]]:
@@ -32,7 +33,7 @@ class OuterNoise:
         steps = np.arange(first, first + BLOCK, 1 if self._three else 2, dtype=np.uint64)
         if not self._three:
             steps //= np.uint64(2)
-        drones = np.arange(self._count, dtype=np.uint64)
+        drones = np.arange(self._drone, self._drone + self._count, dtype=np.uint64)
         drawn = random.words(self._seed, random.OUTER, 0, steps[:, None], drones[None, :])
         tables = [np.broadcast_to(words, (len(steps), self._count)).tolist() for words in drawn]
         rows: list[list[Vector]] = []

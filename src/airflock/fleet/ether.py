@@ -53,7 +53,7 @@ class Ether:
 
     def deliver(self, now: float, at: Sequence[Vector]) -> Iterator[tuple[int, bytes]]:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
-        number = round(now / self._period)
+        number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + SLACK:
             _, _, who, to, datagram = heapq.heappop(self._queue)
             self.sent += 1

@@ -8,7 +8,7 @@ brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the l
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from operator import itemgetter
 from typing import Any
 
@@ -18,6 +18,7 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.fleet import telemetry
+from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import Faults
 from airflock.fleet.modes import HOLD, LAND, MODES, ON_LOSS, ON_SILENCE, OURS, PARAMETERS, PILOT, RTL, TAKEOFF
 from airflock.mavlink import dialect
@@ -59,6 +60,7 @@ class Vehicle:
         self.parameters = PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Vector = (0.0, 0.0, 0.0)
         self.target_at, self.first_at, self.climb_to = -1e9, -1e9, 0.0
+        self.booted = 0.0  # s
         self.beat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
         self.now, self.due, self.rates = 0.0, dict.fromkeys(telemetry.RATES, 0.0), dict(telemetry.RATES)
         self.error: tuple[float, ...] = (0.0,) * 6
@@ -249,6 +251,18 @@ class Vehicle:
     }  # fmt: skip
 
     # ----------------------------------------------------------------------------------------------------- motion
+
+    def suffer(self, faults: Sequence[Fault], now: float, dt: float) -> None:
+        """Let faults act that befall it in the step from now on: motors, navigation, battery, a pilot's hand."""
+        kinds = {f.kind for f in faults if f.holds(self.system, now)}
+        self.motor = "motor" not in kinds
+        frozen = "gnss" in kinds
+        self.frozen = self.frozen if frozen and self.frozen else self.measured if frozen else None
+        for f in faults if kinds else ():
+            if f.kind == "battery" and f.holds(self.system, now):
+                self.battery = f.amount
+            if f.kind == "pilot" and f.holds(self.system, now) and now - f.begin < dt:
+                self.mode = PILOT
 
     def wish(self) -> Vector:
         """Velocity that the autopilot makes for now, m/s."""
