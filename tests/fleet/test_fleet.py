@@ -276,6 +276,20 @@ def test_a_clock_that_is_half_a_second_off_never_starts():
     assert any("missing: clock: -0.50 s" in note for _, who, note in f.log if who == 2), f.log
 
 
+def test_who_forges_packets_changes_nothing_without_the_key_and_little_with_it():
+    """Without: the same bits. With: what jumps is refused, and the drone itself tells that it has a double."""
+    settings = {"radio.delay": 0.2, "world.side": 60.0, "start.separation": 6.0}
+    plain = in_the_air(3, 5.0, **settings)
+    rogue = in_the_air(3, 5.0, faults=(Fault("rogue", (2,), 1.0, amount=30.0),), **settings)
+    assert rogue.digest() == plain.digest() and rogue.nodes[0].refused["signature"] > 10
+    impostor = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=30.0),), **settings)
+    assert impostor.nodes[0].refused["jump"] > 10 and impostor.nodes[0].peers.all[2].state is not None
+    assert math.dist(impostor.nodes[0].peers.all[2].state[:2], impostor.vehicles[1].state[:2]) < 5.0
+    assert any("another sender signs as member 2" in note for _, who, note in impostor.log if who == 2)
+    near = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=3.0),), **settings)
+    assert near.digest() != plain.digest(), "what is plausible is believed: the key is what is trusted"
+
+
 def test_faults_are_checked_at_once(tmp_path):
     path = tmp_path / "faults.toml"
     path.write_text('[[fault]]\nkind = "outage"\nwho = [1, 3]\nbegin = 5\nend = 9.5\n')

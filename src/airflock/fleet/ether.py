@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from airflock.body import radio
 from airflock.fleet.dice import PacketDice
 from airflock.fleet.faults import Fault
+from airflock.fleet.rogue import forged
+from airflock.mavlink.coordinates import Site
 
 SLACK = 1e-6  # s
 Vector = tuple[float, float, float]
@@ -21,14 +23,16 @@ class Ether:
     """Datagrams between the members of a fleet.
 
     k : parameters of the radio; members: system ids; period: s between two packets of a drone
+    site : of the flight, by which forged packets tell places
     reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
         self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
-        reach: Callable[[int, int, float], float] | None = None,
+        reach: Callable[[int, int, float], float] | None = None, site: Site | None = None,
     ):  # fmt: skip
         self._k, self._members, self._period, self._faults = k, list(members), period, faults
+        self._site = site
         self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
@@ -40,6 +44,11 @@ class Ether:
         for to in range(len(self._members)):
             if to != who:
                 self._push(now + self._k.delay + self._late(to, now), who, to, datagram)
+        for f in self._faults:
+            if f.kind in ("rogue", "impostor") and f.holds(self._members[who], now) and self._site is not None:
+                false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
+                for to in range(len(self._members)):
+                    self._push(now + self._k.delay, who, to, false)
 
     def _push(self, due: float, who: int, to: int, datagram: bytes) -> None:
         heapq.heappush(self._queue, (round(due, 6), self._count, who, to, datagram))

@@ -57,7 +57,7 @@ class Fleet:
             for who in card.members
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
-        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach)
+        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach, card.site)
         found = scenario.sensor, scenario.sensors
         self._sensing = [Sensing(*found, seed, i, flat=card.flat) for i in range(len(card.members))]
         self._station = Station(card, operator)
