@@ -51,7 +51,8 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
-    stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
+    stopped, stop_position, stands_until : whether it stopped for somebody whom it has lost (1 or 0), where, and until
+                                           when it stands, s
     away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
@@ -147,6 +148,11 @@ class Flock:
     def stopped(self) -> Row:
         """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
         return self._take("stopped")
+
+    @property
+    def stands_until(self) -> Row:
+        """Time until which each agent that stopped stands, s."""
+        return self._take("stands_until")
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
