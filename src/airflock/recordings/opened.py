@@ -28,7 +28,7 @@ READER = Path(__file__).with_name("reader.py")
 
 
 KINDS = {
-    "netcdf": "a netCDF recording", "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
+    "recording": "a netCDF recording", "netcdf": "a netCDF file", "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
 }  # fmt: skip
 PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python, row by row
 
@@ -36,8 +36,8 @@ PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python
 class Opening:
     """A file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
 
-    def __init__(self, path: str | os.PathLike[str], *, how: str = "netcdf", limit: float | None = None):
-        """Start the process; how: one of `reader.READ`.
+    def __init__(self, path: str | os.PathLike[str], *, how: str = "recording", limit: float | None = None):
+        """Start the process; how: a recording, or one of `reader.READ`.
 
         limit : s of a processor, by default 15 s and a second for each 5 MB of the file (0.1 MB of an ArduPilot log)
 
@@ -46,7 +46,7 @@ class Opening:
         self.path = Path(path)
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
-        if how == "netcdf" and self.path.suffix.lower() in FOREIGN:
+        if how == "recording" and self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
                 f"{self.path}: holds tracks, not yet a recording: airflock import {self.path.name} --save FILE.nc"
             )
@@ -54,7 +54,8 @@ class Opening:
         self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
         paths = [path for path in sys.path if os.path.isabs(path)]
-        asked = {"paths": paths, "file": str(self.path.absolute()), "how": how, "most": most}
+        asked = {"paths": paths, "file": str(self.path.absolute()), "most": most}
+        asked["how"] = "netcdf" if how == "recording" else how
         asked["seconds"] = math.ceil(self.limit)
         # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
         command = [sys.executable, "-I", "-S", str(READER)]
@@ -119,7 +120,7 @@ class Opening:
                 self._take(values.reshape(-1).view(np.uint8).data)
             variables[given["name"]] = xr.Variable(given["dims"], values, _attributes(given["attributes"]))
         raw = xr.Dataset(variables, attrs=_attributes(about["attributes"]))
-        return xr.decode_cf(raw) if self.how == "netcdf" else raw
+        return xr.decode_cf(raw) if self.how in ("recording", "netcdf") else raw
 
     def _late(self) -> RecordingError:
         return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")

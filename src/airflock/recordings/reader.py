@@ -113,7 +113,9 @@ def dataflash(path: str, _: int, share: Share) -> Read:
 
     log = DFReader.DFReader_binary(path)
     rows: dict[str, list[Any]] = {**{part: [] for part in PARTS}, "ORGN": [], "GPS": []}
-    names: dict[str, tuple[str, ...]] = {part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}", f"TV{part[-1]}") for part in PARTS}
+    names: dict[str, tuple[str, ...]] = {
+        part: ("TimeUS", f"P{part[-1]}", f"V{part[-1]}", f"TV{part[-1]}") for part in PARTS
+    }
     names |= {"ORGN": ("Lat", "Lng", "Alt"), "GPS": ("TimeUS", "GWk", "GMS", "I")}
     while (message := log.recv_match(type=[*rows])) is not None:
         kind = message.get_type()

@@ -21,7 +21,7 @@ def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]
         plain = Opening(path, how="hdf5").answer()
         if "position" not in plain:
             return read_idtracker(plain, path, options, findings)
-    return read_dataset(Opening(path).answer(), options, str(path))
+    return read_dataset(Opening(path, how="netcdf").answer(), options, str(path))
 
 
 def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:
