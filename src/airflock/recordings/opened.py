@@ -28,7 +28,8 @@ READER = Path(__file__).with_name("reader.py")
 
 
 KINDS = {
-    "recording": "a netCDF recording", "netcdf": "a netCDF file", "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
+    "recording": "a netCDF recording", "netcdf": "a netCDF file",
+    "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
 }  # fmt: skip
 PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python, row by row
 
