@@ -218,8 +218,8 @@ def workers(folder, kills, seed):
 
     import distributed
 
-    from airflock.evolve.executors.cluster import Cluster
     from airflock.evolve.run import run
+    from airflock.executors.cluster import Cluster
 
     best, space = dict(toys.BEST), toys.SPACE
 
@@ -253,7 +253,7 @@ def workers(folder, kills, seed):
             thread = threading.Thread(target=killer)
             place = folder / f"there{studies}"
             open_folder(place, study, resume=False)
-            executor = Cluster(study, cluster.scheduler_address, task=task)
+            executor = Cluster([task], cluster.scheduler_address)
             thread.start()
             try:
                 run(study, place, executor)
