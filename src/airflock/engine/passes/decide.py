@@ -13,14 +13,6 @@ from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.words import live, wants
 
-EXTREME = {"min": "least", "max": "most"}
-START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
-
-
-def combine(how: str, total: str, term: str) -> str:
-    """Text that reduces one more term into a total."""
-    return f"{total} += {term}" if how == "sum" else f"{total} = {EXTREME[how]}({total}, {term})"
-
 
 def neighbours(build: Builder) -> None:
     """Function neighbours: the neighbour rule over all others in range of each agent, all pairs or by cells."""
