@@ -12,8 +12,7 @@ import pytest
 
 from airflock.core import random
 from airflock.engine import stages
-from airflock.engine.passes import decide, measure, move, perceive
-from airflock.engine.passes.build import Builder
+from airflock.engine.passes import decide, driver, measure, perceive
 from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import plan_of
 from airflock.engine.stages import decide as deciding
@@ -86,21 +85,7 @@ class World:
         found = scenario(kind, agents=6, world__side=60.0, world__height=50.0, start__separation=4.0, **keys)
         self.plan = plan_of(found, precision=64)
         self.tables = tables(found, self.plan, seed)
-        self.build = Builder(self.plan)
-        for make in (
-            perceive.snapshot,
-            perceive.perceive,
-            perceive.receive,
-            perceive.meet,
-            decide.neighbours,
-            decide.boundaries,
-        ):
-            make(self.build)
-        decide.decide(self.build)
-        move.begin(self.build)
-        move.move(self.build)
-        for clock in measure.CLOCKS:
-            measure.measure(self.build, clock)
+        self.build = driver.stages(self.plan)
         rng, n = np.random.default_rng(seed), 6
         dims = self.plan.dimensions
         self.state = {
@@ -222,7 +207,7 @@ class World:
             if text:
                 least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, *parts)
             else:
-                metrics = measure.measured(self.build, clock)
+                metrics = measure.measured(self.plan, clock)
                 least = judging.measure(
                     self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},

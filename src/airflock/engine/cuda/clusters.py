@@ -15,6 +15,7 @@ from airflock.engine.stages.clusters import mean_over, member
 from airflock.engine.stages.measure import add, clear, filled, ways
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import HALF, START, ZERO, X, Y, Z, ask, real, reduced, totals, vector
+from airflock.world.edges import nearest_image
 
 VALID = "np.uint32(FULL) if n >= 32 * part + 32 else (np.uint32((1 << max(n - 32 * part, 0)) - 1))"
 
@@ -41,10 +42,10 @@ def clusters(build: Builder, metric: Metric) -> list[str]:
 
 def _offset(build: Builder, other: str) -> list[str]:
     """Squared distance of agent i to another, by its text."""
-    axes = build.plan.axes
-    square = " + ".join(f"d_{a} * d_{a}" for a in axes)
-    return [*(f"d_{a} = {other.format(a=a, c=c)} - own_{a}" for c, a in enumerate(axes)), *build.image(axes, "d_{}"),
-            f"r2 = {square} + TINY"]  # fmt: skip
+    axes, nearest = build.plan.axes, build.source.name(nearest_image) if build.plan.periodic else ""
+    lines = [f"d_{a} = {other.format(a=a, c=c)} - own_{a}" for c, a in enumerate(axes)]
+    lines += [f"d_{a} = {nearest}(d_{a}, w.half_{a})" for a in axes if nearest]
+    return [*lines, f"r2 = {' + '.join(f'd_{a} * d_{a}' for a in axes)} + TINY"]
 
 
 def _linked(build: Builder, metric: Metric) -> tuple[list[str], str]:

@@ -44,8 +44,6 @@ def surveys(plan: Plan) -> list[Owner]:
 
 def flock(build: Builder) -> None:
     """Function flock: the model's rule, once per decision, on the true states."""
-    if build.plan.model.flock is None:
-        return
     owner = owners(build.plan)[0]
     records = "p wing aero" if "aero" in asks(owner.rule, owner.kind, owner.name) else "p wing"
     build.function("flock(n, row, work, scratch)", build.records(records), _call(build, owner), "return 0")

@@ -1,15 +1,15 @@
 """Measure: order parameters of one instant, and how instants add up. The same text scores flights and recordings."""
 
-from airflock.core.contract import Metric
 from airflock.engine.passes import flock
-from airflock.engine.passes.build import Builder, columns, in_place
+from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
+from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.measure import Measured
-from airflock.engine.stages.words import wants
+from airflock.engine.stages.words import fields, wants
 
 CLOCKS = ("sample", "collision")
 
@@ -25,7 +25,7 @@ def measure(build: Builder, clock: str) -> None:
 
     That of the collision clock returns the least distance of a pair, m.
     """
-    metrics = measured(build, clock)
+    metrics = measured(build.plan, clock)
     outside = any(wants(one.metric.agent, "excursion") for one in metrics)
     parts = {f"survey_{one.metric.name}": flock.survey(build, one.metric) for one in metrics if one.metric.survey}
     grouped = {one.metric.name: build.clusters(one.metric) for one in metrics if build.clusters and one.metric.cluster}
@@ -45,32 +45,13 @@ def measure(build: Builder, clock: str) -> None:
     build.function(f"measure_{clock}({arguments(build)})", lines, f"return {made.answer}")
 
 
-def measured(build: Builder, clock: str) -> tuple[Measured, ...]:
+def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
     """Metrics of a clock, and where their numbers lie."""
-    names = [name for name, _, _ in columns(build.plan.metrics)]
-    found, total = [], 0
-    for metric in build.plan.metrics:
+    found, value, row, total = [], 0, 0, 0
+    for metric in plan.metrics:
         if metric.clock == clock:
-            first = names.index(metric.Sample._fields[0])  # type: ignore[attr-defined]
-            found.append(Measured(metric, first, memory_offset(build, metric), total))
-            total += len(getattr(metric.Pair, "_fields", ()))
+            found.append(Measured(metric, value, row, total))
+            total += len(fields(metric.Pair))
+        value += len(fields(metric.Sample))
+        row += len(fields(metric.Memory))
     return tuple(found)
-
-
-def memory_offset(build: Builder, metric: Metric) -> int:
-    """First row of a metric in the table of metric memories."""
-    before = build.plan.metrics[: build.plan.metrics.index(metric)]
-    return sum(len(getattr(other.Memory, "_fields", ())) for other in before)
-
-
-def accumulate(build: Builder, clock: str) -> list[str]:
-    """Lines that add the values of one instant to the sums over time."""
-    lines = []
-    for c, (_, how, when) in enumerate(columns(build.plan.metrics)):
-        if when == clock:
-            if how in ("mean", "sum"):
-                lines += [f"sums[{c}] += values[{c}]"]
-            else:
-                lines += [f"sums[{c}] = {how}(sums[{c}], values[{c}])"]
-    count = len(columns(build.plan.metrics)) + CLOCKS.index(clock)
-    return [*lines, f"sums[{count}] += 1.0"]
