@@ -5,7 +5,7 @@ from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
 from airflock.engine.cuda.state import memory
 from airflock.engine.passes.build import branch, columns, loop
-from airflock.engine.passes.driver import MADE
+from airflock.engine.passes.driver import make
 from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.schedule import IN_TURN, ORDER, order
@@ -21,9 +21,7 @@ ARGUMENTS = (
 def flight(plan: Plan, shape: Shape) -> str:
     """Text of the driver that flies one flock per block: kernel `fly`."""
     build = CudaBuilder(plan, shape)
-    for name in ("snapshot", *(stage for event in order(build.plan).values() for stage in event)):
-        if name not in build.stages:
-            MADE[name](build)
+    make(build)
     body = _time(build)  # first: it may still name rules
     lines = [*memory(build), *begin(build), *body, *_end(build)]
     options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.bounds}, cache=True")

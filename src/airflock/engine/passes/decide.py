@@ -17,8 +17,6 @@ from airflock.engine.stages.words import live, wants
 def neighbours(build: Builder) -> None:
     """Function neighbours: the neighbour rule over all others in range of each agent, all pairs or by cells."""
     plan, model = build.plan, build.plan.model
-    perceive.receive(build)
-    perceive.meet(build)
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
     draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)

@@ -42,7 +42,6 @@ AWAY = real(1e9)
 
 
 MADE: dict[str, Callable[[Builder], None]] = {  # by name, what makes the function of a stage
-    "snapshot": perceive.snapshot,
     "aim_": scene.aim,
     "glide_": scene.glide,
     "appear_": scene.appear,
@@ -85,9 +84,7 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
     build.source.lenient = lenient
     build.slots = slots.slotted(plan)
     events = order(plan)
-    for name in ("snapshot", *(stage for event in events.values() for stage in event)):
-        if name not in build.stages:
-            MADE[name](build)
+    make(build)
     move.begin(build)
     if plan.sequential:
         _turns(build)
@@ -106,6 +103,17 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
         f"advance(first, last, half, held, {arguments})", _agents(build), made.lines, f"return {made.answer}"
     )
     return build
+
+
+def make(build: Builder) -> None:
+    """Functions of all stages that a plan has, in the order of a step; before them what `neighbours` calls."""
+    perceive.snapshot(build)
+    perceive.receive(build)
+    perceive.meet(build)
+    for event in order(build.plan).values():
+        for name in event:
+            if name != "snapshot":
+                MADE[name](build)
 
 
 def _agents(build: Builder) -> list[str]:

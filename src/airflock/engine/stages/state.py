@@ -89,13 +89,77 @@ class Flock:
         self.packet = Columns("packet", take)
         self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
         self.heading = axes("head_")
-        self.speed, self.excursion = take("speed"), take("excursion_")
-        self.touches, self.rays = take("touches_"), take("rays_")
-        self.square, self.hidden, self.fade = take("square"), take("hidden"), take("fade")
-        self.met, self.heap, self.weak = take("met"), take("heap"), take("weak")
-        self.reach_out, self.reach_in = take("reach_out"), take("reach_in")
-        self.clock, self.stopped = take("clock"), take("stopped")
         self._take = take
+
+    @property
+    def speed(self) -> Row:
+        """Speed of each agent, m/s."""
+        return self._take("speed")
+
+    @property
+    def excursion(self) -> Row:
+        """How far each agent is outside, m."""
+        return self._take("excursion_")
+
+    @property
+    def touches(self) -> Row:
+        """Whether each agent touched the scene since it was last looked at, 1 or 0."""
+        return self._take("touches_")
+
+    @property
+    def rays(self) -> Row:
+        """How many rays each agent cast at its last decision."""
+        return self._take("rays_")
+
+    @property
+    def square(self) -> Row:
+        """Squared distance of each other agent, m²; FAR of whom one agent does not hear."""
+        return self._take("square")
+
+    @property
+    def hidden(self) -> Row:
+        """Whether something that stands in the world hides each other agent, 1 or 0."""
+        return self._take("hidden")
+
+    @property
+    def fade(self) -> Row:
+        """Normal number of the signal of each other agent."""
+        return self._take("fade")
+
+    @property
+    def met(self) -> Row:
+        """Whether one agent meets each other one, 1 or 0."""
+        return self._take("met")
+
+    @property
+    def heap(self) -> Row:
+        """Scratch of whoever ranks agents."""
+        return self._take("heap")
+
+    @property
+    def weak(self) -> Row:
+        """Scratch of whoever ranks signals."""
+        return self._take("weak")
+
+    @property
+    def reach_out(self) -> Row:
+        """Square of how far the packets of each agent carry, m²; negative where nobody hears it."""
+        return self._take("reach_out")
+
+    @property
+    def reach_in(self) -> Row:
+        """Square of how far each agent hears, m²; negative where it hears nobody."""
+        return self._take("reach_in")
+
+    @property
+    def clock(self) -> Row:
+        """How far the clock of each agent is ahead, s."""
+        return self._take("clock")
+
+    @property
+    def stopped(self) -> Row:
+        """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
+        return self._take("stopped")
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
