@@ -12,7 +12,7 @@ from airflock.engine.cuda.shape import shape_of
 from airflock.engine.passes import driver
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.measure import measured
-from airflock.engine.schedule import IN_TURN, ORDER, order
+from airflock.engine.schedule import ORDER, in_turn, order
 from airflock.engine.simulate import plan_of
 from airflock.engine.stages import flight
 from airflock.engine.stages.words import Itself
@@ -39,13 +39,17 @@ def due(plan):
     return [stage for event in order(plan).values() for stage in event]
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_a_driver_calls_its_stages_in_the_order_of_a_step(name):
-    plan = plan_of(load(name), precision=32).built(grid=False)
+STUCK = {"faults": [{"kind": "stuck", "agents": [0], "at": 1.0}]}
+
+
+@pytest.mark.parametrize(("name", "keys"), [*((name, {}) for name in PRESETS), (IN_TURNS, STUCK), (PRESETS[0], STUCK)])
+def test_a_driver_calls_its_stages_in_the_order_of_a_step(name, keys):
+    plan = plan_of(load(name, keys), precision=32).built(grid=False)
+    assert bool(keys) == ("overrule" in order(plan)["decide"])
     text = driver.flight(plan)
     expected = due(plan)
     if plan.sequential:
-        assert calls(text, "turns", IN_TURN) == [stage for stage in IN_TURN if stage in expected]
+        assert calls(text, "turns", in_turn(plan)) == list(in_turn(plan))
         expected = [stage for stage in expected if stage not in (*ORDER["decide"].stages, "move")]
     assert calls(text, "advance", expected) == expected
 

@@ -34,7 +34,7 @@ ORDER: Mapping[str, Event] = {
     "sample": Event(("measure_sample",), "sample_every"),
     "move": Event(("move",)),
 }
-IN_TURN = ("neighbours", "boundaries", "decide", "move")  # for one agent after another in a sequential step
+AT_ONCE = ("perceive", "tune", "rearrange", "flock")  # for all agents: not where one after another decides and moves
 NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "snapshot": lambda plan: plan.late,
     "aim_": lambda plan: plan.goals,
@@ -59,3 +59,9 @@ def order(plan: Plan) -> dict[str, tuple[str, ...]]:
         return stage not in NEEDED or NEEDED[stage](plan)
 
     return {name: tuple(stage for stage in event.stages if needed(stage)) for name, event in ORDER.items()}
+
+
+def in_turn(plan: Plan) -> tuple[str, ...]:
+    """What each agent in turn does in a sequential step."""
+    events = order(plan)
+    return tuple(stage for stage in (*events["decide"], *events["move"]) if stage not in AT_ONCE)

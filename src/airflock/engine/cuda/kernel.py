@@ -8,7 +8,7 @@ from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.passes.driver import make
 from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
-from airflock.engine.schedule import IN_TURN, ORDER, order
+from airflock.engine.schedule import ORDER, in_turn, order
 from airflock.engine.stages.flight import SLACK
 
 ARGUMENTS = (
@@ -210,8 +210,9 @@ def _advance(build: CudaBuilder) -> list[str]:
     further = "moved += real(2.0) * math.sqrt(answer) * row_c.dt"
     if not build.plan.sequential:
         return [build.stages["move"].call(), further]
-    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in build.stages else []
-    alone = [build.stages[name].call(k_="step") for name in IN_TURN[1:] if name in build.stages]
+    due = in_turn(build.plan)
+    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in due else []
+    alone = [build.stages[name].call(k_="step") for name in due if name != "neighbours"]
     turn += [*branch("tid == 0", [*alone, "fastest_ = most(fastest_, answer)"]), "cuda.syncthreads()"]
     return ["fastest_ = ZERO", *loop("i in range(n)", turn), "answer = fastest_", further]
 

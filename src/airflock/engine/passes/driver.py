@@ -10,7 +10,7 @@ from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import primitives
 from airflock.engine.replace import must_replace
-from airflock.engine.schedule import IN_TURN, order
+from airflock.engine.schedule import in_turn, order
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.stages import flight as flight_
 
@@ -132,7 +132,7 @@ def _sampled(plan: Plan) -> dict[str, tuple[list[tuple[int, str]], int]]:
 
 def _turns(build: Builder) -> None:
     """Function turns: each agent in turn meets its neighbours, decides and moves."""
-    due = tuple(name for name in IN_TURN if name in build.turns)
+    due = in_turn(build.plan)
     read = list(dict.fromkeys(line for name in due for line in build.turns[name][0]))
     called = {name: build.turns[name][1] for name in due}
     made = specialise(build, flight_.turns, stages=called, order=due)
