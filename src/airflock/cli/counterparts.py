@@ -28,11 +28,12 @@ SEARCH = (
 )  # fmt: skip
 SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
 FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
+MANY = {**FLOWN, "scheduler": "scheduler"}
 
 COUNTERPARTS: dict[str, Counterpart] = {
     "run": Counterpart(
         "airflock.score(scenario, seeds=4)", "score",
-        {"scenario": "what", **SEEDS, **LOADED, **FLOWN, **TABLE, "save": "airflock.save", "plot": "airflock.plot"},
+        {"scenario": "what", **SEEDS, **LOADED, **MANY, **TABLE, "save": "airflock.save", "plot": "airflock.plot"},
     ),
     "score": Counterpart(
         "airflock.score(recording)", "score",
@@ -44,7 +45,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
         {
-            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **FLOWN, **TABLE,
+            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **MANY, **TABLE,
             "table": "the table returned", "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
         },
     ),
@@ -170,13 +171,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **{name: LOADED[name] for name in SETTINGS}, "trust": "airflock.load", **TABLE,
             **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
             "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
+            "body": "airflock.load", **dict.fromkeys(("mode", "join"), "airflock.fleet.realtime.fly"),
         },
     ),
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
         {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
-         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
+         "breaks": "airflock_papers.breaks.fly", "keep": "airflock_papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",

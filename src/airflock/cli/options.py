@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.doors import FormatError, from_outside, toml
+from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
@@ -25,6 +25,7 @@ Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_defa
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
 Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")]
 Trust = Annotated[bool, typer.Option("--trust", help="Run the code that a file names: a law, fitness functions.")]
 Law = Annotated[
     str | None,
@@ -64,13 +65,7 @@ def settings(
 def value(text: str, where: str) -> Any:
     """A TOML value, or the text itself if it is none; `where` names the option in faults."""
     with from_outside(where):
-        try:
-            document = toml(f"value = {text}")
-        except FormatError:
-            return text.strip()
-        if list(document) != ["value"]:
-            raise ScenarioError([f"{where}: holds more than one value; repeat the option for each key"])
-        return document["value"]
+        return toml_value(text)
 
 
 @contextmanager

@@ -9,22 +9,21 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from airflock import atomic
-from airflock.body.registry import BODIES
 from airflock.core.agent import State
-from airflock.core.contract import Model, model
-from airflock.core.maths import FAR
+from airflock.core.contract import Model
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, reason
+from airflock.doors import from_outside, json_value, read_text
+from airflock.errors import AirflockError, CardError
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
 from airflock.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
+from airflock.onboard.laws import body_of, law_of, look_of, own_of
 from airflock.onboard.safety import Safety
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
@@ -40,7 +39,6 @@ OPTIONAL = ("topology", "groups")  # left out where a drone meets all whom it he
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
-PARTS = ("law", "body")  # of which members may have numbers of their own
 LARGEST_SYSTEM = 250  # system ids above are left to ground stations
 
 
@@ -96,7 +94,7 @@ class Card:
         index = self.members.index(member)
         law, p, b = self.own[index] if self.own else (self.model, self.parameters, self.body_parameters)
         return Pilot(
-            law, p, self.place.seen(_look(law, p)), index=index, period=self.period, groups=self.groups,
+            law, p, self.place.seen(look_of(law, p)), index=index, period=self.period, groups=self.groups,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
@@ -132,13 +130,8 @@ def write_card(path: Path, document: Mapping[str, Any]) -> Card:
 
 def read_card(path: Path) -> Card:
     """Card from its file; CardError with one line per fault."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise CardError([f"{path}: {reason(fault)}"]) from fault
-    except (ValueError, RecursionError) as fault:
-        raise CardError([f"{path}: is not JSON: {fault}"]) from fault
-    return card_of(document, str(path))
+    with from_outside(path, CardError):
+        return card_of(json_value(read_text(path)), str(path))
 
 
 def card_of(document: Any, where: str = "card") -> Card:
@@ -189,9 +182,9 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     elif polygon_fault(corners):
         faults.append(f"fence.corners {polygon_fault(corners)}")
     operator = hexadecimal(d["operator"], faults)
-    law, parameters = _law(d["law"], faults)
-    body, numbers = _body(d["body"], faults)
-    own = _own(d, law, body, faults)
+    law, parameters = law_of(d["law"], faults)
+    body, numbers = body_of(d["body"], faults)
+    own = own_of(d, law, body, faults)
     world = record(arena.Parameters, d["world"], "world", faults)
     silence = record(Silence, d["silence"], "silence", faults)
     topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
@@ -207,7 +200,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         return None
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=_look(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
+        look=look_of(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
     )  # fmt: skip
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
@@ -262,64 +255,3 @@ def _outline(world: arena.Parameters) -> list[tuple[float, float]]:
     if world.arena == "circle":
         return [(r, 0.0), (0.0, r), (-r, 0.0), (0.0, -r), (0.7 * r, 0.7 * r), (-0.7 * r, -0.7 * r)]
     return [(h, h), (-h, h), (-h, -h), (h, -h)] if world.arena == "square" else []
-
-
-def find_law(name: str) -> Model:
-    """A law of the package by its name."""
-    if not name.isidentifier():
-        raise CardError([f"law.kind = {name!r} is not a law of this version"])
-    try:
-        return model(import_module(f"airflock.models.{name}"))
-    except ModuleNotFoundError as fault:
-        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
-
-
-def _law(table: Any, faults: list[str], where: str = "law") -> tuple[Model | None, Any]:
-    try:
-        found = find_law(str(table["kind"]))
-    except (AirflockError, KeyError, TypeError) as fault:
-        faults.append(str(fault) if isinstance(fault, AirflockError) else f"{where}.kind is missing")
-        return None, None
-    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, where, faults)
-
-
-def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
-    kind = table.get("kind") if isinstance(table, dict) else None
-    if not isinstance(kind, str) or kind not in BODIES:
-        faults.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
-        return None, None
-    return BODIES[kind], record(
-        BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", faults
-    )  # fmt: skip
-
-
-def _own(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Model, Any, Any], ...]:
-    """Law, its numbers and those of the body of each member; none where all are alike."""
-    rows = d["own"]
-    if rows == [] or law is None or body is None:
-        return ()
-    if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
-        faults.append("own: give a table with law and body for each member, or an empty list")
-        return ()
-    found = []
-    for number, row in enumerate(rows):
-        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in PARTS)
-        if not sound:
-            faults.append(f"own[{number}] = {row!r}: give the tables law and body")
-            continue
-        where, usual = f"own[{number}]", {part: {k: v for k, v in d[part].items() if k != "kind"} for part in PARTS}
-        b = record(body.Parameters, usual["body"] | row["body"], f"{where}.body", faults)
-        if "kind" in row["law"]:
-            other, p = _law(row["law"], faults, f"{where}.law")
-            if other is not None and other.command != law.command:
-                faults.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
-        else:
-            other, p = law, record(law.Parameters, usual["law"] | row["law"], f"{where}.law", faults)
-        if other is not None:
-            found.append((other, p, b))
-    return tuple(found)
-
-
-def _look(law: Model, p: Any) -> float:
-    """How far (m) a law with these numbers looks for what stands in the world."""
-    return FAR if law.wall_reach is None else float(law.wall_reach(p))

@@ -18,6 +18,7 @@ from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.errors import FlightError
+from airflock.machine import processor
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
@@ -159,7 +160,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 def flown_document(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
     document: dict[str, Any] = plain(scenario.document)
-    for section in ("model", "body", "metrics"):
+    for section in ("model", "body", "sensors", "metrics"):
         table = document.get(section, {})
         kind = table.get("kind") if isinstance(table, dict) else None
         if isinstance(kind, str) and kind.endswith(".py"):
@@ -169,18 +170,6 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
         if str(entry.get("kind", "")).endswith(".py"):
             entry["kind"] = PurePath(entry["kind"]).stem
     return document
-
-
-def processor() -> str:
-    """Model name of the processor."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-        return names[0] if names else "unknown"
-    except OSError:
-        import platform
-
-        return platform.processor() or "unknown"
 
 
 def plain(value: Any) -> Any:
