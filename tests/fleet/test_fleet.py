@@ -17,7 +17,7 @@ from airflock.core import random
 from airflock.core.agent import State
 from airflock.errors import ScenarioError
 from airflock.fleet import compare
-from airflock.fleet.dice import OuterNoise
+from airflock.fleet.dice import OuterNoise, PacketDice, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import KINDS, Fault, read_faults
 from airflock.fleet.lockstep import KEY
@@ -130,6 +130,22 @@ def test_outer_noise_of_a_block_is_that_of_each_step(three):
             four = (*random.normal_pair(*words[:2]), *random.normal_pair(*words[2:]))
             flat = (*(four[2:] if step % 2 else four[:2]), 0.0)
             assert noise(step, drone) == (four[:3] if three else flat)
+
+
+def test_words_of_a_block_are_those_of_each_measurement():
+    words = SensorDice(2**40 + 7, 3)
+    for number in (0, 1, 15, 16, 4097):
+        for drone in range(3):
+            for draw in (0, 1):
+                assert words(number, draw, drone) == random.words(2**40 + 7, random.SENSOR, 0, number, drone, draw)
+
+
+def test_numbers_of_a_block_of_packets_are_those_of_each_pair():
+    drawn, seed = PacketDice(2**40 + 7, 6), 2**40 + 7
+    for number in (0, 1, 15, 16, 4097):
+        for to in range(6):
+            for who in range(6):
+                assert drawn(number, to, who) == random.pair_uniform(seed, random.PACKET, 0, number, to, who, 6)
 
 
 # ----------------------------------------------------------------------------------------------- single drones differ
