@@ -178,7 +178,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
         {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
-         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
+         "breaks": "airflock_papers.breaks.fly", "keep": "airflock_papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",

@@ -204,19 +204,15 @@ def replay(
     """
     from airflock.mavlink.keys import read_key
     from airflock.onboard.card import read_card
-    from airflock.onboard.log import replay as again
+    from airflock.onboard.log import read_log
 
     found, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
     ticks, different, notes = 0, [], []
-    try:
-        with open(log, encoding="utf-8") as lines:
-            for tick in again(lines, found, key):
-                ticks += 1
-                notes += [(tick.time, note) for note in tick.out.notes]
-                if not tick.same:
-                    different.append(tick.time)
-    except UnicodeDecodeError as fault:
-        raise CardError([f"{log}: is not a log of a flight on board"]) from fault
+    for tick in read_log(log, found, key):
+        ticks += 1
+        notes += [(tick.time, note) for note in tick.out.notes]
+        if not tick.same:
+            different.append(tick.time)
     if as_json:
         tables.emit_json({"ticks": ticks, "different": different, "notes": notes})
     else:

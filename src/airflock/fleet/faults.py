@@ -1,11 +1,11 @@
 """Faults of a fleet: what goes wrong, for whom, and when; read from TOML, checked at once."""
 
-import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from airflock.errors import ScenarioError, reason
+from airflock.doors import from_outside, read_toml
+from airflock.errors import ScenarioError
 
 KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",
@@ -49,12 +49,8 @@ class Fault:
 
 def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
     """Faults from a TOML file of tables [[fault]]; ScenarioError with one line per mistake."""
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as wrong:
-        raise ScenarioError([f"{path}: {reason(wrong)}"]) from wrong
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as wrong:
-        raise ScenarioError([f"{path}: {wrong}"]) from wrong
+    with from_outside(path):
+        document = read_toml(path)
     found, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]
     tables = document.get("fault", [])
     for number, table in enumerate(tables if isinstance(tables, list) else [tables]):

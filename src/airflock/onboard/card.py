@@ -17,7 +17,8 @@ from airflock.core.agent import State
 from airflock.core.contract import Model
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, reason
+from airflock.doors import from_outside, json_value, read_text
+from airflock.errors import AirflockError, CardError
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
@@ -127,13 +128,8 @@ def write_card(path: Path, document: Mapping[str, Any]) -> Card:
 
 def read_card(path: Path) -> Card:
     """Card from its file; CardError with one line per fault."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise CardError([f"{path}: {reason(fault)}"]) from fault
-    except (ValueError, RecursionError) as fault:
-        raise CardError([f"{path}: is not JSON: {fault}"]) from fault
-    return card_of(document, str(path))
+    with from_outside(path, CardError):
+        return card_of(json_value(read_text(path)), str(path))
 
 
 def card_of(document: Any, where: str = "card") -> Card:

@@ -60,6 +60,8 @@ class Flock:
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body, sense                          : what the body and the sensor remember, by field of their Memory
     goal, departed                       : where its own goal is, and where it started, m
+    speed, heading                       : m/s, and unit vector, of the true state
+    excursion                            : how far it is outside the arena or inside of what stands in it, m
     before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
     errors, chances                      : normal and uniform numbers of the sensors
@@ -87,7 +89,18 @@ class Flock:
         self.sense, self.chances = Columns("sense", take), Columns("chance", take)
         self.packet = Columns("packet", take)
         self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
+        self.heading = axes("head_")
         self._take = take
+
+    @property
+    def speed(self) -> Row:
+        """Speed of each agent, m/s."""
+        return self._take("speed")
+
+    @property
+    def excursion(self) -> Row:
+        """How far each agent is outside, m."""
+        return self._take("excursion_")
 
     @property
     def touches(self) -> Row:
@@ -161,6 +174,10 @@ class Flock:
     def shared(self, owner: str, name: str) -> Row:
         """A column of Shared, that a rule of the whole flock fills: of the "model" or of a metric, by its name."""
         return self._take(f"shared_{owner}_{name}")
+
+    def pair(self, metric: str, name: str) -> Row:
+        """What the pair rule of a metric found, one field of it."""
+        return self._take(f"{metric}_{name}")
 
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""
