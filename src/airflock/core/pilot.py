@@ -206,9 +206,7 @@ class Pilot:
         found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            over = rule.once and (
-                self.silence is not None or packet.came < self.decisions
-            )
+            over = rule.once and (self.silence is not None or packet.came < self.decisions)  # by silence: `counts`
             told = age <= rule.forget and not over
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
