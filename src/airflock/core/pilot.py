@@ -211,7 +211,8 @@ class Pilot:
         found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            told = age <= rule.forget and not (rule.once and packet.came < self.decisions)
+            over = rule.once and (self.silence is not None or packet.came < self.decisions)  # by silence: `counts`
+            told = age <= rule.forget and not over
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
                 found.append(Heard(who, level(state) if self.flat else state, age, group=self.group_of(who)))
