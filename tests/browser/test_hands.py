@@ -196,7 +196,7 @@ def test_a_file_is_opened_and_one_that_is_no_toml_is_told(browser, tab, tmp_path
         until(lambda: "mine.toml" in tab.inner_text("body"), "the page does not name it")
 
         def orange():
-            red, green, blue = np.moveaxis(shot(tab)[:, :640], 2, 0)
+            red, green, blue = np.moveaxis(shot(tab)[160:615, 140:640], 2, 0)
             return places((red > 180) & (green < 160) & (blue < 90))
 
         until(lambda: orange() >= 6, "its obstacles are not seen")
