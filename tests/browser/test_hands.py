@@ -188,7 +188,7 @@ def test_a_file_is_opened_and_one_that_is_no_toml_is_told(browser, tab, tmp_path
         field = tab.locator("input[type=file]")
         flown = player.flight
         field.set_input_files({"name": "story.toml", "mimeType": "text/plain", "buffer": b"Once upon a time"})
-        until(lambda: "story.toml: is no scenario file (TOML)" in tab.inner_text("body"), "the page does not tell")
+        until(lambda: "story.toml: is not a scenario file (TOML)" in tab.inner_text("body"), "the page does not tell")
         assert player.flight is flown and lines and not list(tmp_path.iterdir())
         text = presets()["vasarhelyi_2018/obstacles"].read_bytes()
         field.set_input_files({"name": "mine.toml", "mimeType": "text/plain", "buffer": text})

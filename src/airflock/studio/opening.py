@@ -70,11 +70,11 @@ def scenario_text(name: str, content: bytes) -> str:
         toml(text)
     except UnicodeDecodeError as fault:
         wrong = f"is not text in UTF-8: byte {fault.start} is 0x{content[fault.start]:02x}"
-        raise StudioError(f"{name}: is no scenario file (TOML): {wrong}") from fault
+        raise StudioError(f"{name}: is not a scenario file (TOML): {wrong}") from fault
     except FormatError as fault:
-        raise StudioError(f"{name}: is no scenario file (TOML): {fault}") from fault
+        raise StudioError(f"{name}: is not a scenario file (TOML): {fault}") from fault
     except TextError as fault:
         raise StudioError(f"{name}: {fault}") from fault
     if not name.lower().endswith(".toml"):
-        raise StudioError(f"{name}: is no scenario file; its name must end with .toml")
+        raise StudioError(f"{name}: is not a scenario file; its name must end with .toml")
     return text
