@@ -8,6 +8,7 @@ constants in a kernel.
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
+from math import isfinite
 from typing import Any, NamedTuple
 
 from airflock.errors import ParameterError
@@ -195,7 +196,7 @@ class Parameters:
         for name, declared, _ in declarations(self):
             value = getattr(self, name)
             if isinstance(declared, Quantity):
-                if isinstance(value, int) and not isinstance(value, bool):
+                if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023:
                     value = float(value)
                     object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
                 fault = quantity_fault(value, declared)
@@ -204,9 +205,9 @@ class Parameters:
             elif isinstance(declared, Text):
                 fault = "" if isinstance(value, str) else f"= {value!r} is no text"
             else:
-                value = _frozen(value)
-                object.__setattr__(self, name, value)
-                fault = ""
+                fault = points_fault(value, declared)
+                if not fault:
+                    object.__setattr__(self, name, _frozen(value))
             if fault:
                 faults.append(f"{type(self).__name__}.{name} {fault}")
         if faults:
@@ -229,7 +230,27 @@ def choice_fault(value: Any, declared: Choice) -> str:
     return "" if value in declared.options else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
+def points_fault(value: Any, declared: Points) -> str:
+    """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
+    try:
+        sound = _are_points(_frozen(value), declared.depth, declared.axes)
+    except (TypeError, ValueError, OverflowError):
+        sound = False
+    what = f"{'polygons, each a list of ' if declared.depth == 3 else ''}points of {declared.axes} finite numbers"
+    return "" if sound else f"is not a list of {what}"
+
+
+def _are_points(value: Any, depth: int, axes: int) -> bool:
+    if not isinstance(value, tuple):
+        return False
+    if depth > 1:
+        return all(_are_points(entry, depth - 1, axes) for entry in value)
+    return len(value) == axes and all(isinstance(number, float) and isfinite(number) for number in value)
+
+
 def _frozen(value: Any) -> Any:
+    if isinstance(value, (str, bool)):
+        raise TypeError(f"{value!r} is not a number")
     return tuple(_frozen(v) for v in value) if isinstance(value, (list, tuple)) else float(value)
 
 
