@@ -106,7 +106,8 @@ def of_tuning(folder):
 
     told = read_toml(folder / "certificate.toml")
     names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")
-    return rows(folder / "study"), [(folder / name).read_text() for name in names], told["limit"], told["flights"]
+    texts = [(folder / name).read_text().replace(str(folder), "FOLDER") for name in names]
+    return rows(folder / "study"), texts, told["limit"], told["flights"]
 
 
 def tracks(folder):
