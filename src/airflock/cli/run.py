@@ -46,6 +46,7 @@ def run(
         tables.say(f"note: {note}")
     numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     device = picked(flights, device, precision=precision, say=tables.say)
+    options.tell_time(flights, threads, device)
     options.compile_aloud(found, precision, device)
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
         rows = score_flights(flights, numbers, threads=threads, precision=precision, done=done, device=device)
