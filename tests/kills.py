@@ -21,10 +21,10 @@ from pathlib import Path
 import toys
 from airflock import atomic
 from airflock.evolve.after import conclude
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import STUDY, open_folder, sweep, versions
 from airflock.evolve.search import search
 from airflock.evolve.store import FILE, Store
+from airflock.executors.here import Here
 
 RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"
@@ -219,8 +219,8 @@ def workers(folder, kills, seed):
 
     import distributed
 
-    from airflock.evolve.executors.cluster import Cluster
     from airflock.evolve.run import run
+    from airflock.executors.cluster import Cluster
 
     best, space = dict(toys.BEST), toys.SPACE
 

@@ -180,8 +180,8 @@ def _certificate(target):
 
 
 def _store(target):
-    from airflock.evolve.executors import Flight, Landed
     from airflock.evolve.store import Batch, Store
+    from airflock.executors import Flight, Landed
 
     target.mkdir()
     with Store(target) as store:
