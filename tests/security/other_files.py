@@ -28,7 +28,7 @@ FOREIGN = ("table", "array", "arrays", "parquet", "ulog", "dataflash", "tracking
 def sound():
     """Bytes of a sound file of each kind, by kind, with the ending of its name."""
     found = {
-        "card": (".json", _card()),
+        "card": (".json", sound_card()),
         "certificate": (".toml", _certificate()),
         "faults": (".toml", b'[[fault]]\nkind = "outage"\nwho = [1]\nbegin = 1.0\nend = 2.0\n'),
         "geojson": (".geojson", json.dumps(_field()).encode()),
@@ -42,7 +42,8 @@ def sound():
     return found | _tracks()
 
 
-def _card():
+def sound_card():
+    """Bytes of a flight card."""
     from airflock.fleet.prepare import card_document
     from airflock.onboard.card import hash_of
     from airflock.scenarios.files import load
@@ -116,7 +117,7 @@ def _log():
 def _made_card():
     from airflock.onboard.card import card_of
 
-    return card_of(json.loads(_card()))
+    return card_of(json.loads(sound_card()))
 
 
 def _steps():
