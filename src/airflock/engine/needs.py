@@ -24,7 +24,7 @@ SHARE = 0.9  # of the free memory that one flight may take
 ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the laws here keep 20 to 60
 LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
 # s of one core (2 cores of 2025, single precision). Of the shipped presets none takes more than twice what is told, and
-# none less than a fifth (benchmarks/RESULTS.md, "Seconds beforehand").
+# none less than a fifth (benchmarks/RESULTS-trust.md).
 PAIR = 7e-10  # for one look at one other agent
 STEP = 4e-9  # for one motion step of one agent
 SIGHT = 2e-6  # for one look of one agent among a hundred buildings
