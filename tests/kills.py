@@ -254,7 +254,7 @@ def workers(folder, kills, seed):
             thread = threading.Thread(target=killer)
             place = folder / f"there{studies}"
             open_folder(place, study, resume=False)
-            executor = Cluster(study, cluster.scheduler_address, task=task)
+            executor = Cluster([task], cluster.scheduler_address)
             thread.start()
             try:
                 run(study, place, executor)

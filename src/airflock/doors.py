@@ -116,6 +116,17 @@ def toml(text: str) -> dict[str, Any]:
     return document
 
 
+def toml_value(text: str) -> Any:
+    """A value as TOML writes it, or the text itself where it is none; raises TextError where it is more than one."""
+    try:
+        document = toml(f"value = {text}")
+    except FormatError:
+        return text.strip()
+    if list(document) != ["value"]:
+        raise TextError("holds more than one value; give each key one of its own")
+    return document["value"]
+
+
 def json_object(text: Any) -> dict[str, Any]:
     """A JSON text as a dict; raises FormatError where it is none and TextError where it is beyond bounds."""
     found = json_value(text)

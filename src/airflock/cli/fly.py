@@ -133,7 +133,8 @@ def prepare(
     for name, _, share in loads:
         tables.say(f"{name} radio: {share:.0%} of its time, by an estimate from its bit rate")
     for guard in made.autopilot.guards:
-        tables.say(f"set {guard.name} within [{guard.low:g}, {guard.high:g}]: {guard.why}")
+        safe = "to the own system id" if guard.own else f"within [{guard.low:g}, {guard.high:g}]"
+        tables.say(f"set {guard.name} {safe}: {guard.why}")
 
 
 def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[tuple[str, str, float]]:

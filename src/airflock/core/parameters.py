@@ -29,6 +29,7 @@ class Quantity(NamedTuple):
     source: str
     optional: bool  # None is allowed and means "derived from the rest of the scenario"
     whole: bool = False  # only whole numbers make sense
+    usual: tuple[float, float] | None = None  # span that a slider shows; None: around the value
 
     @property
     def span(self) -> str:
@@ -65,8 +66,9 @@ Declaration = Quantity | Choice | Points | Text
 
 
 def quantity(
-    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False
-) -> Any:
+    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False,
+    usual: tuple[float, float] | None = None,
+) -> Any:  # fmt: skip
     """Declare a number of a record of parameters.
 
     Parameters
@@ -83,6 +85,9 @@ def quantity(
         Where the default comes from.
     whole : bool
         Only whole numbers make sense; searches take no others.
+    usual : (float, float), optional
+        The span in which it is usually set, inside the allowed range: the ends of its slider on a live page. Without
+        it a slider takes the bounds of a study of the same law, or else reaches from 0 to 4 times the value.
 
     Returns
     -------
@@ -102,7 +107,9 @@ def quantity(
     Traceback (most recent call last):
     airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
     """
-    record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole)
+    if usual is not None and not low <= usual[0] < usual[1] <= high:
+        raise ParameterError(f"usual = {usual} is no span inside [{low:g}, {high:g}] ({meaning})")
+    record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole, usual)
     return field(default=default, metadata={"airflock": record})
 
 

@@ -14,6 +14,8 @@ KINDS = {
     "jitter": "packets to these drones are late by up to `amount` s more",
     "duplicate": "packets to these drones arrive twice with probability `amount`",
     "corrupt": "packets to these drones arrive with a wrong bit with probability `amount`",
+    "rogue": "somebody without the key sends packets as these drones, `amount` m east of them",
+    "impostor": "somebody with the key sends packets as these drones, `amount` m east of them",
     "node": "the node is dead: it hears and says nothing",
     "motor": "the motors are off: the vehicle falls",
     "gnss": "the position that the autopilot tells is frozen",
@@ -23,7 +25,7 @@ KINDS = {
 }
 AMOUNTS = {
     "loss": (0.0, 1.0), "duplicate": (0.0, 1.0), "corrupt": (0.0, 1.0), "jitter": (0.0, 30.0), "battery": (0.0, 100.0),
-    "clock": (-3600.0, 3600.0),
+    "clock": (-3600.0, 3600.0), "rogue": (-1e4, 1e4), "impostor": (-1e4, 1e4),
 }  # fmt: skip
 
 
