@@ -11,7 +11,7 @@ from airflock.core.fault import Fault
 from airflock.core.parameters import declarations
 from airflock.core.sensor import Sensor
 from airflock.doors import is_file
-from airflock.errors import AirflockError, ScenarioError
+from airflock.errors import AirflockError, ParameterError, ScenarioError
 from airflock.scenarios import (
     checks,
     faulty,
@@ -107,12 +107,22 @@ def make(
         name=where, model=found, vehicle=vehicle, sensor=sensor, measures=measures, published=published,
         document=merged, **parts, **single,
     )  # fmt: skip
-    faults = places.place_faults(scenario)
+    faults = _derived_faults(scenario) or places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     notes = (*notes, *left_out, *told, *converted, *told_of, *_notes(scenario), *advice(scenario))
     notes = (*notes, *places.place_notes(scenario))
     return replace(scenario, notes=notes)
+
+
+def _derived_faults(scenario: Scenario) -> list[str]:
+    """Numbers that follow from the scenario and lie outside their ranges: what loads can fly."""
+    try:
+        scenario.measured_by()
+    except ParameterError as fault:
+        told = [f"metrics.{line.partition('.')[2]}" for line in str(fault).splitlines()]
+        return [f"{line}; it follows from the other keys unless it is given" for line in told]
+    return []
 
 
 def _individuals(
