@@ -41,23 +41,27 @@ AWAY = real(1e9)
 """
 
 
-MADE: dict[str, Callable[[Builder], None]] = {  # by name, what makes the function of a stage
-    "aim_": scene.aim,
-    "glide_": scene.glide,
-    "appear_": scene.appear,
+MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of each stage; rows are numbered in this order
+    "snapshot": perceive.snapshot,
     "perceive": perceive.perceive,
     "tune": perceive.tune,
+    "receive": perceive.receive,
+    "meet": perceive.meet,
     "neighbours": decide.neighbours,
-    "rearrange": slots.rearrange,
     "boundaries": decide.boundaries,
     "flock": flock.flock,
     "decide": decide.decide,
     "stop": decide.stop,
     "overrule": decide.overrule,
-    "measure_collision": partial(measure.measure, clock="collision"),
-    "measure_sample": partial(measure.measure, clock="sample"),
     "move": move.move,
+    "measure_sample": partial(measure.measure, clock="sample"),
+    "measure_collision": partial(measure.measure, clock="collision"),
+    "aim_": scene.aim,
+    "glide_": scene.glide,
+    "appear_": scene.appear,
+    "rearrange": slots.rearrange,
 }
+CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
 
 # Loops over agents take 32 at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
@@ -106,14 +110,11 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
 
 
 def make(build: Builder) -> None:
-    """Functions of all stages that a plan has, in the order of a step; before them what `neighbours` calls."""
-    perceive.snapshot(build)
-    perceive.receive(build)
-    perceive.meet(build)
-    for event in order(build.plan).values():
-        for name in event:
-            if name != "snapshot":
-                MADE[name](build)
+    """Functions of all stages that a plan has."""
+    due = {*CALLED, *(stage for event in order(build.plan).values() for stage in event)}
+    for name, one in MADE.items():
+        if name in due:
+            one(build)
 
 
 def _agents(build: Builder) -> list[str]:
