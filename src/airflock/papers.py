@@ -1,12 +1,11 @@
 """The door to the papers, which are a distribution of their own: airflock-papers."""
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import Any
 
 from airflock.errors import AirflockError
 
-if TYPE_CHECKING:
-    import airflock_papers.claims
-    import airflock_papers.paper
+PACKAGE = "airflock_papers"  # looked for when it is asked for: Airflock flies without it
 
 
 def paper(
@@ -16,7 +15,7 @@ def paper(
     quick: bool = False,
     seeds: int | None = None,
     threads: int | None = None,
-) -> "list[airflock_papers.claims.Claim]":
+) -> list[Any]:
     """Recompute a paper's numbers and compare them with what it prints.
 
     Needs `pip install airflock-papers`, or in a clone of the repository `pip install -e ./papers`.
@@ -36,7 +35,7 @@ def paper(
 
     Returns
     -------
-    list of Claim
+    list of airflock_papers.claims.Claim
         Each with the printed number, ours, and the verdict.
 
     Raises
@@ -51,24 +50,23 @@ def paper(
     Traceback (most recent call last):
     airflock.errors.AirflockError: vasarhely_2018: unknown paper; did you mean vasarhelyi_2018?
     """
-    return find(name).run(only=only, quick=quick, seeds=seeds, threads=threads)
+    found: list[Any] = find(name).run(only=only, quick=quick, seeds=seeds, threads=threads)
+    return found
 
 
-def find(name: str) -> "airflock_papers.paper.Paper":
+def find(name: str) -> Any:
     """The publication of this name.
 
     Raises AirflockError if airflock-papers is not installed, or there is no such paper.
     """
     installed()
-    from airflock_papers import catalogue
-
-    return catalogue.find(name)
+    return import_module(f"{PACKAGE}.catalogue").find(name)
 
 
 def installed() -> None:
     """Raise AirflockError, with what to install, unless airflock-papers is there."""
     try:
-        import airflock_papers  # noqa: F401
+        import_module(PACKAGE)
     except ModuleNotFoundError as fault:
         raise AirflockError(
             "papers need airflock-papers: pip install airflock-papers (in a clone of Airflock: pip install -e ./papers)"

@@ -264,7 +264,8 @@ def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
     away = own._replace(x=1.5, y=-2.0)
     assert one.decide(away, 4.05).command == pytest.approx((-0.75, 1.0, 0.0)), "back to where it stopped"
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
-    assert math.hypot(*one.decide(own, 4.2).command[:2]) > 1.0
+    assert one.decide(away, 4.2).command == pytest.approx((-0.75, 1.0, 0.0)), "it stands for a second more"
+    assert math.hypot(*one.decide(own, 5.1).command[:2]) > 1.0
     assert one.steer(own, 9.0) == (0.0, 0.0, 0.0)
     one.forget(1)
     assert not one.lost_near(own, 9.0)

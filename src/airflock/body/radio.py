@@ -16,7 +16,9 @@ FIG8 = "our choice in the spirit of Fig. 8"
 class Parameters(Record):
     """Status packets between agents: constant delay and range, optional loss, or two unreliable links."""
 
-    delay: float = quantity(1.0, "s", low=0.0, high=30.0, source=S5, meaning="age of neighbours' data on arrival")
+    delay: float = quantity(
+        1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
+    )
     range: float = quantity(80.0, "m", low=0.0, high=1e8, source=S5, meaning="largest distance of communication")
     loss: float = quantity(
         0.0,

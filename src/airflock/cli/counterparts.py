@@ -171,6 +171,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **{name: LOADED[name] for name in SETTINGS}, "trust": "airflock.load", **TABLE,
             **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
             "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
+            "body": "airflock.load", **dict.fromkeys(("mode", "join"), "airflock.fleet.realtime.fly"),
         },
     ),
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),

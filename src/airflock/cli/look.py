@@ -126,10 +126,18 @@ def replay(
     """
     options.writable((page, PAGES))
     from airflock.plots.picture import flight_of
+    from airflock.replays import check_colour
     from airflock.replays import replay as make_replay
+    from airflock.scenarios.files import load
 
+    settings = options.settings(changes, agents, duration)
     with options.compiling_told():
-        recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
+        if what.lower().endswith(".nc"):
+            recording = flight_of(what, seed, settings, law, trust=trust)
+        else:
+            scenario = load(what, settings, law, trust=trust)
+            check_colour(scenario, colour)
+            recording = flight_of(scenario, seed)
     made = make_replay(recording, rate=rate, colour=colour)
     made.save(page)
     tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

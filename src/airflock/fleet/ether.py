@@ -10,8 +10,10 @@ import random as dice
 from collections.abc import Callable, Iterator, Sequence
 
 from airflock.body import radio
-from airflock.core import random
+from airflock.fleet.dice import PacketDice
 from airflock.fleet.faults import Fault
+from airflock.fleet.rogue import forged
+from airflock.mavlink.coordinates import Site
 
 SLACK = 1e-6  # s
 Vector = tuple[float, float, float]
@@ -21,15 +23,17 @@ class Ether:
     """Datagrams between the members of a fleet.
 
     k : parameters of the radio; members: system ids; period: s between two packets of a drone
+    site : of the flight, by which forged packets tell places
     reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
         self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
-        reach: Callable[[int, int, float], float] | None = None,
+        reach: Callable[[int, int, float], float] | None = None, site: Site | None = None,
     ):  # fmt: skip
-        self._k, self._members, self._seed, self._period, self._faults = k, list(members), seed, period, faults
-        self._reach = reach
+        self._k, self._members, self._period, self._faults = k, list(members), period, faults
+        self._site = site
+        self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
@@ -40,6 +44,11 @@ class Ether:
         for to in range(len(self._members)):
             if to != who:
                 self._push(now + self._k.delay + self._late(to, now), who, to, datagram)
+        for f in self._faults:
+            if f.kind in ("rogue", "impostor") and f.holds(self._members[who], now) and self._site is not None:
+                false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
+                for to in range(len(self._members)):
+                    self._push(now + self._k.delay, who, to, false)
 
     def _push(self, due: float, who: int, to: int, datagram: bytes) -> None:
         heapq.heappush(self._queue, (round(due, 6), self._count, who, to, datagram))
@@ -53,7 +62,7 @@ class Ether:
 
     def deliver(self, now: float, at: Sequence[Vector]) -> Iterator[tuple[int, bytes]]:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
-        number = round(now / self._period)
+        number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + SLACK:
             _, _, who, to, datagram = heapq.heappop(self._queue)
             self.sent += 1
@@ -67,14 +76,14 @@ class Ether:
     def _passes(self, now: float, number: int, who: int, to: int, distance: float) -> bool:
         """Whether a packet over this distance (m) gets through."""
         k = self._k
-        if distance > k.range or self._cut(now, who, to):
+        if distance > k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
-        if self._reach is not None and distance > self._reach(who, to, now):
+        if self._faults and (
+            self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
+        ):
             return False
-        if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
-            return False
-        u = random.pair_uniform(self._seed, random.PACKET, 0, number, to, who, len(self._members))
-        return bool(u >= radio.unheard(distance, number, self._period, k))
+        missed = radio.unheard(distance, number, self._period, k)
+        return bool(missed <= 0.0 or self._drawn(number, to, who) >= missed)
 
     def _cut(self, now: float, who: int, to: int) -> bool:
         if self._of("outage", who, now) or self._of("outage", to, now):
