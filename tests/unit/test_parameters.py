@@ -81,3 +81,11 @@ def test_a_plain_number_is_told_without_its_unit():
     assert quantity_fault(2.0, length) == "= 2 m lies outside [0, 1] m"
     with pytest.raises(ScenarioError, match=r"agents = 0 lies outside \[1, 1e\+07\]$"):
         load("vasarhelyi_2018/4ms", {"agents": 0})
+
+
+def test_declared_parameters_of_a_class_that_is_no_dataclass_are_not_lost():
+    class Bare(Parameters):
+        speed: float = quantity(4.0, "m/s", low=0.0, high=10.0, meaning="speed")
+
+    with pytest.raises(ParameterError, match=r"^Bare declares speed, but is not a dataclass; write @dataclass"):
+        list(declarations(Bare))

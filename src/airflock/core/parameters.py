@@ -162,6 +162,10 @@ def declarations(record: Any) -> Iterator[tuple[str, Declaration, Any]]:
 
 @cache
 def _declarations(kind: type) -> tuple[tuple[str, Declaration, Any], ...]:
+    left = [name for name, value in vars(kind).items() if isinstance(value, Field)]
+    if left:
+        where = "@dataclass(frozen=True, kw_only=True) above the class"
+        raise ParameterError(f"{kind.__name__} declares {', '.join(left)}, but is not a dataclass; write {where}")
     return tuple(
         (item.name, _declared(item), None if item.default is MISSING else item.default) for item in fields(kind)
     )
