@@ -256,6 +256,13 @@ def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
         assert bool(one.heard(1.4)) is known and not one.heard(1.6)
 
 
+def test_who_is_lost_when_its_packet_comes_is_not_heard():
+    """A patience shorter than the delay: the simulator hears nobody then, and so does its pilot."""
+    one = pilot(silence=Silence(rule="stop", patience=0.3), hearing=Hearing.simulated(links=False))
+    one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.35)
+    assert not one.heard(0.35) and one.heard(0.25)
+
+
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
     one, own = pilot(silence=Silence(rule="stop", patience=2.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)

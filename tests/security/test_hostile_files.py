@@ -48,6 +48,8 @@ def packed(tmp_path):
         (tmp_path / f"{section}.toml").write_text(text)
     text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
     (tmp_path / "faults.toml").write_text(text)
+    text = 'extends = "vasarhelyi_2018/4ms"\n[[groups]]\nagents = 2\nmodel = { kind = "evil.py" }\n'
+    (tmp_path / "groups.toml").write_text(text)
     (tmp_path / "extended.toml").write_text('extends = "evil.toml"\nagents = 4\n')
     version = f'[flown]\nairflock = "{airflock.__version__}"\nprecision = 32\ndevice = "cpu"\nrules = "0"\n'
     text = 'seal = ""\nformat = 1\nconfidence = 0.95\nlimit = []\n[flights]\ncount = 1\nlooks = ""\nuncertain = false\n'
@@ -141,6 +143,7 @@ WAYS = {
     ),
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
     "sensor of a scenario": (python('airflock.load("sensors.toml")'), CONSENT),
+    "law of a group": (python('airflock.load("groups.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),
     "fault of an event": (

@@ -93,6 +93,10 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
         return "silence.rule = 'stop' flies on device = cpu or python"
     if plan.topology is not None:
         return f"topology.kind = {plan.topology.name!r} flies on device = cpu or python"
+    if plan.laws:
+        return "groups with laws of their own fly on device = cpu or python"
+    if plan.grouped:
+        return "rules that ask for groups fly on device = cpu or python"
     if plan.varied:
         return "numbers that differ among agents fly on device = cpu or python"
     if agents <= MOST_TOGETHER:

@@ -101,7 +101,7 @@ def time_note(scenarios: Sequence[Scenario], threads: int) -> str:
 def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     """Bytes that a flight of so many agents takes, about."""
     times, real, width, states = clock(scenario), plan.bits // 8, lanes(agents), 2 * plan.dimensions
-    kept = len(getattr(plan.model.Memory, "_fields", ()))
+    kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     past = times["ring"] * states if plan.noisy or plan.delayed else 0
     numbers = (ROWS + kept + past) * width + (agents * (states + 1) * width if plan.packets else 0)

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from airflock.body.registry import BODIES
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import declarations
@@ -17,6 +18,7 @@ from airflock.scenarios import (
     faulty,
     formats,
     geometry,
+    group_laws,
     groups,
     places,
     schema,
@@ -30,9 +32,11 @@ from airflock.scenarios.ground import file_faults
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+FAMILIES: Mapping[str, Mapping[str, Any]] = {"body": BODIES, "sensors": SENSORS}
 KINDS = {"body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",))}  # usual kind; keys of every kind
 
 
@@ -47,6 +51,7 @@ def make(
     vehicle: Body | None = None,
     sensor: Sensor | None = None,
     kinds: Mapping[str, Fault] | None = None,
+    laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
@@ -54,7 +59,7 @@ def make(
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle, sensor : a model, a metric set, a body, a sensor given directly, not by name
-    kinds : kinds of fault given directly, by name
+    kinds : kinds of fault given directly, by name; laws : laws that groups may name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
@@ -95,7 +100,7 @@ def make(
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, sensor, measures)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
-    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
+    single, told_of, more = _individuals(merged, parts, found, (vehicle, sensor), folder, kinds, laws, trust)
     faults += more
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -124,16 +129,26 @@ def _derived_faults(scenario: Scenario) -> list[str]:
 
 
 def _individuals(
-    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, vehicle: Body, folder: Path | None,
-    kinds: Mapping[str, Fault] | None, trust: bool,
+    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, carried: tuple[Body, Sensor],
+    folder: Path | None, kinds: Mapping[str, Fault] | None, laws: Mapping[str, Model] | None, trust: bool,
 ) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
     """Groups and faults of a scenario, notes, and what is wrong with them."""
     if not {"groups", "faults"} & set(merged) or parts["flight"] is None:
         return {}, [], []
     count, flight = int(parts["flight"].agents), parts["flight"]
-    records = {"body": vehicle.Parameters} | ({"model": found.Parameters} if found else {})
-    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records)
+    vehicle, sensor = carried
+    records = {"body": vehicle.Parameters, "sensors": sensor.Parameters} | (
+        {"model": found.Parameters} if found else {}
+    )
+    named = None
+    if found is not None and parts.get("parameters") is not None:
+        kind, world = merged.get("model", {}).get("kind"), parts["world"]
+        walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
+        named = group_laws.Laws(found, kind, parts["parameters"], laws or {}, folder, trust, walls)
+    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records, named)
     faults += groups.group_faults(flocks, found)
+    if found is not None and not faults:
+        faults += group_laws.misfits(flocks, parts, found, vehicle, sensor)
     sequential = flight.update == "sequential"
     made, told, more = faulty.entries(
         merged.get("faults", ()), count, flocks, sequential, folder, own=kinds, trust=trust
@@ -207,7 +222,8 @@ def _parts(
         given = merged.get(section, {})
         if section in KINDS and isinstance(given, Mapping):
             given = {key: value for key, value in given.items() if key != "kind"}
-        parts[section], more = schema.check(section, given, record)
+        kinds = {name: member.Parameters for name, member in FAMILIES.get(section, {}).items()}
+        parts[section], more = schema.check(section, given, record, kinds=kinds)
         faults += more
     top: dict[str, Any] = {key: merged[key] for key in ("agents", "duration", "dt", "update") if key in merged}
     parts["flight"], more = schema.check("", top, Flight)
