@@ -4,6 +4,7 @@ import errno
 import json
 import math
 import sys
+from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
@@ -384,11 +385,12 @@ def test_a_full_disk_leaves_the_old_picture_and_nothing_new(tmp_path, monkeypatc
     figure, path = transfer(), tmp_path / "a.png"
     path.write_bytes(b"old")
 
-    def full(target, **_):
-        target.write_bytes(b"half")
+    def full(target, _):
+        with target.open("wb") as file:
+            file.write(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(figure, "savefig", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(PictureError, match="No space left on device; nothing was saved"):
         save_figure(figure, path)
     assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]
