@@ -15,6 +15,7 @@ import pytest
 
 from airflock.core import random
 from airflock.core.agent import State
+from airflock.core.radio import lost
 from airflock.errors import ScenarioError
 from airflock.fleet import compare
 from airflock.fleet.dice import OuterNoise
@@ -31,6 +32,8 @@ from airflock.onboard.log import replay
 from airflock.onboard.mission import Phase
 from airflock.onboard.ports import open_port
 from airflock.onboard.run import fly as fly_node
+from airflock.radios import links
+from airflock.radios.registry import RADIOS
 from airflock.recordings.scores import measure
 from fleets import card, fleet, scenario
 
@@ -104,19 +107,17 @@ def test_the_same_seed_gives_the_same_bits_in_two_processes():
 @pytest.mark.parametrize("kind", ["constant", "links"])
 def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
     """Counted by arrivals: the share that a radio of the simulator lets through at this distance."""
-    from airflock.body import radio
-
-    k = radio.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
-    ether = Ether(k, [1, 2], 3, 0.2)
+    k = links.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
+    ether = Ether(RADIOS[kind], k, [1, 2], 3, 0.2)
     at, count = [(0.0, 0.0, 0.0), (70.0, 0.0, 0.0)], 4000
     heard = 0
     for step in range(count):
         ether.send(0.2 * step, 0, b"x")
         heard += len(list(ether.deliver(0.2 * step + 0.2, at)))
     if kind == "constant":
-        share = 1.0 - radio.lost(70.0, k)
+        share = 1.0 - lost(70.0, k)
     else:
-        fast, slow = (radio.received(70.0, float(link), k) for link in (0, 1))
+        fast, slow = (links.received(70.0, float(link), k) for link in (0, 1))
         share = 1.0 - (1.0 - fast) ** 2 * (0.8 + 0.2 * (1.0 - slow))  # the slow link sends in each fifth period
     assert heard / count == pytest.approx(share, abs=0.03)
 

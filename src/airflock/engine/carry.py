@@ -24,7 +24,8 @@ def carry(old: State, new: State, step: int) -> None:
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.packets and new.plan.packets:
-        new.arrays["store"][...] = old.arrays["store"][:, lanes[: old.agents]][..., lanes]
+        kept = None if old.plan.radio == new.plan.radio else 2 * new.plan.dimensions + 1  # another radio begins anew
+        new.arrays["store"][:kept] = old.arrays["store"][:kept, lanes[: old.agents]][..., lanes]
     if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
         new.arrays["mem"][...] = old.arrays["mem"][:, lanes]
     _remembered(old, new, lanes)

@@ -1,7 +1,7 @@
 """Needs: how much memory a flight takes on this machine, judged before it is compiled and flown.
 
 What grows with the flock is counted: rows of numbers, past states that a delay asks for, a packet of each pair where
-radio links lose some, the grid, and the frames of a recording.
+the radio keeps them, the grid, and the frames of a recording.
 """
 
 import os
@@ -46,7 +46,7 @@ def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     kept = len(getattr(plan.model.Memory, "_fields", ()))
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     past = times["ring"] * states if plan.noisy or plan.delayed else 0
-    numbers = (ROWS + kept + past) * width + (agents * (states + 1) * width if plan.packets else 0)
+    numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
     cells = 8 * grid.CHUNKS * (grid.CELLS * agents + grid.SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)
 

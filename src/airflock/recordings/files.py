@@ -14,6 +14,7 @@ from airflock.doors import from_outside
 from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
 from airflock.metrics.registry import SETS
+from airflock.radios.registry import RADIOS
 from airflock.recordings import attributes
 from airflock.recordings.flights import processor, provenance, simulate
 from airflock.recordings.layout import check
@@ -134,7 +135,7 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
             f"recording: was flown with a law of its own, {name!r}, which is not in the file; give it with "
             "--law FILE.py (in Python: law=...)"
         )
-    for section, known in (("body", BODIES), ("sensors", SENSORS), ("metrics", SETS)):
+    for section, known in (("body", BODIES), ("sensors", SENSORS), ("radio", RADIOS), ("metrics", SETS)):
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:
             raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")

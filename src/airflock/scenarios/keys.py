@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 
 from airflock.body.registry import BODIES
 from airflock.core import fault
-from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
+from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, number_names, with_unit
+from airflock.core.radio import Packets
 from airflock.errors import ScenarioError
+from airflock.radios.registry import RADIOS
 from airflock.scenarios import groups
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -21,7 +23,7 @@ class Key(NamedTuple):
     """One key of a scenario file.
 
     name    : as it is written after --set, for instance "radio.delay"
-    of      : the model, body or sensor that the key belongs to; "" where it is always there
+    of      : the model, body, sensor or radio that the key belongs to; "" where it is always there
     kind    : "number", "choice", "points" or "text"
     default : None means "derived from the rest of the scenario"
     unit    : SI unit; "1" for a plain number, "" for what has none
@@ -56,13 +58,12 @@ class Key(NamedTuple):
 
 
 def records() -> dict[str, type]:
-    """Section → record of its parameters: the top, every model, body and sensor by its name, and the other
-    sections.
-    """
+    """Section → record of its parameters: the top, every model, body, sensor and radio by its name, other sections."""
     result: dict[str, type] = {TOP: Flight}
     result |= {name: find_model(name).Parameters for name in MODELS}
     result |= {name: body.Parameters for name, body in BODIES.items()}
     result |= {name: sensor.Parameters for name, sensor in SENSORS.items()}
+    result |= {name: radio.Parameters for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
     return result | {name: record for name, record in SECTIONS.items() if name not in ("body", "sensors")}
 
 
@@ -102,7 +103,7 @@ def keys(section: str | None = None) -> list[Key]:
     ['model.r', 'model.eta']
     """
     known = records()
-    every = [key for name, record in known.items() for key in _of(name, record)]
+    every = [key for name, record in known.items() for key in _of(name, record) if not _of_all(key, name)]
     if section is None:
         return every
     if section in known:
@@ -119,9 +120,15 @@ def keys(section: str | None = None) -> list[Key]:
     return found
 
 
+def _of_all(key: Key, section: str) -> bool:
+    """Whether a key of a kind of radio is one that all radios have, which the section tells already."""
+    return section in RADIOS and key.name.partition(".")[2] in number_names(Packets)
+
+
 def _of(section: str, record: type) -> Sequence[Key]:
     """Keys of one record."""
     owners = {**dict.fromkeys(MODELS, "model"), **dict.fromkeys(BODIES, "body"), **dict.fromkeys(SENSORS, "sensors")}
+    owners |= dict.fromkeys(RADIOS, "radio")
     before = "" if section == TOP else owners.get(section, section)
     owner = section if section in owners else ""
     found = []
