@@ -10,12 +10,12 @@ import time
 from pathlib import Path
 
 from airflock.engine.simulate import score_flight, score_flights
-from airflock.evolve.executors.here import Here
 from airflock.evolve.run import executor_for
 from airflock.evolve.search import search
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import load_study
+from airflock.executors.here import Here
 
 NAME = "vasarhelyi_2018/6ms"
 

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import toys
 from airflock.evolve.after import conclude
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import STUDY, open_folder, sweep, versions
 from airflock.evolve.search import search
 from airflock.evolve.store import FILE, Store
+from airflock.executors.here import Here
 
 RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"

@@ -11,17 +11,18 @@ import pytest
 
 import toys
 from airflock.certify.campaign import FOLDER, Campaign
-from airflock.certify.flights import Task as CertifyTask
-from airflock.certify.flights import measured, score_of
+from airflock.certify.flights import CampaignTask, measured, score_of
 from airflock.certify.limits import read_all
 from airflock.certify.run import run as certified
-from airflock.errors import StudyError
-from airflock.evolve.executors import Flight
-from airflock.evolve.executors.cluster import Cluster, Task
-from airflock.evolve.executors.here import Here
+from airflock.errors import FlightError, StudyError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import run
 from airflock.evolve.store import Store
+from airflock.evolve.task import tasks_of
+from airflock.executors import Flight
+from airflock.executors.cluster import Cluster
+from airflock.executors.here import Here
+from airflock.executors.scores import scores
 from airflock.scenarios.files import load
 from needed import needed
 
@@ -92,7 +93,7 @@ def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
 
     thread = threading.Thread(target=killer)
     open_folder(tmp_path / "there", study, resume=False)
-    executor = Cluster(study, doomed.scheduler_address, task=toy_task(0.03))
+    executor = Cluster([toy_task(0.03)], doomed.scheduler_address)
     thread.start()
     try:
         found = run(study, tmp_path / "there", executor)
@@ -111,7 +112,7 @@ def test_flights_that_never_end_are_recorded_as_failed(doomed):
         clock.sleep(9.0 if parameters["model.r0_rep"] > 50.0 else 0.0)
         return {"fitness": 1.0}, "", 0.0, "worker"
 
-    executor = Cluster(toys.study(), doomed.scheduler_address, timeout=2.0, task=task)
+    executor = Cluster([task], doomed.scheduler_address, timeout=2.0)
     flights = [Flight(i, 0, {"model.r0_rep": r}, i) for i, r in enumerate((20.0, 60.0, 30.0))]
     landed = {x.flight.candidate: x for x in executor.fly(flights)}
     executor.close()
@@ -121,16 +122,16 @@ def test_flights_that_never_end_are_recorded_as_failed(doomed):
 
 def test_schedulers_without_workers_are_one_line():
     with local(0) as empty, pytest.raises(StudyError, match="has no workers"):
-        Cluster(toys.study(), empty.scheduler_address, answer=0.3)
+        Cluster(tasks_of(toys.study()), empty.scheduler_address, answer=0.3)
 
 
 def test_schedulers_that_do_not_answer_are_one_line():
     with pytest.raises(StudyError, match="--scheduler tcp://127.0.0.1:9: does not answer"):
-        Cluster(toys.study(), "tcp://127.0.0.1:9", answer=0.3)
+        Cluster(tasks_of(toys.study()), "tcp://127.0.0.1:9", answer=0.3)
 
 
 def test_workers_with_different_processors_are_named(cluster, monkeypatch):
-    executor = Cluster(toys.study(), cluster.scheduler_address)
+    executor = Cluster(tasks_of(toys.study()), cluster.scheduler_address)
     monkeypatch.setattr(executor.client, "run", lambda _: {"a": "Epyc", "b": "Xeon"})
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
@@ -146,7 +147,7 @@ def test_a_task_flies_the_same_flight_as_this_process():
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
     parameters = study.space.parameters([0.5] * 11)
-    values, reason, _, _ = Task.of(study)(parameters, 5)
+    values, reason, _, _ = tasks_of(study)[0](parameters, 5)
     assert not reason and values == score_flight(with_parameters(study.scenario, parameters), 5)
 
 
@@ -165,7 +166,7 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
     open_folder(tmp_path / "here", campaign, resume=False, kind=FOLDER)
     wanted = certified(campaign, tmp_path / "here", Here(lambda p, own: task(p, own)[0], 4), 600.0, kept=False)
     open_folder(tmp_path / "there", campaign, resume=False, kind=FOLDER)
-    executor = Cluster(None, doomed.scheduler_address, task=task)
+    executor = Cluster([task], doomed.scheduler_address)
     worker = random.Random(seed).choice(list(doomed.workers.values()))
     killer = threading.Timer(0.5, os.kill, (worker.pid, signal.SIGKILL))
     killer.start()
@@ -181,9 +182,34 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
 def test_a_worker_flies_a_certificate_to_the_bits_of_one_process():
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 6, "duration": 10.0})
     limits = read_all(["r_min<60 at 5%", "phi_wall>0 at 5%"], scenario)
-    task = pickle.loads(pickle.dumps(CertifyTask(scenario, limits, 32)))
+    task = pickle.loads(pickle.dumps(CampaignTask(scenario, limits, 32)))
     score = score_of(measured(scenario, limits), limits, 32)
     for own in range(3):
         values, reason, _, _ = task({}, own)
         assert values == score({}, own) and not reason
     assert any("closest" in task({}, own)[0] for own in range(3))
+
+
+def test_scores_over_workers_are_those_of_this_process(cluster):
+    plain = load("vicsek_1995/ordered", {"agents": 6, "duration": 2.0})
+    louder = load("vicsek_1995/ordered", {"agents": 6, "duration": 2.0, "model.eta": 1.0})
+    scenarios, seeds = [plain, louder, plain, louder], [0, 0, 1, 1]
+    landed = []
+    found = scores(scenarios, seeds, scheduler=cluster.scheduler_address, done=lambda: landed.append(1))
+    assert found == scores(scenarios, seeds) and len(landed) == 4
+
+
+def test_a_flight_that_goes_wrong_on_a_worker_is_one_line(cluster, monkeypatch):
+    def task(parameters, seed):
+        return (
+            (None, f"seed {seed}: agent 0 left the finite numbers", 0.0, "worker") if seed == 3 else ({}, "", 0.0, "")
+        )
+
+    monkeypatch.setattr("airflock.executors.cluster.Task", lambda scenario, precision: task)
+    with pytest.raises(FlightError, match="^seed 3: agent 0 left the finite numbers$"):
+        scores([load("vicsek_1995/ordered")] * 5, range(5), scheduler=cluster.scheduler_address)
+
+
+def test_workers_fly_on_their_own_processors():
+    with pytest.raises(StudyError, match="device = cuda: workers of a scheduler fly on their cpu"):
+        scores([load("vicsek_1995/ordered")], [0], scheduler="tcp://127.0.0.1:9", device="cuda")

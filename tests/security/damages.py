@@ -135,9 +135,9 @@ def full_disk(seed, number, folder, tell=False):
 
 
 def _write(what, target):
-    from airflock.evolve.executors import Flight, Landed
     from airflock.evolve.folder import write
     from airflock.evolve.store import Batch, Store
+    from airflock.executors import Flight, Landed
     from airflock.plots.save import save_figure
     from airflock.recordings.files import save
 

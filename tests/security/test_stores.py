@@ -6,8 +6,8 @@ import pytest
 
 from airflock.errors import StudyError
 from airflock.evolve import tables
-from airflock.evolve.executors import Flight, Landed
 from airflock.evolve.store import FILE, Batch, Store
+from airflock.executors import Flight, Landed
 
 BATCH = Batch("search", 0, 0)
 

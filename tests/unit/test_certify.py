@@ -19,9 +19,9 @@ from airflock.certify.seeds import COUNT, identity, seed
 from airflock.certify.tolerance import sound_keys
 from airflock.cli.main import app
 from airflock.errors import AirflockError, ScenarioError, StudyError
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
+from airflock.executors.here import Here
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 

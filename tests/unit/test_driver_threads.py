@@ -1,9 +1,12 @@
-"""Threads that ask for one driver at the same moment all get it whole."""
+"""Drivers are compiled when that is asked for, and threads that ask for one at the same moment all get it whole."""
 
 import random
 import threading
 
+from airflock.engine import cpu
+from airflock.engine.simulate import compile_for, plan_of, score_flight
 from airflock.engine.store import load_driver
+from airflock.scenarios.files import load
 
 
 def test_no_thread_gets_a_driver_that_another_is_still_executing(tmp_path, monkeypatch):
@@ -21,3 +24,13 @@ def test_no_thread_gets_a_driver_that_another_is_still_executing(tmp_path, monke
     for thread in threads:
         thread.join()
     assert len(set(found)) == 1 and None not in found
+
+
+def test_what_has_been_compiled_for_a_scenario_is_what_flies_it():
+    scenario = load("vicsek_1995/ordered", {"agents": 5, "duration": 1.0})
+    compile_for(scenario)
+    driver = cpu.flight_driver(plan_of(scenario))
+    compiled = list(driver.advance.signatures)
+    assert len(compiled) == 1
+    score_flight(scenario)
+    assert list(driver.advance.signatures) == compiled

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 import toys
 from airflock.errors import ScenarioError
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.growing import LONGEST, SHARES, Length
 from airflock.evolve.run import Interrupted, run
 from airflock.evolve.search import averaged
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
+from airflock.executors.here import Here
 
 WHOLE = 600.0
 

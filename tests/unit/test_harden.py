@@ -7,11 +7,11 @@ import toys
 from airflock.engine.simulate import score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import again, harden
-from airflock.evolve.executors.here import Here
 from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
+from airflock.executors.here import Here
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 

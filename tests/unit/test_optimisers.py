@@ -5,13 +5,13 @@ import pytest
 
 import toys
 from airflock.errors import StudyError
-from airflock.evolve.executors.here import Here
 from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.genetic import BinaryGenetic, decode, genetic
 from airflock.evolve.nondominated import front
 from airflock.evolve.optimisers import optimiser
 from airflock.evolve.race import race
 from airflock.evolve.store import Store
+from airflock.executors.here import Here
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):

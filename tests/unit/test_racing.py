@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 import toys
 from airflock.errors import ScenarioError
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import open_folder
 from airflock.evolve.racing import still_needed
 from airflock.evolve.run import Interrupted, run
+from airflock.executors.here import Here
 
 RACE = {"racing": "optimistic", "random_numbers": "generation", "seeds": 4, "population": 16, "generations": 8}
 

@@ -7,11 +7,11 @@ from airflock.engine.simulate import score_flight
 from airflock.errors import StudyError
 from airflock.evolve.after import conclude
 from airflock.evolve.bounds import unread, usual_space
-from airflock.evolve.executors.here import Here
 from airflock.evolve.search import search
 from airflock.evolve.space import declared, with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study, make_study
+from airflock.executors.here import Here
 from airflock.scenarios.files import load, presets
 
 OWN = {"agents": 12, "world.side": 120.0}

@@ -16,9 +16,6 @@ from airflock.cli.harden import _optima
 from airflock.engine.simulate import score_flight, score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
-from airflock.evolve.executors.cluster import rebuild, tasks_of
-from airflock.evolve.executors.here import Here
-from airflock.evolve.executors.together import Together
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, executor_for, run
 from airflock.evolve.search import evaluate
@@ -26,6 +23,10 @@ from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import load_study, make_study
+from airflock.evolve.task import tasks_of
+from airflock.evolve.together import Together
+from airflock.executors.cluster import rebuild
+from airflock.executors.here import Here
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 

@@ -15,14 +15,14 @@ import pytest
 import airflock
 import toys
 from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.executors import Flight
-from airflock.evolve.executors.here import Here
-from airflock.evolve.executors.together import Together
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, on_device, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
+from airflock.evolve.together import Together
+from airflock.executors import Flight
+from airflock.executors.here import Here
 from airflock.papers.dimock_2003.units import gains
 from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
 
@@ -123,7 +123,7 @@ def test_overlapping_writers_are_refused_and_readers_are_not(tmp_path):
 
 
 def test_flights_are_on_disk_as_soon_as_they_land_and_count_once(tmp_path):
-    from airflock.evolve.executors import Flight, Landed
+    from airflock.executors import Flight, Landed
 
     batch = Batch("search", 0, 0)
     with Store(tmp_path) as store:

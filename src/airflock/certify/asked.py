@@ -6,6 +6,7 @@ from typing import Any
 from airflock.certify.campaign import Campaign
 from airflock.certify.limits import read_all
 from airflock.errors import ScenarioError, StudyError
+from airflock.executors.cluster import fly_on_their_cpu
 from airflock.scenarios.scenario import Scenario
 
 
@@ -63,5 +64,4 @@ def check_options(budget: float, timeout: float | None, scheduler: str | None, d
         raise StudyError(f"budget = {budget:g} s is not positive")
     if timeout is not None and not timeout > 0.0:
         raise StudyError(f"timeout = {timeout:g} s is not positive")
-    if scheduler is not None and device != "cpu":
-        raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
+    fly_on_their_cpu(scheduler, device)

@@ -15,8 +15,8 @@ from airflock.certify.seeds import COUNT, SPLIT, seed
 from airflock.certify.splitting import Estimate, Falls, Lineage, Particle, estimate, repetition
 from airflock.engine.events import Event
 from airflock.errors import ScenarioError
-from airflock.evolve.executors import Executor, Flight, Landed
 from airflock.evolve.store import Batch, Store
+from airflock.executors import Executor, Flight, Landed
 from airflock.scenarios.scenario import Scenario
 
 REPETITIONS = 5

@@ -12,8 +12,8 @@ from airflock.certify.campaign import Campaign
 from airflock.certify.limits import Limit
 from airflock.certify.seeds import COUNT, seed
 from airflock.errors import StudyError
-from airflock.evolve.executors import Executor, Flight
 from airflock.evolve.store import Batch, Store
+from airflock.executors import Executor, Flight
 
 BATCH = Batch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together

@@ -10,12 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from airflock.certify.campaign import FOLDER, Campaign
-from airflock.certify.flights import Task, score_of
+from airflock.certify.flights import CampaignTask, score_of
 from airflock.certify.seeds import TOLERANCE, seed
 from airflock.errors import StudyError
-from airflock.evolve.executors import Executor, Flight
-from airflock.evolve.executors.here import Here
 from airflock.evolve.folder import read
+from airflock.executors import Executor, Flight
+from airflock.executors.cluster import Cluster
+from airflock.executors.here import Here
 
 PILOT = 16  # flights that tell how many there is time for
 
@@ -35,10 +36,8 @@ def executor_for(
 ) -> Executor:
     """Who flies: this process, or the workers of a dask scheduler."""
     if scheduler is not None:
-        from airflock.evolve.executors.cluster import Cluster
-
-        task = Task(campaign.scenario, campaign.limits, campaign.precision)
-        return Cluster(None, scheduler, timeout=timeout, task=task)
+        task = CampaignTask(campaign.scenario, campaign.limits, campaign.precision)
+        return Cluster([task], scheduler, timeout=timeout)
     from airflock.engine.simulate import compile_for, takes_all_cores
     from airflock.threads import cores
 

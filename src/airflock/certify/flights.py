@@ -4,21 +4,14 @@ A flight in which an event happened is flown a second time in parts, measured at
 where events are rare, and flights are deterministic: both are the same one.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from airflock.certify.limits import OF_R_COLL, Limit
-from airflock.errors import AirflockError, StudyError
-from airflock.evolve.executors import Flight as Flown
-from airflock.evolve.executors import Score
-from airflock.evolve.executors.cluster import compiling, rebuild, worker_name
-from airflock.evolve.executors.here import land
-from airflock.evolve.folder import plain
 from airflock.evolve.space import with_parameters
-from airflock.scenarios.making import make
+from airflock.executors import Score
+from airflock.executors.cluster import Task
 from airflock.scenarios.scenario import Scenario
 
 PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration
@@ -91,27 +84,18 @@ def story(
     return {"closest": scores.get("r_min"), "first": first}
 
 
-class Task:
+class CampaignTask(Task):
     """What a worker of a dask scheduler is sent: the scenario as text, the limits, and how to measure."""
 
     def __init__(self, scenario: Scenario, limits: Sequence[Limit], precision: int):
         """Raises StudyError for a law that exists only in this process."""
-        self.text, self.where = json.dumps(plain(scenario.document)), scenario.name
-        self.limits, self.precision = tuple(limits), precision
-        try:
-            make(json.loads(self.text), self.where, folder=Path(self.where).parent, trust=True)
-        except AirflockError as fault:
-            raise StudyError(
-                f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {fault}"
-            ) from fault
+        super().__init__(scenario, precision)
+        self.limits = tuple(limits)
 
-    def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
-        """Fly on a worker: scores or None, reason, duration (s), who flew."""
-        from airflock.engine.simulate import compile_for
+    def flown(self, scenario: Scenario) -> Scenario:
+        """The scenario with the distances measured that the limits ask for."""
+        return measured(scenario, self.limits)
 
-        scenario = measured(rebuild(self.text, self.where), self.limits)
-        with compiling:  # threads of a worker wait for the first to compile
-            compile_for(scenario, precision=self.precision)
-        score = score_of(scenario, self.limits, self.precision)
-        landed = land(score, Flown(0, 0, parameters, seed), worker_name())
-        return landed.values, landed.reason, landed.duration, landed.worker
+    def score_of(self, scenario: Scenario) -> Score:
+        """Parameters and seed → what the limits look at."""
+        return score_of(scenario, self.limits, self.precision)

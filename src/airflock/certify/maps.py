@@ -11,9 +11,9 @@ from airflock.certify.campaign import Campaign
 from airflock.certify.seeds import MAP
 from airflock.certify.tolerance import Screen, level_of
 from airflock.errors import ScenarioError
-from airflock.evolve.executors import Executor
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
+from airflock.executors import Executor
 from airflock.scenarios.scenario import Scenario
 
 MOST = 400  # cells

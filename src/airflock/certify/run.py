@@ -14,10 +14,10 @@ from airflock.certify.counting import Count, Watch, count
 from airflock.certify.executing import executor_for, folder_of, planned
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.maps import bounds_over, sound_axes
-from airflock.evolve.executors import Executor
 from airflock.evolve.folder import open_folder, sweep, versions, write
 from airflock.evolve.run import Interrupted
 from airflock.evolve.store import Store
+from airflock.executors import Executor
 from airflock.scenarios import formats
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario

@@ -18,9 +18,9 @@ from airflock.certify.counting import Count
 from airflock.certify.seeds import TOLERANCE, seed
 from airflock.core.parameters import Quantity
 from airflock.errors import ScenarioError
-from airflock.evolve.executors import Executor, Flight
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
+from airflock.executors import Executor, Flight
 from airflock.scenarios.scenario import Scenario
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened

@@ -55,7 +55,6 @@ Check = Annotated[
     bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again, compare the bits.")
 ]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Bounds, distances and tolerances.")]
-Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")]
 Timeout = Annotated[
     float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
 ]
@@ -77,7 +76,7 @@ def certify(
     uncertain: Uncertain = False,
     check: Check = False,
     plot: Plot = None,
-    scheduler: Scheduler = None,
+    scheduler: options.Scheduler = None,
     timeout: Timeout = None,
     changes: options.Set = None,
     law: options.Law = None,

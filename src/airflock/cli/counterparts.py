@@ -28,11 +28,12 @@ SEARCH = (
 )  # fmt: skip
 SEEDS = {"seeds": "seeds", "first_seed": "seeds"}
 FLOWN = {"threads": "threads", "precision": "precision", "device": "device"}
+MANY = {**FLOWN, "scheduler": "scheduler"}
 
 COUNTERPARTS: dict[str, Counterpart] = {
     "run": Counterpart(
         "airflock.score(scenario, seeds=4)", "score",
-        {"scenario": "what", **SEEDS, **LOADED, **FLOWN, **TABLE, "save": "airflock.save", "plot": "airflock.plot"},
+        {"scenario": "what", **SEEDS, **LOADED, **MANY, **TABLE, "save": "airflock.save", "plot": "airflock.plot"},
     ),
     "score": Counterpart(
         "airflock.score(recording)", "score",
@@ -44,7 +45,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "sweep": Counterpart(
         'airflock.sweep(scenario, {"radio.delay": [0, 1, 2]})', "sweep",
         {
-            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **FLOWN, **TABLE,
+            "scenario": "what", "over": "over", **SEEDS, **SETTINGS, **CODE, **MANY, **TABLE,
             "table": "the table returned", "plot": "airflock.plots.heatmap", "show": "a column of the table returned",
         },
     ),

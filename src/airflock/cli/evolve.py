@@ -35,9 +35,7 @@ def evolve(
         typer.Option(help="Averages of the last means that also fly in the final.", show_default="0"),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")
-    ] = None,
+    scheduler: options.Scheduler = None,
     timeout: Annotated[
         float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
     ] = None,

@@ -25,6 +25,7 @@ Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_defa
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
 Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
+Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")]
 Trust = Annotated[bool, typer.Option("--trust", help="Run the code that a file names: a law, fitness functions.")]
 Law = Annotated[
     str | None,

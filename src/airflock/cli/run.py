@@ -1,7 +1,7 @@
 """Verbs run and score: fly a scenario, or measure a recording."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ def run(
     threads: options.Threads = None,
     precision: options.Precision = 32,
     device: options.Device = "cpu",
+    scheduler: options.Scheduler = None,
     as_json: options.Json = False,
     save: options.SaveFile = None,
     plot: options.PlotFile = None,
@@ -29,7 +30,8 @@ def run(
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
-    from airflock.engine.simulate import picked, score_flights
+    from airflock.engine.simulate import picked
+    from airflock.executors.scores import scores
     from airflock.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound
     from airflock.scenarios.files import load
@@ -45,10 +47,12 @@ def run(
     for note in found.notes:
         tables.say(f"note: {note}")
     numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
-    device = picked(flights, device, precision=precision, say=tables.say)
-    options.compile_aloud(found, precision, device)
+    if scheduler is None:
+        device = picked(flights, device, precision=precision, say=tables.say)
+        options.compile_aloud(found, precision, device)
+    chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
-        rows = score_flights(flights, numbers, threads=threads, precision=precision, done=done, device=device)
+        rows = scores(flights, numbers, **chosen, done=done)
     if save or plot:
         _record(found, numbers, precision, device, save, plot)
     if as_json:

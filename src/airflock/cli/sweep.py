@@ -36,6 +36,7 @@ def sweep(
     threads: options.Threads = None,
     precision: options.Precision = 32,
     device: options.Device = "cpu",
+    scheduler: options.Scheduler = None,
     as_json: options.Json = False,
     table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
     plot: Annotated[
@@ -64,10 +65,11 @@ def sweep(
     for note in alike(dict.fromkeys(note for found in scenarios for note in found.notes)):
         tables.say(f"note: {note}")
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
-    options.compile_aloud(scenarios[0], precision, device)
+    if scheduler is None:
+        options.compile_aloud(scenarios[0], precision, device)
     with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}
-        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say)
+        tidy = flown(points, scenarios, numbers, **chosen, say=tables.say, scheduler=scheduler)
     _keep(tidy, keys, show, scenarios[0], table, plot)
     if as_json:
         tables.emit_json({"scenario": scenario, "seeds": seeds, "runs": tidy.to_dict("records")})

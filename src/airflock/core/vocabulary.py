@@ -6,6 +6,7 @@ All quantities are in SI; a difference is always neighbour minus own.
 import inspect
 from collections.abc import Callable
 from difflib import get_close_matches
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from airflock.errors import RuleError
@@ -345,6 +346,7 @@ class Mean(NamedTuple):
     n: float
 
 
+@lru_cache(maxsize=1024)
 def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...]:
     """Names that a rule asks for, checked against the vocabulary of its kind."""
     names = tuple(inspect.signature(rule).parameters)

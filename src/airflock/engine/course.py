@@ -62,7 +62,7 @@ class Course:
 
     def call(self, first: int, last: int, half: int = 0) -> None:
         """One call of the driver, for what is not a part of the flight itself."""
-        with cpu.compiling(self.state.plan.model.name):
+        with cpu.flying(self.state):
             self._placed(self.state.advance(first, last, half))
 
     @property
@@ -84,7 +84,7 @@ class Course:
         if self.record:
             count = -(-last // every) - -(-first // every)
             frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
-        with cpu.compiling(state.plan.model.name):
+        with cpu.flying(state):
             done = self._placed(cpu.advance(state, first, last, frames, 1 if self.sensed else 0))
         self.step, self.sensed = done, False
         if frames is not None:
@@ -234,6 +234,6 @@ class Course:
 
 def _compiled(state: State) -> State:
     """A state whose driver has been compiled; nothing is flown."""
-    with cpu.compiling(state.plan.model.name):
+    with cpu.flying(state):
         state.compile()
     return state

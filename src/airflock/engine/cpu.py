@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -61,12 +61,14 @@ def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
     return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
 
 
+def is_loaded(driver: ModuleType) -> bool:
+    """Whether a driver flies at once: it has been compiled or read in this process, or is interpreted."""
+    return bool(getattr(driver.advance, "overloads", True))
+
+
 def is_compiled(driver: ModuleType) -> bool:
     """Whether a driver flies without being compiled first: in this process, or from what an earlier one has kept."""
-    advance = driver.advance
-    if not hasattr(advance, "signatures"):  # interpreted
-        return True
-    return bool(advance.signatures) or any(Path(advance.stats.cache_path).glob("*.nbi"))
+    return is_loaded(driver) or any(Path(driver.advance.stats.cache_path).glob("*.nbi"))
 
 
 def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: str = "cpu") -> Flown:
@@ -81,7 +83,7 @@ def fly(plan: Plan, tables: Tables, start: NDArray[Any] | None = None, device: s
         if plan.record
         else None
     )
-    with compiling(plan.model.name):
+    with flying(state):
         status = advance(state, 0, steps + 1, frames)
     if frames is not None and state.ended:
         frames = frames[: -(-status // every)]
@@ -110,6 +112,11 @@ def advance(state: State, first: int, last: int, frames: NDArray[Any] | None = N
         step, half = done, 0
         steps = max(1, int(steps * min(8.0, BEAT / max(time.monotonic() - begun, 1e-6))))
     return step
+
+
+def flying(state: State) -> AbstractContextManager[None]:
+    """Around calls of a state's driver: `compiling`, if it has to be compiled first."""
+    return nullcontext() if is_loaded(state.driver) else compiling(state.plan.model.name)
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 from airflock.body.registry import BODIES
@@ -119,6 +120,14 @@ class Plan:
     topology: Topology | None = None
     fading: bool = False
     build: Build = Build()
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        """Taken once: what a plan leads to is looked up several times in each flight."""
+        return hash(tuple(getattr(self, each.name) for each in fields(self)))
 
     def built(self, **changes: Any) -> "Plan":
         """The same flight built otherwise: fields of `Build`."""

@@ -294,8 +294,11 @@ def finish(scenario: Scenario, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
-    """Compile what flies a scenario; scenarios that differ by numbers share it."""
-    cpu.flight_driver(plan_of(scenario, precision=precision))
+    """Compile what flies a scenario, if that has not been done; scenarios that differ by numbers share it."""
+    driver = cpu.flight_driver(plan_of(scenario, precision=precision))
+    if not cpu.is_loaded(driver):
+        with cpu.compiling(scenario.model.name):
+            opened(scenario, 0, precision).compile()
 
 
 def score_flights(

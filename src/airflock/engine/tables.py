@@ -90,6 +90,8 @@ def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
 
 def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shapes as they stand at the start, and what appears later: its bounds (m), time (s) and number."""
+    if not len(scene.later):
+        return scene.shapes, np.zeros((0, 8))
     shapes, k = scene.shapes.copy(), scene.later
     later = np.column_stack([shapes[k, :6], shapes[k, APPEARS], k])
     shapes[k, :6] = AWAY

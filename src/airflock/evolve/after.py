@@ -20,7 +20,6 @@ from scipy import stats
 from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import tables
-from airflock.evolve.executors import Executor
 from airflock.evolve.folder import plain, write
 from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
@@ -29,6 +28,7 @@ from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
+from airflock.executors import Executor
 from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 

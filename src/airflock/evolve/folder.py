@@ -1,6 +1,5 @@
 """The folder of a study: made or opened again, its study.toml compared before anything is written."""
 
-import os
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -11,6 +10,7 @@ from airflock import atomic
 from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.study import same_or_refuse
+from airflock.machine import processor
 
 STUDY = "study.toml"
 PACKAGES = ("airflock", "numpy", "numba", "cma", "pymoo")
@@ -103,20 +103,10 @@ def plain(value: Any) -> Any:
 
 def versions() -> dict[str, str]:
     """Versions that the last bits of a study depend on, and the processor."""
-    found = {"python": platform.python_version(), "cpu": cpu_model()}
+    found = {"python": platform.python_version(), "cpu": processor()}
     for name in PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             continue
     return found
-
-
-def cpu_model() -> str:
-    """Name of this machine's processor, for instance to tell that two machines may round differently."""
-    if os.path.exists("/proc/cpuinfo"):
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()

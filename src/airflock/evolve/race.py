@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.evolve.executors import Executor
 from airflock.evolve.search import evaluate
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
+from airflock.executors import Executor
 
 NEIGHBOURS = 10
 ROUNDS = ((1.0, 4), (0.25, 16))  # share of the pool that flies, and with how many seeds

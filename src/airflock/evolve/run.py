@@ -10,8 +10,6 @@ from typing import Any
 from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve.after import Result, conclude
-from airflock.evolve.executors import Executor, Score
-from airflock.evolve.executors.here import Here
 from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
@@ -21,6 +19,9 @@ from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study
+from airflock.executors import Executor, Score
+from airflock.executors.cluster import Cluster, fly_on_their_cpu
+from airflock.executors.here import Here
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
@@ -183,8 +184,7 @@ def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:
     """The study for a device: cpu, cuda, or what auto picks for a generation of it. A missing one is one line."""
     if device == "cpu":
         return study
-    if scheduler is not None:
-        raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
+    fly_on_their_cpu(scheduler, device)
     if device not in ("cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
     from airflock.engine.simulate import picked
@@ -198,13 +198,13 @@ def executor_for(
 ) -> Executor:
     """Who flies: this process, or the workers of a dask scheduler."""
     if study.device != "cpu":
-        from airflock.evolve.executors.together import Together
+        from airflock.evolve.together import Together
 
         return Together(study, study.device)
     if scheduler is not None:
-        from airflock.evolve.executors.cluster import Cluster
+        from airflock.evolve.task import tasks_of
 
-        return Cluster(study, scheduler, timeout=timeout)
+        return Cluster(tasks_of(study), scheduler, timeout=timeout)
     from airflock.engine.simulate import compile_for, takes_all_cores
     from airflock.threads import cores
 

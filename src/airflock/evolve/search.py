@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import StudyError
-from airflock.evolve.executors import Executor, Flight
 from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
@@ -23,6 +22,7 @@ from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
 from airflock.evolve.tables import DURATION
+from airflock.executors import Executor, Flight
 from airflock.scenarios.scenario import Scenario
 
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 
 from airflock.errors import StudyError
-from airflock.evolve.executors import Executor
 from airflock.evolve.search import evaluate
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
+from airflock.executors import Executor
 
 METHODS = ("sobol", "morris")
 

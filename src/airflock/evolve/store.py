@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from airflock.doors import FormatError, from_outside, json_object, json_value
 from airflock.errors import StudyError
-from airflock.evolve.executors import Landed
+from airflock.executors import Landed
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
 SCHEMA = """

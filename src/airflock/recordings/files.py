@@ -13,10 +13,11 @@ from airflock.body.registry import BODIES
 from airflock.doors import from_outside
 from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
+from airflock.machine import processor
 from airflock.metrics.registry import SETS
 from airflock.radios.registry import RADIOS
 from airflock.recordings import attributes
-from airflock.recordings.flights import processor, provenance, simulate
+from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import check
 from airflock.recordings.opened import Opening
 from airflock.scenarios.laws import given_law

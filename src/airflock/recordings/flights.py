@@ -18,6 +18,7 @@ from airflock.engine.passes.driver import flight
 from airflock.engine.simulate import fly, picked, plan_of
 from airflock.engine.store import toolchain
 from airflock.errors import FlightError
+from airflock.machine import processor
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
@@ -168,18 +169,6 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
         if str(entry.get("kind", "")).endswith(".py"):
             entry["kind"] = PurePath(entry["kind"]).stem
     return document
-
-
-def processor() -> str:
-    """Model name of the processor."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-        return names[0] if names else "unknown"
-    except OSError:
-        import platform
-
-        return platform.processor() or "unknown"
 
 
 def plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ from airflock import __version__
 from airflock.cache import cache_folder, cache_trouble, drivers, usual_folder
 from airflock.engine.cuda import device as gpu
 from airflock.engine.simulate import score_flight, score_flights
-from airflock.recordings.flights import processor
+from airflock.machine import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores

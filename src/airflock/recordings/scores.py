@@ -20,9 +20,10 @@ from airflock.doors import from_outside
 from airflock.engine import cpu
 from airflock.engine.passes.build import columns
 from airflock.engine.plan import Plan
-from airflock.engine.simulate import finish, plan_of, score_flights
+from airflock.engine.simulate import finish, plan_of
 from airflock.engine.tables import tables
 from airflock.errors import RecordingError
+from airflock.executors.scores import scores
 from airflock.metrics import nearest
 from airflock.metrics.registry import POWER, SETS, reports
 from airflock.radios.registry import RADIOS
@@ -46,6 +47,7 @@ def score(
     done: Callable[[], None] | None = None,
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
+    scheduler: str | None = None,
     aero: bool = False,
     groups: bool = False,
 ) -> pd.DataFrame:
@@ -69,6 +71,8 @@ def score(
         cpu, cuda (a GPU, all flights together), python, or auto, which tells `say` what it picked.
     say : callable, optional
         Told what auto picked.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers fly, instead of this process.
     aero : bool
         For a recording, measure the power that its geometry saves.
     groups : bool
@@ -81,8 +85,8 @@ def score(
 
     Raises
     ------
-    ScenarioError, RecordingError, FlightError
-        If the scenario, the recording or the flight is faulty.
+    ScenarioError, RecordingError, FlightError, StudyError
+        If the scenario, the recording or the flight is faulty, or the scheduler does not answer.
 
     Notes
     -----
@@ -109,7 +113,7 @@ def score(
         return _about(pd.DataFrame([values]), scenario_of(what, settings))
     scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
-    rows = score_flights([scenario] * len(found), found, **options)
+    rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
 
 

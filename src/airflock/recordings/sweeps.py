@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.engine.simulate import picked, score_flights
 from airflock.errors import AirflockError, ScenarioError
+from airflock.executors.scores import scores
 from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
@@ -29,6 +29,7 @@ def sweep(
     done: Callable[[], None] | None = None,
     device: str = "cpu",
     say: Callable[[str], None] | None = None,
+    scheduler: str | None = None,
 ) -> pd.DataFrame:
     """Fly a scenario over a grid of values, several seeds at each point of the grid.
 
@@ -56,6 +57,8 @@ def sweep(
         cpu, cuda, python, or auto, which tells `say` what it picked.
     say : callable, optional
         Told what auto picked.
+    scheduler : str, optional
+        Address of a dask scheduler whose workers fly, instead of this process.
 
     Returns
     -------
@@ -64,8 +67,8 @@ def sweep(
 
     Raises
     ------
-    ScenarioError
-        With the faults of all points, before anything flies.
+    ScenarioError, FlightError, StudyError
+        With the faults of all points, before anything flies; if a flight goes wrong; if the scheduler does not answer.
 
     Examples
     --------
@@ -78,7 +81,8 @@ def sweep(
     points = grid(over)
     scenarios = scenarios_at(what, points, settings, law, trust=trust)
     numbers = sound_seeds(seeds)
-    return flown(points, scenarios, numbers, threads=threads, precision=precision, done=done, device=device, say=say)
+    options = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
+    return flown(points, scenarios, numbers, scheduler=scheduler, **options)
 
 
 def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
@@ -114,8 +118,7 @@ def flown(
     """Tidy table of the flights of all seeds at all points; options as of `sweep`."""
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
-    device = picked(flights, options.pop("device"), precision=options["precision"], say=options.pop("say"))
-    rows = score_flights(flights, [seed for _, _, seed in jobs], device=device, **options)
+    rows = scores(flights, [seed for _, _, seed in jobs], **options)
     return pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
 
 

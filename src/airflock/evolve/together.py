@@ -4,9 +4,9 @@ import time
 from collections.abc import Iterator, Sequence
 
 from airflock.errors import AirflockError
-from airflock.evolve.executors import Flight, Landed
 from airflock.evolve.space import with_parameters
 from airflock.evolve.study import Study
+from airflock.executors import Flight, Landed
 
 
 class Together:

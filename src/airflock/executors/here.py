@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 from airflock.errors import AirflockError
-from airflock.evolve.executors import Flight, Landed, Score
+from airflock.executors import Flight, Landed, Score
 
 
 def land(score: Score, flight: Flight, worker: str = "") -> Landed:

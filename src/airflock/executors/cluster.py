@@ -9,23 +9,32 @@ tried again on a fresh worker process and then recorded as failed.
 import json
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from airflock.errors import StudyError
-from airflock.evolve.executors import Flight, Landed, Score
-from airflock.evolve.folder import cpu_model, plain
-from airflock.evolve.space import with_parameters
-from airflock.evolve.study import Study
+from airflock.engine.simulate import compile_for, score_flight
+from airflock.errors import AirflockError, StudyError
+from airflock.executors import Flight, Landed, Score
+from airflock.executors.here import land
+from airflock.machine import processor
+from airflock.scenarios.making import make
+from airflock.scenarios.scenario import Scenario
 
 ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
 RETRIES = 2  # further tries of a flight that took too long
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
+Fly = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
 compiling = Lock()  # held while a worker compiles: its threads wait for the first
+
+
+def fly_on_their_cpu(scheduler: str | None, device: str) -> None:
+    """Refuse another device where workers fly. Raises StudyError."""
+    if scheduler is not None and device != "cpu":
+        raise StudyError(f"device = {device}: workers of a scheduler fly on their cpu; leave out one of the two")
 
 
 class Cluster:
@@ -33,17 +42,18 @@ class Cluster:
 
     def __init__(
         self,
-        study: Study | None,
+        tasks: Sequence[Fly],
         address: str,
         *,
         timeout: float | None = None,
-        task: Any = None,
         answer: float = ANSWER,
+        kept: bool = True,
     ):
         """Connect.
 
+        tasks   : what is run on a worker, by the place of a flight
         timeout : s that one flight may take; answer : s to wait for the scheduler
-        task    : what is run on a worker instead of a flight of a study
+        kept    : whether what has landed is stored, so that it can be gone on with
 
         Raises StudyError if nobody answers at the address, or nobody works there.
         """
@@ -51,7 +61,7 @@ class Cluster:
             from distributed import Client
         except ModuleNotFoundError as fault:
             raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
-        self.tasks, self.timeout = tasks_of(study) if task is None and study is not None else (task,), timeout
+        self.tasks, self.timeout, self.kept = tuple(tasks), timeout, kept
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)
             self.client.wait_for_workers(1, timeout=answer)
@@ -63,7 +73,7 @@ class Cluster:
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
-        models = sorted(set(self.client.run(cpu_model).values()))
+        models = sorted(set(self.client.run(processor).values()))
         if len(models) > 1:
             warnings.warn(
                 f"workers have different processors ({'; '.join(models)}): flights may differ in the last bits, and "
@@ -109,9 +119,8 @@ class Cluster:
         try:
             return dict(self.client.nthreads())
         except Exception as fault:  # whatever the network raises
-            raise StudyError(
-                "the scheduler answers no more; what has landed is stored, continue with --resume"
-            ) from fault
+            after = "; what has landed is stored, continue with --resume" if self.kept else ""
+            raise StudyError(f"the scheduler answers no more{after}") from fault
 
     def _landed(self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]) -> Landed | None:
         """The outcome of a task that is over; None if it has to fly again."""
@@ -157,54 +166,38 @@ class Cluster:
 
 
 class Task:
-    """What a worker is sent: small, and picklable wherever the worker's code comes from."""
+    """What a worker is sent to fly one scenario: small, and picklable wherever the worker's code comes from."""
 
-    def __init__(self, text: str, where: str, precision: int):
-        """A scenario as JSON text, and where it came from."""
-        self.text, self.where, self.precision = text, where, precision
-
-    @classmethod
-    def of(cls, study: Study, place: int = 0) -> "Task":
-        """The task of one of a study's scenarios; raises StudyError for a law that exists only in this process."""
-        from airflock.errors import AirflockError
-
-        scenario = study.scenarios[place]
-        made = cls(json.dumps(plain(scenario.document)), scenario.name, int(study.search.precision))
+    def __init__(self, scenario: Scenario, precision: int):
+        """The scenario as JSON text; raises StudyError for one whose code exists only in this process."""
+        self.text, self.where, self.precision = json.dumps(scenario.document), scenario.name, precision
         try:
-            rebuild(made.text, made.where)
+            rebuild(self.text, self.where)
         except AirflockError as fault:
             raise StudyError(
                 f"{scenario.name}: workers cannot rebuild this scenario; put its law into a file: {fault}"
             ) from fault
-        return made
 
     def __call__(self, parameters: Mapping[str, float], seed: int) -> tuple[Any, str, float, str]:
         """Fly on a worker: order parameters or None, reason, duration (s), who flew."""
-        from airflock.evolve.executors.here import land
-
-        landed = land(self._score, Flight(0, 0, parameters, seed), worker_name())
-        return landed.values, landed.reason, landed.duration, landed.worker
-
-    @property
-    def _score(self) -> Score:
-        from airflock.engine.simulate import compile_for, score_flight
-
-        scenario = rebuild(self.text, self.where)
+        scenario = self.flown(rebuild(self.text, self.where))
         with compiling:  # threads of a worker wait for the first to compile
             compile_for(scenario, precision=self.precision)
-        return lambda p, seed: score_flight(with_parameters(scenario, p), seed, precision=self.precision)
+        landed = land(self.score_of(scenario), Flight(0, 0, parameters, seed), worker_name())
+        return landed.values, landed.reason, landed.duration, landed.worker
 
+    def flown(self, scenario: Scenario) -> Scenario:
+        """The scenario whose driver flies."""
+        return scenario
 
-def tasks_of(study: Study) -> tuple[Task, ...]:
-    """The task of each scenario of a study."""
-    return tuple(Task.of(study, place) for place in range(len(study.scenarios)))
+    def score_of(self, scenario: Scenario) -> Score:
+        """Parameters and seed → order parameters; here no parameters are varied."""
+        return lambda _, seed: score_flight(scenario, seed, precision=self.precision)
 
 
 @lru_cache(maxsize=8)
-def rebuild(text: str, where: str) -> Any:
+def rebuild(text: str, where: str) -> Scenario:
     """Scenario from its document; made once in a worker process."""
-    from airflock.scenarios.making import make
-
     # its law has run where the study began: whoever began it has consented
     return make(json.loads(text), where, folder=Path(where).parent, trust=True)
 
