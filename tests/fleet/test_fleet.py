@@ -32,7 +32,7 @@ from airflock.onboard.log import replay
 from airflock.onboard.mission import Phase
 from airflock.onboard.ports import open_port
 from airflock.onboard.run import fly as fly_node
-from airflock.radios import links
+from airflock.radios import jitter, links
 from airflock.radios.registry import RADIOS
 from airflock.recordings.scores import measure
 from fleets import card, fleet, scenario
@@ -120,6 +120,17 @@ def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
         fast, slow = (links.received(70.0, float(link), k) for link in (0, 1))
         share = 1.0 - (1.0 - fast) ** 2 * (0.8 + 0.2 * (1.0 - slow))  # the slow link sends in each fifth period
     assert heard / count == pytest.approx(share, abs=0.03)
+
+
+def test_the_ether_brings_packets_as_late_as_the_radio_says():
+    k = jitter.Parameters(delay=0.2, jitter=0.3, longest=9.0)
+    ether, at, late = Ether(RADIOS["jitter"], k, [1, 2], 3, 0.1), [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0)], []
+    for step in range(2000):
+        ether.send(0.1 * step, 0, str(step).encode(), at)
+    for tick in range(21_000):
+        late += [0.01 * tick - 0.1 * int(data) - 0.2 for _, data in ether.deliver(0.01 * tick, at)]
+    assert len(late) == 2000 and min(late) > -1e-6
+    assert sum(late) / len(late) == pytest.approx(0.3 + 0.005, rel=0.1)  # looked for every 10 ms
 
 
 @pytest.mark.parametrize("three", [False, True])

@@ -37,8 +37,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
-    vehicle, sensor, transceiver, measures : body, sensor, radio and metric set that `body`, `sensors`, `radio` and
-                `metrics` hold the numbers of
+    vehicle, sensor, transceiver, measures : what `body`, `sensors`, `radio` and `metrics` hold the numbers of
     groups    : agents that share numbers; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
