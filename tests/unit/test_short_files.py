@@ -2,8 +2,10 @@
 
 import pytest
 
-from airflock.core.parameters import Quantity, declarations
+from airflock.core.parameters import Quantity, declarations, number_names
+from airflock.core.radio import Packets
 from airflock.errors import ScenarioError
+from airflock.radios.registry import RADIOS
 from airflock.scenarios import keys
 from airflock.scenarios.files import load, presets
 
@@ -112,6 +114,9 @@ def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path)
 
 def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario():
     declared = {(of, name) for of, record in keys.records().items() for name, _, _ in declarations(record)}
+    declared -= {
+        (kind, name) for kind in RADIOS for name in number_names(Packets)
+    }  # told once, as those of the section
     assert len(keys.keys()) == len(declared)
     for name in ("vasarhelyi_2018/4ms", "couzin_2002/torus", "kidger/city"):
         scenario = load(name)
