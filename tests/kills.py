@@ -1,11 +1,17 @@
-"""Kill a study at random moments (SIGKILL) until it has died so many times; every end must equal the undisturbed one.
+"""Kill what is at work at random moments (SIGKILL), until it has died so many times: every end equals the undisturbed.
 
-python tests/kills.py FOLDER --kills 200 --seed 7
+python tests/kills.py FOLDER --what evolve --kills 200 --seed 7
+
+What is at work is one of LIVES: a life begins, or goes on with, what a folder holds, to its end. Toy flights stand for
+real ones where only the store matters. `workers` kills worker processes of dask under a study. What is done stands in
+FOLDER/WHAT/done.json, so that a run that was cut off goes on.
 """
 
 import argparse
+import json
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import sys
@@ -13,6 +19,7 @@ import time
 from pathlib import Path
 
 import toys
+from airflock import atomic
 from airflock.evolve.after import conclude
 from airflock.evolve.folder import STUDY, open_folder, sweep, versions
 from airflock.evolve.search import search
@@ -22,10 +29,14 @@ from airflock.executors.here import Here
 RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"
 FLIGHTS = "SELECT stage, run, generation, candidate, repeat, seed, scores, reason FROM flight"
+MINE = {
+    "agents": 4, "duration": 20.0, "dt": 0.1, "model": {"kind": "vasarhelyi_2018", "v_flock": 6.0, "p_rep": 0.2},
+    "world": {"side": 120.0}, "radio": {"delay": 0.4},
+}  # fmt: skip
 
 
-def life(folder):
-    """Begin or continue the study in a folder, to its end."""
+def evolve(folder):
+    """A study of toy flights."""
     study = toys.study(generations=12, seeds=2, restarts=1)
     open_folder(folder, study, resume=(folder / STUDY).exists())
     executor = Here(toys.slow_bowl, 2)
@@ -36,7 +47,120 @@ def life(folder):
     executor.close()
 
 
-def child(folder):
+def of_study(folder):
+    """Everything of a study but what tells of the machine."""
+    return rows(folder), [(folder / name).read_text() for name in NAMED]
+
+
+def rows(folder):
+    with sqlite3.connect(folder / FILE) as connection:
+        return [connection.execute(sql).fetchall() for sql in (CANDIDATES, FLIGHTS)]
+
+
+def certify(folder):
+    """A campaign of toy flights, so many in all, and its certificate."""
+    from airflock.certify.campaign import FOLDER, Campaign
+    from airflock.certify.limits import read_all
+    from airflock.certify.run import run
+    from airflock.scenarios.files import load
+
+    scenario = load("vasarhelyi_2018/real_6ms")
+    campaign = Campaign(scenario, read_all(["r_min<1 at 2%", "phi_vel>=5 in 98%"], scenario), flights=400)
+
+    def dice(_, own):
+        time.sleep(0.001)
+        chance = random.Random(own)
+        return {"r_min": 0.5 if chance.random() < 0.005 else 5.0, "phi_vel": 6.0 + chance.gauss(0.0, 0.4)}
+
+    open_folder(folder, campaign, resume=(folder / f"{FOLDER}.toml").is_file(), kind=FOLDER)
+    executor = Here(dice, 2)
+    try:
+        run(campaign, folder, executor, 60.0).save(folder / "certificate.toml")
+    finally:
+        executor.close()
+
+
+def of_certificate(folder):
+    lines = (folder / "certificate.toml").read_text().replace(str(folder), "FOLDER").splitlines()
+    return rows(folder), [line for line in lines if not line.startswith("seal = ")]  # of the folder's name, too
+
+
+def tune(folder):
+    """A tuning of real flights, tiny ones, but for its pictures."""
+    from importlib import import_module
+
+    from airflock.scenarios.making import make
+
+    tuning = import_module("airflock.tune.run")
+    tuning._rate = lambda *_: 300.0
+    import_module("airflock.evolve.run").draw = lambda *_: None
+    import_module("airflock.tune.report").save = lambda found: atomic.write(found.folder / "report.html", repr(found))
+    # the limit is shown after its first looks, whatever the time
+    resume = (folder / tuning.PLAN).is_file()
+    tuning.tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
+
+
+def of_tuning(folder):
+    """All stages; of the certificate what counting showed, because tolerances are looked for as long as time allows."""
+    from airflock.doors import read_toml
+
+    told = read_toml(folder / "certificate.toml")
+    names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")
+    return rows(folder / "study"), [(folder / name).read_text() for name in names], told["limit"], told["flights"]
+
+
+def tracks(folder):
+    """A table of tracks becomes a recording and a table again."""
+    import numpy as np
+    import pandas as pd
+
+    from airflock.recordings.exports.export import export
+    from airflock.recordings.files import save
+    from airflock.recordings.imports.load import load_tracks
+
+    folder.mkdir(exist_ok=True)
+    os.chdir(folder)  # recordings tell the names of their sources
+    time_, who = np.meshgrid(0.1 * np.arange(3000), np.arange(6), indexing="ij")
+    east, north = 20.0 * np.sin(0.1 * time_ + who), 20.0 * np.cos(0.1 * time_ + who)
+    columns = {"t": time_, "id": who, "x": east, "y": north}
+    atomic.write("tracks.csv", pd.DataFrame({k: v.ravel() for k, v in columns.items()}).to_csv(index=False))
+    found = load_tracks("tracks.csv")
+    save(found, "flight.nc")
+    export(found, "again.csv")
+
+
+def of_tracks(folder):
+    """Every file, by its content; nothing else is left, not even what a dead process had begun."""
+    atomic.FRESH = -1.0
+    atomic.swept.cache_clear()
+    atomic.swept(folder)
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def studio(folder):
+    """What the live page writes: a tuned scenario, the flight again as a recording, its replay."""
+    from airflock.studio.player import Player
+
+    folder.mkdir(exist_ok=True)
+    player = Player("vasarhelyi_2018/4ms", {"agents": 4}, seed=3)
+    player.fly(40)
+    player.change("model.p_rep", 0.2)
+    player.fly(40)
+    player.save_toml(folder / "tuned.toml")
+    player.save_recording(folder / "tuned.nc")
+    player.save_replay(folder / "tuned.html")
+
+
+LIVES = {
+    "evolve": (evolve, of_study),
+    "certify": (certify, of_certificate),
+    "tune": (tune, of_tuning),
+    "import": (tracks, of_tracks),
+    "studio": (studio, of_tracks),
+}
+
+
+def child(life, folder):
     """Process that lives one life."""
     pid = os.fork()
     if pid == 0:
@@ -49,43 +173,111 @@ def child(folder):
     return pid
 
 
-def contents(folder):
-    """Everything of a study but what tells of the machine."""
-    with sqlite3.connect(folder / FILE) as connection:
-        found = [connection.execute(sql).fetchall() for sql in (CANDIDATES, FLIGHTS)]
-    return found, [(folder / name).read_text() for name in NAMED]
+def killed(what, folder, kills, seed):
+    """Kill lives until so many have died; a line for each study that came to its end, and the sum."""
+    life, contents = LIVES[what]
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = folder / "done.json"
+    done = json.loads(kept.read_text()) if kept.exists() else {"kills": 0, "studies": 0, "usual": None}
+    if done["usual"] is None:
+        for _ in range(2):  # the first one imports and compiles
+            shutil.rmtree(folder / "undisturbed", ignore_errors=True)
+            begin = time.perf_counter()
+            assert os.waitpid(child(life, folder / "undisturbed"), 0)[1] == 0
+            done["usual"] = time.perf_counter() - begin
+        kept.write_text(json.dumps(done))
+    wanted = contents(folder / "undisturbed")
+    while done["kills"] < kills:
+        chance, mine = random.Random(f"{seed} {done['studies']}"), 0
+        place = folder / f"study{done['studies']}"
+        shutil.rmtree(place, ignore_errors=True)
+        while True:
+            pid = child(life, place)
+            limit, dead = time.perf_counter() + chance.uniform(0.0, 0.9 * done["usual"]), 0
+            while not dead and (time.perf_counter() < limit or done["kills"] + mine >= kills):
+                dead, status = os.waitpid(pid, os.WNOHANG)
+                time.sleep(0.001)
+            if dead:
+                assert status == 0, f"{what} {done['studies']} failed after {mine} kills"
+                break
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            mine += 1
+        assert contents(place) == wanted, f"{what} {done['studies']} ended differently after {mine} kills"
+        done["kills"], done["studies"] = done["kills"] + mine, done["studies"] + 1
+        kept.write_text(json.dumps(done))
+        shutil.rmtree(place)
+        sys.stderr.write(f"{what}: {done['kills']} of {kills} kills\n")
+    sys.stdout.write(f"{what}: {done['kills']} kills in {done['studies']} lives of {done['usual']:.2f} s: "
+                     "all ends identical\n")  # fmt: skip
+
+
+def workers(folder, kills, seed):
+    """Kill workers of dask under studies until so many have died."""
+    import threading
+
+    import distributed
+
+    from airflock.evolve.run import run
+    from airflock.executors.cluster import Cluster
+
+    best, space = dict(toys.BEST), toys.SPACE
+
+    def task(parameters, own):  # a closure, because workers cannot import the tests
+        import random as chance
+        import time as clock
+
+        clock.sleep(0.03)
+        away = sum(((parameters[k] - v) / space["model"][k[6:]]["high"]) ** 2 for k, v in best.items())
+        return {"fitness": 1.0 - away + 0.01 * chance.Random(own).gauss(0.0, 1.0)}, "", 0.0, "worker"
+
+    shutil.rmtree(folder, ignore_errors=True)
+    study, chance = toys.study(population=10, generations=10, seeds=2), random.Random(seed)
+    open_folder(folder / "here", study, resume=False)
+    run(study, folder / "here", Here(lambda p, s: task(p, s)[0], 2))
+    died = studies = 0
+    while died < kills:
+        over = threading.Event()
+        how = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 60}
+        with distributed.LocalCluster(**how) as cluster:
+
+            def killer(cluster=cluster, over=over):
+                nonlocal died
+                while not over.wait(chance.uniform(0.2, 0.6)):
+                    worker = chance.choice(list(cluster.workers.values()))
+                    # one at a time: a worker that dies before it has started is given up by its nanny
+                    if worker.pid and len(cluster.scheduler_info["workers"]) == 2:
+                        os.kill(worker.pid, signal.SIGKILL)
+                        died += 1
+
+            thread = threading.Thread(target=killer)
+            place = folder / f"there{studies}"
+            open_folder(place, study, resume=False)
+            executor = Cluster([task], cluster.scheduler_address)
+            thread.start()
+            try:
+                run(study, place, executor)
+            finally:
+                over.set()
+                thread.join()
+        assert rows(place) == rows(folder / "here"), f"study {studies} ended differently after {died} kills"
+        studies += 1
+        sys.stderr.write(f"workers: {died} of {kills} kills\n")
+    sys.stdout.write(f"workers: {died} workers killed under {studies} studies: all ends identical\n")
 
 
 def main():
     """Exit status 0 if all ends are identical."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("folder", type=Path)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=lambda name: Path(name).resolve())
+    parser.add_argument("--what", choices=[*LIVES, "workers"], default="evolve")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
-    chance = random.Random(asked.seed)
-    begin = time.perf_counter()
-    os.waitpid(child(asked.folder / "undisturbed"), 0)
-    usual = time.perf_counter() - begin
-    wanted = contents(asked.folder / "undisturbed")
-    kills = studies = 0
-    while kills < asked.kills:
-        folder = asked.folder / f"study{studies}"
-        while True:
-            pid = child(folder)
-            limit, dead = time.perf_counter() + chance.uniform(0.0, 0.9 * usual), 0
-            while not dead and (time.perf_counter() < limit or kills >= asked.kills):
-                dead, status = os.waitpid(pid, os.WNOHANG)
-                time.sleep(0.001)
-            if dead:
-                assert status == 0, f"study {studies} failed after {kills} kills"
-                break
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
-            kills += 1
-        assert contents(folder) == wanted, f"study {studies} ended differently after {kills} kills"
-        studies += 1
-    sys.stdout.write(f"{kills} kills in {studies} studies of {usual:.2f} s: all ends identical\n")
+    if asked.what == "workers":
+        workers(asked.folder / "workers", asked.kills, asked.seed)
+    else:
+        killed(asked.what, asked.folder / asked.what, asked.kills, asked.seed)
 
 
 if __name__ == "__main__":

@@ -96,6 +96,7 @@ def silence(keys: dict[str, Any], rng: Random, kind: str, length: float, dt: flo
     if not hears or keys["update"] == "sequential" or rng.random() > 0.4:
         return
     keys |= {"silence.rule": "stop", "silence.patience": dt * rng.choice((0, 2, 6)), "silence.keep": 0.5 * length}
+    keys["silence.pause"] = dt * (0, 1, 5)[keys["agents"] % 3]
     keys |= {"silence.closing": length * rng.choice((0.0, 1.0, 20.0)), "silence.forget": rng.choice((0.4, 20.0))}
 
 

@@ -142,6 +142,12 @@ class _Dead(ast.NodeTransformer):
             return None
         return node
 
+    def visit_AugAssign(self, node):
+        if isinstance(node.target, ast.Name) and node.target.id not in self.read:
+            self.dropped = True
+            return None
+        return node
+
     def visit_For(self, node):
         self.generic_visit(node)
         return node if node.body else None

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Wheel and sdist of this commit with their hashes: the same commit gives the same bytes.
+# Wheels and sdists of airflock and airflock-papers of this commit with their hashes: the same commit gives the same bytes.
 # Usage: tools/build.sh FOLDER   (needs the package build)
 set -euo pipefail
 out=$(realpath -m "${1:?give a folder}")
@@ -9,5 +9,6 @@ export SOURCE_DATE_EPOCH
 umask 022
 rm -rf "$out"
 python -m build --outdir "$out" .
+python -m build --outdir "$out" papers
 cd "$out"
 sha256sum ./*.whl ./*.tar.gz > SHA256SUMS

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from inspect import getsource
 from typing import Any
 
+import kinds
 from repository import repository
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
@@ -27,6 +28,18 @@ PICTURES = {
     "dimock_2003": "51_formation_flight",
 }  # fmt: skip
 
+LOW_AND_HIGH = "25_low_and_high"  # draws all order parameters but these, which tell of whole flights or scenes
+DRAWN = {
+    "14_transfer": ("f_speed", "f_coll", "f_disc", "f_cluster", "f_wall", "f_corr", "fitness"),
+    "16_obstacles": ("n_contacts", "touching"),
+    "30_city": ("goals_reached", "goals", "time_to_goal", "f_goals", "f_env", "n_env_coll", "avoiding", "n_avoid"),
+    "31_rays": ("rays",),
+    "32_flocked": ("flocked", "time_to_flock", "n_clusters", "n_stragglers"),
+    "50_boids": ("f_collision", "cns_ext", "cns_pol", "quality", "cns_ext_groups", "cns_pol_groups", "quality_groups"),
+    "51_formation_flight": ("power", "power_most", "power_solo", "saving", "crowding", "unrest", "stable"),
+    "21_couzin_mill": ("volume",),
+}
+
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before sphinx looks for them."""
@@ -39,6 +52,8 @@ def write_all() -> None:
     models()
     order_parameters()
     robots()
+    kinds.faults()
+    kinds.topologies()
     vocabulary()
     keys()
     commands()
@@ -155,7 +170,20 @@ def order_parameters() -> None:
         rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
         pieces.append(table(("what", "of it"), rows))
         pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
+        pieces.append(f"\n{_drawn(name)}\n")
     put("order_parameters.md", "".join(pieces))
+
+
+def _drawn(name: str) -> str:
+    """Where the gallery shows an order parameter."""
+    if f'"{name}"' in (DOCS / "gallery" / f"{LOW_AND_HIGH}.py").read_text(encoding="utf-8"):
+        return f"[A picture of low and high](/generated/gallery/{LOW_AND_HIGH}) shows two flocks with their values."
+    if name == "present":
+        return "It has no picture: 1 where all are there, 0.5 where half of the agents dropped out at the start."
+    example = next((example for example, names in DRAWN.items() if name in names), "")
+    if not example:
+        raise ExtensionError(f"order parameter {name}: no example of the gallery shows it")
+    return f"[A picture](/generated/gallery/{example}) of flights that it tells of is in the gallery."
 
 
 def _names(found: Iterable[str]) -> str:
@@ -283,21 +311,17 @@ def vocabulary() -> None:
 
 def keys() -> None:
     """Every key of a scenario file, and the units that values may carry."""
-    from airflock.scenarios.keys import about, records
-    from airflock.scenarios.keys import keys as keys_of
-    from airflock.scenarios.laws import MODELS
+    from airflock.scenarios.keys import sections
     from airflock.scenarios.units import UNITS
 
     pieces = [
         "# Every key of a scenario file\n\nThe same lists are printed by `airflock keys`, `airflock keys radio`, "
         "`airflock keys delay`, and with `--json` for machines. A dash means that the value comes from the rest of the "
-        "scenario. Four more keys stand at the top: `title`, `extends` (a preset or file to begin from), `published` "
-        "(what a paper reports), and `model.kind`, `body.kind` and "
-        "`sensors.kind` name the law, the body and the sensor; `radio.kind` may name a file, too.\n"
+        "scenario, or that there is none.\n"
     ]
-    for name in records():
-        head = f'model.kind = "{name}"' if name in MODELS else name
-        pieces.append(f"\n## {head}\n\n{plain(about(name))}\n\n{key_table(keys_of(name))}")
+    for section in sections().values():
+        pieces.append(f"\n## {plain(section.head)}\n\n{plain(section.about)}\n\n")
+        pieces.append(key_table(section.keys) if section.keys else "It has no numbers of its own.\n")
     pieces.append(
         '\n## Units\n\nA plain number is in the declared SI unit. A text such as `"400 ms"`, or a table with value '
         "and unit, is converted; a note tells every conversion.\n\n"

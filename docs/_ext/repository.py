@@ -26,15 +26,11 @@ def repository() -> None:
         copy(folder / "README.md", f"papers/{folder.name}/index.md", after)
         for path in extra:
             copy(path, f"papers/{folder.name}/{path.stem.lower()}.md")
-    alone = sorted((ROOT / "papers").glob("*.md"))
+    alone = sorted(path for path in (ROOT / "papers").glob("*.md") if path.name != "README.md")
     for path in alone:
         copy(path, f"papers/{path.stem.lower()}.md")
     listed = "\n".join([f"{path.name}/index" for path in papers] + [path.stem.lower() for path in alone])
-    head = (
-        "# Papers\n\nEvery publication that is recomputed: each number that was compared, what was flown for it, and "
-        "whether it was met. `airflock paper NAME` flies it again.\n\n"
-    )
-    put("papers/index.md", f"{head}```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
+    copy(ROOT / "papers/README.md", "papers/index.md", f"\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n")
 
 
 def copy(source: Path, name: str, after: str = "") -> None:
@@ -67,7 +63,7 @@ def _page_of(file: Path) -> str | None:
         return None
     parts = file.relative_to(ROOT).parts
     if parts[0] == "papers" and len(parts) == 2 and file.suffix == ".md":
-        return f"papers/{file.stem.lower()}.md"
+        return f"papers/{'index' if parts[1] == 'README.md' else file.stem.lower()}.md"
     if parts[0] == "papers" and len(parts) in (2, 3) and (len(parts) == 2 or file.suffix == ".md"):
         rest = "index" if len(parts) == 2 or parts[2] == "README.md" else file.stem.lower()
         return f"papers/{parts[1]}/{rest}.md"

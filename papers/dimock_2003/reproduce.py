@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from airflock.papers.claims import print_claims
-from airflock.papers.dimock_2003.report import reproduce
+from airflock_papers.claims import print_claims
+from airflock_papers.dimock_2003.report import reproduce
 
 if __name__ == "__main__":
     print_claims(reproduce(Path(__file__).parent))

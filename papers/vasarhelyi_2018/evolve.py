@@ -8,9 +8,9 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from airflock.papers.claims import print_claims
-from airflock.papers.vasarhelyi_2018.evolved import reproduce
-from airflock.papers.vasarhelyi_2018.table_s1 import RUNS
+from airflock_papers.claims import print_claims
+from airflock_papers.vasarhelyi_2018.evolved import reproduce
+from airflock_papers.vasarhelyi_2018.table_s1 import RUNS
 
 if __name__ == "__main__":
     here = Path(__file__).parent

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from airflock.papers import page
-from airflock.papers.claims import print_claims
-from airflock.papers.vicsek_1995 import PAPER
+from airflock_papers import page
+from airflock_papers.claims import print_claims
+from airflock_papers.vicsek_1995 import PAPER
 
 ABOUT = "The paper's text is not at hand: nothing is quoted, and nothing counts as a sentence of the paper."
 

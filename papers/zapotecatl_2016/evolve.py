@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from airflock.papers import page
-from airflock.papers.claims import print_claims
-from airflock.papers.zapotecatl_2016 import PAPER
+from airflock_papers import page
+from airflock_papers.claims import print_claims
+from airflock_papers.zapotecatl_2016 import PAPER
 
 TITLE = "Boids evolved for the quality of Zapotecatl et al. 2016"
 

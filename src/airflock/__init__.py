@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.identify.run import identify as identify
     from airflock.infer.run import infer as infer
     from airflock.metrics.registry import metric_set as metric_set
-    from airflock.papers.recompute import paper as paper
+    from airflock.papers import paper as paper
     from airflock.plots.picture import plot as plot
     from airflock.plots.video import video as video
     from airflock.recordings.exports.export import export as export
@@ -101,7 +101,7 @@ _WHERE = {
     "infer": "airflock.infer",
     "load_tracks": "airflock.recordings.imports.load",
     "load_recording": "airflock.recordings.files",
-    "paper": "airflock.papers.recompute",
+    "paper": "airflock.papers",
     "doctor": "airflock.recordings.health",
 }
 # packages; all but plots can be called (decision 0010)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from airflock.errors import AirflockError, ScenarioError, bounded, reason
+from airflock.errors import AirflockError, CardError, ScenarioError, bounded, reason
 
 MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
@@ -74,7 +74,7 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
 
 def _one(kind: type[AirflockError], line: str) -> AirflockError:
     line = bounded(" ".join(line.split()))
-    return kind([line]) if issubclass(kind, ScenarioError) else kind(line)
+    return kind([line]) if issubclass(kind, (ScenarioError, CardError)) else kind(line)
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
@@ -114,6 +114,17 @@ def toml(text: str) -> dict[str, Any]:
         raise FormatError(str(fault)) from fault
     _walk(document)
     return document
+
+
+def toml_value(text: str) -> Any:
+    """A value as TOML writes it, or the text itself where it is none; raises TextError where it is more than one."""
+    try:
+        document = toml(f"value = {text}")
+    except FormatError:
+        return text.strip()
+    if list(document) != ["value"]:
+        raise TextError("holds more than one value; give each key one of its own")
+    return document["value"]
 
 
 def json_object(text: Any) -> dict[str, Any]:

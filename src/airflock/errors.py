@@ -86,7 +86,7 @@ class CardError(AirflockError):
     """A flight card cannot be flown: carries every fault that was found, one line each."""
 
     def __init__(self, faults: list[str]):
-        self.faults = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in fault) for fault in faults]
+        self.faults = [printable(fault) for fault in bounded_lines(faults)]
         super().__init__("\n".join(self.faults))
 
 

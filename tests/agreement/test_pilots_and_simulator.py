@@ -24,6 +24,7 @@ from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
 from airflock.onboard.fields import frozen
+from airflock.radios.registry import RADIOS
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
 from flocks import ISLANDS, PENTAGON
@@ -199,7 +200,7 @@ def test_only_the_newest_sound_packet_counts():
 
 
 def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock():
-    one = pilot(hearing=Hearing.simulated(links=False))
+    one = pilot(hearing=Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters()))
     own, east = State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0), State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     assert one.hear(1, east, 7.0, 5.0), "its clock is 2 s ahead"
     assert one.hear(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
@@ -207,7 +208,7 @@ def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock()
     assert heard.state.x == 8.0 and heard.age == 1.0
     met, alone = one.decide(own, 5.0).command, one.decide(own, 5.2).command
     assert met != alone and not one.heard(5.2)
-    links = pilot(hearing=Hearing.simulated(links=True))
+    links = pilot(hearing=Hearing.simulated(RADIOS["links"], RADIOS["links"].Parameters()))
     links.hear(1, east, 4.0, 5.0)
     links.decide(own, 5.0)
     assert links.heard(500.0)[0].state.x == 9.0 + 496.0
@@ -247,7 +248,10 @@ def test_a_neighbour_counts_as_heard_or_as_lost_but_never_as_both(age, distance)
 
 def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
     """With the rule of silence the law hears it until it is lost; without, it is gone at the next decision."""
-    hearing, own = Hearing.simulated(links=False), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    hearing, own = (
+        Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters()),
+        State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0),
+    )
     for rule, known in ((Silence(rule="stop", patience=1.5), True), (None, False)):
         one = pilot(silence=rule, hearing=hearing)
         one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 1.0)
@@ -264,7 +268,8 @@ def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():
     away = own._replace(x=1.5, y=-2.0)
     assert one.decide(away, 4.05).command == pytest.approx((-0.75, 1.0, 0.0)), "back to where it stopped"
     one.hear(1, State(20.0, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 4.1)
-    assert math.hypot(*one.decide(own, 4.2).command[:2]) > 1.0
+    assert one.decide(away, 4.2).command == pytest.approx((-0.75, 1.0, 0.0)), "it stands for a second more"
+    assert math.hypot(*one.decide(own, 5.1).command[:2]) > 1.0
     assert one.steer(own, 9.0) == (0.0, 0.0, 0.0)
     one.forget(1)
     assert not one.lost_near(own, 9.0)

@@ -21,7 +21,19 @@ from airflock.engine.passes import build as building
 from airflock.engine.passes import driver
 from airflock.engine.simulate import plan_of
 from airflock.engine.specialise import values
-from airflock.engine.stages import decide, move, neighbours, noise, perceive, receive, scene, start, surfaces
+from airflock.engine.stages import (
+    clusters,
+    decide,
+    measure,
+    move,
+    neighbours,
+    noise,
+    perceive,
+    receive,
+    scene,
+    start,
+    surfaces,
+)
 from airflock.scenarios.files import load, presets
 from flocks import ISLANDS, NOTCHED, SILENT, scenario
 from trees import digests
@@ -107,6 +119,8 @@ CHANGES = (
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
     (perceive, "flock.position[a][i] + flock.own_error", "flock.position[a][i] + flock.sent_error", "3-D"),
     (decide, "flock.command[a][i] = o[a]", "flock.command[a][i] = o[0]", "quiet"),
+    (measure, "(integer(j) < nn)", "(integer(j) <= nn)", "quiet"),
+    (clusters, "if done + size == n", "if size == n", "quiet"),
     (start, "return -(i + 1)", "return -i", "quiet"),
     (scene, "later[r, 6] <= time", "later[r, 6] >= time", "kidger/city"),
     (noise, "step % 2 == 0", "step % 2 == 1", "links"),

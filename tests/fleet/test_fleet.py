@@ -253,11 +253,30 @@ def test_silence_does_not_end_in_a_collision():
     assert lows[True] > 3.0 > lows[False]
 
 
-def test_whose_node_died_has_landed_before_the_others_forget_it():
-    """Its autopilot lands where setpoints end; the others stand still meanwhile, and then fly on."""
-    f = in_the_air(10, 30.0, 3, (Fault("node", (2,), 5.0),), noisy=True, silent=True)
+@pytest.mark.parametrize(("kind", "seconds"), [("px4", 30.0), ("ardupilot", 36.0)])
+def test_whose_node_died_lands_while_the_others_stand(kind, seconds):
+    """PX4 lands a second after the last setpoint, ArduPilot five after the last heartbeat; the others wait for 20 s."""
+    found = compare.sampled(scenario(4, seconds, noisy=True), 0.2)
+    card = compare.software_card(found, silent=True, vehicle=kind)
+    f = compare.fly(found, card, 3, faults=(Fault("node", (2,), 5.0),))
+    at = f.array()[round(25.0 / card.period), 1]
+    assert at[2] < 8.0, "when it is given up it is far below the flock"
     assert f.vehicles[1].mode == "LAND" and not f.vehicles[1].armed
     assert f.vehicles[1].state.z == 0.0
+
+
+def test_who_holds_stays_where_it_came_to_stand():
+    """A minute of outer noise does not carry it away: by its own navigation it is where it was."""
+    found = compare.sampled(scenario(2, 60.0, noisy=True), 0.2)
+    f = fleet(found, 1, start=compare.first_states(found, 1))
+    f.advance(1.0)
+    f.order(Do.HOLD)
+    f.advance(10.0)
+    stands = [v.measured for v in f.vehicles]
+    f.advance(60.0)
+    assert set(f.phases()) == {Phase.HOLD}
+    for before, v in zip(stands, f.vehicles, strict=True):
+        assert math.dist(before[:2], v.measured[:2]) < 1.5
 
 
 def test_a_clock_that_is_half_a_second_off_never_starts():
@@ -267,6 +286,20 @@ def test_a_clock_that_is_half_a_second_off_never_starts():
     f.advance(20.0)
     assert f.nodes[1].phase == Phase.READY and not f.vehicles[1].armed
     assert any("missing: clock: -0.50 s" in note for _, who, note in f.log if who == 2), f.log
+
+
+def test_who_forges_packets_changes_nothing_without_the_key_and_little_with_it():
+    """Without: the same bits. With: what jumps is refused, and the drone itself tells that it has a double."""
+    settings = {"radio.delay": 0.2, "world.side": 60.0, "start.separation": 6.0}
+    plain = in_the_air(3, 5.0, **settings)
+    rogue = in_the_air(3, 5.0, faults=(Fault("rogue", (2,), 1.0, amount=30.0),), **settings)
+    assert rogue.digest() == plain.digest() and rogue.nodes[0].refused["signature"] > 10
+    impostor = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=30.0),), **settings)
+    assert impostor.nodes[0].refused["jump"] > 10 and impostor.nodes[0].peers.all[2].state is not None
+    assert math.dist(impostor.nodes[0].peers.all[2].state[:2], impostor.vehicles[1].state[:2]) < 5.0
+    assert any("another sender signs as member 2" in note for _, who, note in impostor.log if who == 2)
+    near = in_the_air(3, 5.0, faults=(Fault("impostor", (2,), 1.0, amount=3.0),), **settings)
+    assert near.digest() != plain.digest(), "what is plausible is believed: the key is what is trusted"
 
 
 def test_faults_are_checked_at_once(tmp_path):
@@ -311,6 +344,22 @@ def test_px4_does_what_its_parameter_says_when_setpoints_end(action, mode):
     v.step(0.9, 0.01)
     assert v.mode == "OURS"
     v.step(1.1, 0.01)
+    assert v.mode == mode
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, "OURS"), (1, "RTL"), (5, "LAND"), (7, "HOLD")])
+def test_ardupilot_does_what_its_parameter_says_when_heartbeats_end(action, mode):
+    """Five seconds after the last heartbeat of its own station, and of no other."""
+    v, say, stranger = vehicle("ardupilot"), Speaker(AUTOPILOTS["ardupilot"], 1), Speaker(AUTOPILOTS["ardupilot"], 9)
+    v.parameters["FS_GCS_ENABLE"] = action
+    v.state, v.armed, v.mode = State(0.0, 0.0, 20.0, 0.0, 0.0, 0.0), True, "OURS"
+    v.step(60.0, 0.01)
+    assert v.mode == "OURS", "nobody has ever been there"
+    v.receive(say.heartbeat(), 60.0)
+    v.receive(stranger.heartbeat(), 63.0)
+    v.step(64.9, 0.01)
+    assert v.mode == "OURS"
+    v.step(65.1, 0.01)
     assert v.mode == mode
 
 

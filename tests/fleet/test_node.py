@@ -23,6 +23,7 @@ from airflock.onboard.card import card_of, hash_of, read_card, write_card
 from airflock.onboard.log import Logged, read_memory, replay
 from airflock.onboard.mission import Phase
 from airflock.onboard.node import Memory, Node
+from airflock.onboard.saying import own_status
 from fleets import PRIVATE, document, fleet, scenario
 
 common = dialect.common()
@@ -195,8 +196,9 @@ def test_two_drones_with_one_number_do_not_start():
     for datagram in node.tick(1.0).radios[0] + node.tick(1.2).radios[0]:
         node.radio(datagram, 1.2)  # a radio that hears itself
     node.radio(
-        Signer(bytes(32), 1)(status.message(node._status(node.wire.state, 1.2), CARD.site), STARTED + 10**6), 1.2
-    )
+        Signer(bytes(32), 1)(status.message(own_status(CARD, node.wire, node.wire.state, STARTED, node.phase, peers=0),
+                                            CARD.site), STARTED + 10**6), 1.2,
+    )  # fmt: skip
     live(node, vehicle, 1.4, 2.0)
     assert node.phase == Phase.READY, "neither an echo nor a forgery is a twin"
     node.radio(told(who=1, utc=STARTED + 2_050_123), 2.1)
@@ -234,7 +236,7 @@ def test_a_card_is_written_and_read_and_its_change_is_seen(tmp_path):
     path.write_text(json.dumps(changed))
     with pytest.raises(CardError, match="changed after it was written"):
         read_card(path)
-    for text, line in (("{", "is not JSON"), ("[]", "not a flight card"), ("[" * 10_000, "not JSON")):
+    for text, line in (("{", "is not JSON"), ("[]", "not a flight card"), ("[" * 10_000, "nested more than 32 deep")):
         path.write_text(text)
         with pytest.raises(CardError, match=line):
             read_card(path)

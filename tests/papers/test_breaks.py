@@ -5,12 +5,13 @@ import json
 import pytest
 
 import airflock
+import airflock_papers
 from airflock.errors import AirflockError
-from airflock.papers import breaks, quick, statistics
-from airflock.papers.claims import Measured
-from airflock.papers.flights import Flights, with_changes
-from airflock.papers.paper import Paper
-from airflock.papers.statements import Statement
+from airflock_papers import breaks, quick, statistics
+from airflock_papers.claims import Measured
+from airflock_papers.flights import Flights, with_changes
+from airflock_papers.paper import Paper
+from airflock_papers.statements import Statement
 
 
 def statement(name: str, bound: str, changes: dict) -> Statement:
@@ -58,10 +59,10 @@ def test_a_change_sets_or_multiplies_what_a_scenario_has() -> None:
     assert halved.agents == 7 and halved.flight.duration == 2.0 * scenario.flight.duration
 
 
-@pytest.mark.parametrize("name", airflock.papers.PAPERS)
+@pytest.mark.parametrize("name", airflock_papers.PAPERS)
 def test_every_change_is_of_keys_that_scenarios_have(name: str) -> None:
     presets = {"kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms"}
-    for found in breaks.load(f"airflock.papers.{name}").values():
+    for found in breaks.load(f"airflock_papers.{name}").values():
         if found.breaks and found.breaks != breaks.EXCHANGED:
             before = airflock.load(presets[name])
             after = with_changes(before, found.breaks)
@@ -111,6 +112,6 @@ def test_the_committed_verdicts_are_of_known_claims_and_parts() -> None:
     rows = quick.committed()
     silent = {("kidger", "readings")}  # a table without a claim
     assert {(row.paper, row.part) for row in rows} | silent == set(quick.parts())
-    for name in airflock.papers.PAPERS:
-        known = breaks.load(f"airflock.papers.{name}")
+    for name in airflock_papers.PAPERS:
+        known = breaks.load(f"airflock_papers.{name}")
         assert {row.id for row in rows if row.paper == name} <= set(known), name

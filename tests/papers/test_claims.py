@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airflock.errors import AirflockError
-from airflock.papers import PAPERS, bounds, statistics
-from airflock.papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
-from airflock.papers.statements import LONGEST, load, read
+from airflock_papers import PAPERS, bounds, statistics
+from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
+from airflock_papers.statements import LONGEST, load, read
 
 ROOT = Path(__file__).parents[2] / "papers"
 COMMITTED = [path for name in PAPERS for path in sorted((ROOT / name).glob("*.toml"))]
@@ -94,7 +94,7 @@ def test_a_bound_on_what_was_not_measured_is_told() -> None:
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_shipped_statements_are_sound(name: str) -> None:
-    statements = load(f"airflock.papers.{name}")
+    statements = load(f"airflock_papers.{name}")
     assert all(s.fails_if for s in statements.values() if s.kind == "paper" and s.bound)
     assert all(s.published is None or s.quote for s in statements.values())
 
@@ -102,7 +102,7 @@ def test_shipped_statements_are_sound(name: str) -> None:
 @pytest.mark.parametrize("path", COMMITTED, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_committed_claims_are_those_of_the_statements(path: Path) -> None:
     """Every field that a statement has stands in the committed claim, and the verdict follows from the bound."""
-    statements = load(f"airflock.papers.{path.parent.name}")
+    statements = load(f"airflock_papers.{path.parent.name}")
     for claim in read_claims(path)[1]:
         told = statements[claim.id]
         for key, value in asdict(told).items():
@@ -114,7 +114,7 @@ def test_committed_claims_are_those_of_the_statements(path: Path) -> None:
 @pytest.mark.parametrize("name", PAPERS)
 def test_every_statement_stands_on_a_committed_page(name: str) -> None:
     flown = {claim.id for path in sorted((ROOT / name).glob("*.toml")) for claim in read_claims(path)[1]}
-    missing = [key for key in load(f"airflock.papers.{name}") if key not in flown]
+    missing = [key for key in load(f"airflock_papers.{name}") if key not in flown]
     assert not missing
 
 

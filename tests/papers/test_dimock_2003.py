@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from airflock.metrics import fitness_dimock
-from airflock.papers.dimock_2003 import ga, robust, robust_claims, static
-from airflock.papers.dimock_2003.flights import Flight
-from airflock.papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 from airflock.scenarios.files import load
+from airflock_papers.dimock_2003 import ga, robust, robust_claims, static
+from airflock_papers.dimock_2003.flights import Flight
+from airflock_papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 
 
 def test_the_published_gains_lie_on_the_chromosome():

@@ -11,8 +11,8 @@ import airflock
 from airflock.engine.simulate import score_flights
 from airflock.errors import AirflockError
 from airflock.evolve.study import load_study
-from airflock.papers.claims import read_claims
-from airflock.papers.kidger import PAPER, conduct
+from airflock_papers.claims import read_claims
+from airflock_papers.kidger import PAPER, conduct
 
 FOLDER = Path(__file__).parents[2] / "papers" / "kidger"
 SEEDS = range(20)

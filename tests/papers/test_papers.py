@@ -8,24 +8,25 @@ from pkgutil import iter_modules
 import pytest
 from typer.testing import CliRunner
 
-import airflock.papers
+import airflock
+import airflock_papers
 from airflock.cli.main import app
-from airflock.papers import PAPERS, programs
-from airflock.papers.paper import Paper
-from airflock.papers.sentences import PARTS, faults, first_words, letters, sentences
+from airflock_papers import PAPERS, programs
+from airflock_papers.catalogue import find
+from airflock_papers.sentences import PARTS, faults, first_words, letters, sentences
 
 ROOT = Path(__file__).parents[2]
 
 
 def test_every_module_with_a_paper_is_listed() -> None:
-    names = [item.name for item in iter_modules(airflock.papers.__path__)]
-    found = {name for name in names if hasattr(import_module(f"airflock.papers.{name}"), "PAPER")}
+    names = [item.name for item in iter_modules(airflock_papers.__path__)]
+    found = {name for name in names if hasattr(import_module(f"airflock_papers.{name}"), "PAPER")}
     assert found == set(PAPERS)
 
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_the_committed_page_is_of_that_paper(name: str) -> None:
-    paper: Paper = import_module(f"airflock.papers.{name}").PAPER
+    paper = find(name)
     folder = ROOT / "papers" / name
     assert (folder / "README.md").read_text(encoding="utf-8").startswith(f"# {paper.title}\n")
     header = tomllib.loads((folder / "claims.toml").read_text(encoding="utf-8"))
@@ -46,7 +47,7 @@ def test_a_list_of_sentences_is_checked_against_a_text() -> None:
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_an_unknown_part_is_refused_before_anything_flies(name: str) -> None:
-    paper: Paper = import_module(f"airflock.papers.{name}").PAPER
+    paper = find(name)
     with pytest.raises(airflock.AirflockError, match=f"only = 'nothing': unknown part; known: .*{paper.parts[0]}"):
         paper.run(only="nothing")
 

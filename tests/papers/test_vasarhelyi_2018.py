@@ -13,13 +13,13 @@ import airflock
 from airflock.core.maths import bell, peak, rising
 from airflock.errors import AirflockError
 from airflock.metrics.fitness_vasarhelyi import fitness
-from airflock.papers import statistics
-from airflock.papers.claims import Claim, judge, read_claims
-from airflock.papers.flights import Flights
-from airflock.papers.statements import load
-from airflock.papers.vasarhelyi_2018 import PAPER, fig1, outdoor, pressure, report, table_s2, tuning
-from airflock.papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
-from airflock.papers.vasarhelyi_2018.table_s2 import PROGRAM
+from airflock_papers import statistics
+from airflock_papers.claims import Claim, judge, read_claims
+from airflock_papers.flights import Flights
+from airflock_papers.statements import load
+from airflock_papers.vasarhelyi_2018 import PAPER, fig1, outdoor, pressure, report, table_s2, tuning
+from airflock_papers.vasarhelyi_2018.published import REFIT, SPEEDS, optimum, program_runs
+from airflock_papers.vasarhelyi_2018.table_s2 import PROGRAM
 
 FOLDER = Path(__file__).parents[2] / "papers" / "vasarhelyi_2018"
 
@@ -176,7 +176,7 @@ def test_pressure_keeps_the_density(agents):
 def test_quick_table_s2_at_one_speed_is_near_the_table():
     """Ten flights at 6 m/s, the speed with the smallest spread."""
     scores = airflock.score(optimum(6), seeds=10)
-    found = judge(load("airflock.papers.vasarhelyi_2018"), [table_s2.against_program(6, c, scores) for c in PROGRAM])
+    found = judge(load("airflock_papers.vasarhelyi_2018"), [table_s2.against_program(6, c, scores) for c in PROGRAM])
     assert [claim.verdict for claim in found] == ["agrees"] * 4
 
 
@@ -200,7 +200,7 @@ def test_every_pair_of_tuning_differs_in_what_its_sentence_says():
         for v in tuning.ONLY.get(name, tuning.SPEEDS):
             assert tuning.CASES[changed].scenario(v).document != tuning.CASES[base].scenario(v).document
             for column in columns:
-                assert f"tuning.{name}.{column}.{v}ms" in load("airflock.papers.vasarhelyi_2018")
+                assert f"tuning.{name}.{column}.{v}ms" in load("airflock_papers.vasarhelyi_2018")
 
 
 @pytest.mark.papers
@@ -214,7 +214,7 @@ def test_verdicts_are_those_committed(part, committed):
 @pytest.mark.papers
 def test_another_hundred_seeds_agree_with_the_authors_program():
     """Not the seeds of the committed numbers."""
-    statements = load("airflock.papers.vasarhelyi_2018")
+    statements = load("airflock_papers.vasarhelyi_2018")
     for v in SPEEDS:
         scores = airflock.score(optimum(v), seeds=range(1000, 1100))
         for claim in judge(statements, [table_s2.against_program(v, column, scores) for column in PROGRAM]):

@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from airflock.papers.claims import judge
-from airflock.papers.statements import load
-from airflock.papers.zapotecatl_2016 import COARSE_OFF, RADII, published
-from airflock.papers.zapotecatl_2016.verdicts import TRENDS, distance, minimum, trend
+from airflock_papers.claims import judge
+from airflock_papers.statements import load
+from airflock_papers.zapotecatl_2016 import COARSE_OFF, RADII, published
+from airflock_papers.zapotecatl_2016.verdicts import TRENDS, distance, minimum, trend
 
-STATEMENTS = load("airflock.papers.zapotecatl_2016")
+STATEMENTS = load("airflock_papers.zapotecatl_2016")
 
 
 def grid(value, seeds=5, spread=1e-6):

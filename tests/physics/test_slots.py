@@ -8,8 +8,9 @@ import pytest
 
 import airflock.display
 from airflock.engine import cpu
-from airflock.engine.passes.slots import EVERY, slotted
+from airflock.engine.passes.slots import slotted
 from airflock.engine.simulate import plan_of
+from airflock.engine.stages.flight import EVERY
 from airflock.engine.tables import tables
 from airflock.scenarios.files import load
 

@@ -3,6 +3,7 @@
 python tests/security/fuzz.py scenarios 1000000 --seed 7
 python tests/security/fuzz.py studies 100000
 python tests/security/fuzz.py recordings 10000
+python tests/security/fuzz.py files 100000
 python tests/security/fuzz.py commands 3000
 python tests/security/fuzz.py caches 200
 python tests/security/fuzz.py disks 1000
@@ -15,6 +16,7 @@ than its reader may), or by ending the process.
 """
 
 import argparse
+import json
 import os
 import select
 import signal
@@ -26,15 +28,16 @@ from pathlib import Path
 
 import damages
 import mutations
+import other_files
 
 HANG = 20.0  # s
 BATCH = 400  # cases of a child
-PATIENCE = {"recordings": 70.0}  # s; a reader has 15 s of a processor, four times as long where others use it, too
-SLOW = ("recordings", "caches", "disks")
-CASES = mutations.CASES | damages.CASES
+PATIENCE = {"recordings": 70.0, "files": 70.0}  # s; a reader has 15 s of a processor, four times as long by the clock
+SLOW = ("recordings", "caches", "disks", "files")
+CASES = mutations.CASES | damages.CASES | other_files.CASES
 
 
-def attack(case, count, seed, *, folder, begin=0, say=None, batch=BATCH, hang=HANG):
+def attack(case, count, seed, *, folder, begin=0, batch=BATCH, hang=HANG):
     """Run case(seed, number, folder) for `count` numbers; the failures as (number, reason), and how many were refused.
 
     A case returns whether it was accepted, and raises for anything else than that or an AirflockError.
@@ -51,8 +54,6 @@ def attack(case, count, seed, *, folder, begin=0, say=None, batch=BATCH, hang=HA
         number, more, taken = _watch(pid, reading, number, stop, hang)
         failures += more
         accepted += taken
-        if say is not None:
-            say(number - begin, failures)
     return failures, accepted
 
 
@@ -107,6 +108,7 @@ def main():
     parser.add_argument("--seed", type=int, default=2018)
     parser.add_argument("--begin", type=int, default=0, help="number of the first case")
     parser.add_argument("--only", type=int, help="repeat one case in this process, with its traceback")
+    parser.add_argument("--kept", type=Path, help="file of what has been done, to go on after it was cut off")
     asked = parser.parse_args()
     case = CASES[asked.what]
     mutations.warm(asked.what)
@@ -114,24 +116,43 @@ def main():
         if asked.only is not None:
             sys.stdout.write(f"accepted: {case(asked.seed, asked.only, Path(folder), tell=True)}\n")
             return 0
-        began, told = time.monotonic(), time.monotonic()
+        return campaign(case, asked, Path(folder))
 
-        def say(done, failures):
-            nonlocal told
-            if time.monotonic() - told > 10.0:
-                told = time.monotonic()
-                sys.stderr.write(f"{done} of {asked.count}, {len(failures)} failures, {told - began:.0f} s\n")
 
-        how = {"begin": asked.begin, "say": say, "batch": 25 if asked.what in SLOW else BATCH}
-        how["hang"] = PATIENCE.get(asked.what, HANG)
-        failures, accepted = attack(case, asked.count, asked.seed, folder=Path(folder), **how)
-        for number, reason in failures:
-            sys.stdout.write(f"case {number}: {reason}\n")
-        sys.stdout.write(
-            f"{asked.what}, seed {asked.seed}: {asked.count} cases, {accepted} accepted, {len(failures)} failures, "
-            f"{time.monotonic() - began:.0f} s\n"
-        )
-        return 1 if failures else 0
+def campaign(case, asked, folder):
+    """All cases, in parts that are kept; status 0, 1 if something failed, 3 if the time was over before the end."""
+    done = {"cases": 0, "accepted": 0, "seconds": 0.0, "failures": []}
+    if asked.kept and asked.kept.exists():
+        done = json.loads(asked.kept.read_text())
+    limit = time.monotonic() + float(os.environ.get("AIRFLOCK_LIMIT", "inf"))
+    told = 0.0
+    how = {"batch": 25 if asked.what in SLOW else BATCH, "hang": PATIENCE.get(asked.what, HANG)}
+    while done["cases"] < asked.count and time.monotonic() < limit:
+        began, count = time.monotonic(), min(how["batch"], asked.count - done["cases"])
+        first = asked.begin + done["cases"]
+        failures, accepted = attack(case, count, asked.seed, folder=folder, begin=first, **how)
+        done["cases"] += count
+        done["accepted"] += accepted
+        done["seconds"] += time.monotonic() - began
+        done["failures"] += failures
+        if asked.kept:
+            asked.kept.write_text(json.dumps(done))
+        if time.monotonic() - told > 10.0:
+            told = time.monotonic()
+            sys.stderr.write(told_of(asked, done))
+    for number, reason in done["failures"]:
+        sys.stdout.write(f"case {number}: {reason}\n")
+    sys.stdout.write(told_of(asked, done))
+    return 3 if done["cases"] < asked.count else int(bool(done["failures"]))
+
+
+def told_of(asked, done):
+    """One line: cases, how many were accepted, failures, seconds, cases a second."""
+    rate = done["cases"] / max(done["seconds"], 1e-9)
+    return (
+        f"{asked.what}, seed {asked.seed}: {done['cases']} of {asked.count} cases, {done['accepted']} accepted, "
+        f"{len(done['failures'])} failures, {done['seconds']:.0f} s, {rate:.3g} a second\n"
+    )
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 
+import documents
+
 from airflock import doors
 from airflock.errors import AirflockError, ScenarioError
 
@@ -48,7 +50,8 @@ def anything(rng, depth=0):
     if kind == 4:
         return rng.choice([
             "", "x", "aaa" * 200, "mine.py", "a" * 300 + ".py", "../../etc/passwd", "/dev/zero", "\0", "é\u202e\n\x1b[",
-            "none", "square", "cap", "vicsek_1995", "kidger", "points", "mesh", "periodic", "fitness", "nsga2", "1",
+            "none", "square", "nearest", "visible", "gnss", "links", "stop", "motor", "dryden", "quadrotor",
+            "cap", "vicsek_1995", "kidger", "points", "mesh", "periodic", "fitness", "nsga2", "1",
         ])  # fmt: skip
     if kind == 5:
         return datetime.date(2018, 7, 18)
@@ -86,12 +89,12 @@ def lines_of(document):
 
 
 def mutate(rng, document):
-    """A copy of a document with one to four things changed."""
+    """A copy of a document with one to four things changed, also inside lists of tables."""
     document = json.loads(json.dumps(document, default=str))
     for _ in range(rng.choice([1, 1, 1, 2, 4])):
         table = document
-        while rng.random() < 0.75 and any(isinstance(v, dict) for v in table.values()):
-            table = table[rng.choice([k for k, v in table.items() if isinstance(v, dict)])]
+        while rng.random() < 0.75 and (inside := _inside(table)):
+            table = rng.choice(inside)
         key = rng.choice([*table, "new"]) if table else "new"
         what = rng.randrange(8)
         if what == 0:
@@ -99,15 +102,45 @@ def mutate(rng, document):
         elif what == 1:
             table[key + rng.choice(["x", " ", "é", "." * 3])] = table.pop(key, 1)
         elif what == 2:
-            table[rng.choice(["kind", "model", "scene", "goals", "world", "format", "published", "aero", "search"])] = (
-                anything(rng)
-            )
+            table[
+                rng.choice(
+                    [
+                        "kind",
+                        "model",
+                        "scene",
+                        "goals",
+                        "world",
+                        "format",
+                        "published",
+                        "aero",
+                        "search",
+                        "sensors",
+                        "topology",
+                        "silence",
+                        "groups",
+                        "faults",
+                        "extends",
+                        "body",
+                        "wind",
+                        "scenarios",
+                        "over_scenarios",
+                        "objective",
+                    ]
+                )
+            ] = anything(rng)
         elif what == 3 and isinstance(table.get(key), list) and table[key]:
             entry = rng.randrange(len(table[key]))
             table[key] = [*table[key][:entry], anything(rng), *table[key][entry + 1 :]]
         else:
             table[key] = anything(rng)
     return document
+
+
+def _inside(table):
+    """Tables that a table holds, alone or in lists."""
+    found = [value for value in table.values() if isinstance(value, dict)]
+    lists = [value for value in table.values() if isinstance(value, list)]
+    return found + [entry for entries in lists for entry in entries if isinstance(entry, dict)]
 
 
 def damage(rng, content):
@@ -136,10 +169,11 @@ def damage(rng, content):
 
 @cache
 def scenarios():
-    """Documents of all presets and of the golden scenario."""
+    """Documents of all presets, of the golden scenario, and of every section."""
     from airflock.scenarios.files import presets
 
-    return [doors.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
+    shipped = [doors.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
+    return shipped + [*documents.SCENARIOS] * (len(shipped) // len(documents.SCENARIOS))  # half of all cases
 
 
 @cache
@@ -149,8 +183,10 @@ def studies():
 
     found = [doors.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
     named = [document for document in found if "scenario" in document]
-    return [{**document, "scenario": document["scenario"].replace("scenario.toml", "vasarhelyi_2018/4ms")}
-            for document in named] + [document for document in found if "scenario" not in document]  # fmt: skip
+    rest = [document for document in found if "scenario" not in document]
+    preset = "vasarhelyi_2018/4ms"
+    named = [{**document, "scenario": document["scenario"].replace("scenario.toml", preset)} for document in named]
+    return named + rest + [*documents.STUDIES] * (len(named) // len(documents.STUDIES))  # half of all cases
 
 
 def _written(rng, documents, path):
@@ -256,7 +292,30 @@ def recording(seed, number, folder, tell=False):
     return _judged(use, path, tell)
 
 
-VERBS = ("run", "score", "sweep", "plot", "video", "presets", "validate", "display", "paper", "evolve", "harden")
+VERBS = (
+    "run",
+    "score",
+    "sweep",
+    "plot",
+    "video",
+    "presets",
+    "validate",
+    "display",
+    "paper",
+    "evolve",
+    "harden",
+    "replay",
+    "certify",
+    "tune",
+    "import",
+    "export",
+    "identify",
+    "infer",
+    "fleet",
+    "keys",
+    "doctor",
+    "types",
+)
 VALUES = (
     "", "0", "-1", "1e400", "nan", "inf", "9" * 50, "9" * 4400, "x", "model.p_rep=1", "model.p_rep=[[[[", "=1", "a=b=c",
     "model.p_rep={value=0.1}", "agents=" + "9" * 400, "model." + "x" * 5000 + "=1", "a" + ".a" * 50000 + "=1", "é=",
@@ -349,6 +408,10 @@ def warm(what):
         import airflock.evolve.run
         import airflock.plots.trajectories
         import airflock.recordings.files  # noqa: F401
+    elif what == "files":
+        import other_files
+
+        other_files.sound()
     elif what == "disks":
         import damages
 

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from mutations import GOLDEN
 
 import airflock
 from airflock.errors import RecordingError
+from airflock.recordings.flights import flown_document
 from airflock.recordings.opened import Opening
 
 
@@ -27,6 +29,23 @@ def test_this_process_opens_no_hdf5():
     )
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=120)
     assert done.stdout == "False\n", done.stderr
+
+
+def test_tracks_of_others_are_opened_apart_as_well(tmp_path):
+    xr.open_dataset(GOLDEN / "recording.nc", engine="h5netcdf").load().to_netcdf(tmp_path / "a.h5", engine="h5netcdf")
+    text = "import sys, airflock\nfound = airflock.load_tracks({!r}, unit='m')\nprint('h5py' in sys.modules)"
+    for name in (str(GOLDEN / "recording.nc"), str(tmp_path / "a.h5")):
+        done = subprocess.run([sys.executable, "-c", text.format(name)], capture_output=True, text=True, timeout=120)
+        assert done.stdout == "False\n", done.stderr
+
+
+def test_a_recording_names_no_file_of_code(tmp_path):
+    """Laws, bodies, sensors, metrics and faults of one's own are bare names in it."""
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    sections = ("model", "body", "sensors", "metrics")
+    document = {name: {**scenario.document.get(name, {}), "kind": "/home/someone/own.py"} for name in sections}
+    told = flown_document(replace(scenario, document={**document, "faults": [{"kind": "/home/someone/own.py"}]}))
+    assert "someone" not in str(told) and str(told).count("'own'") == len(sections) + 1
 
 
 def test_a_recording_that_hangs_is_given_up():

@@ -54,7 +54,9 @@ def test_every_message_reads_as_pymavlink_reads_it(number, noise):
 
 def _in_order(number, flat):
     kind = common.mavlink_map[number]
-    fields = {name: (index, count) for name, index, count, _ in dialect.layout(number).fields}
+    known = dialect.layout(number)
+    fields = {name: (index, 0) for name, index in (*known.single, *known.texts)}
+    fields |= {name: (index, count) for name, index, count in known.arrays}
     for name in kind.fieldnames:
         index, count = fields[name]
         yield list(flat[index : index + count]) if count else flat[index]

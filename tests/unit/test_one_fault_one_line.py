@@ -76,9 +76,3 @@ def test_a_key_of_the_search_that_stands_at_the_top_of_a_study_is_told_its_place
         f"{file}: generations: unknown key; did you mean search.generations?",
         f"{file}: titel: unknown key; did you mean title?",
     ]
-
-
-@pytest.mark.parametrize(("name", "keys"), [("groups", "name, agents, model, body"), ("faults", "kind, at, until")])
-def test_lists_of_tables_are_told_with_their_keys(name, keys):
-    with pytest.raises(ScenarioError, match=rf"{name}: a list of tables \[\[{name}\]\], with the keys {keys}"):
-        airflock.keys(name)

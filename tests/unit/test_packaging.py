@@ -19,7 +19,8 @@ def test_the_conda_recipe_needs_what_pip_installs():
         name, bounds = re.fullmatch(r"([\w-]+)(.*)", need).groups()
         wanted.append(f"{CONDA_NAMES.get(name, name)} {bounds}")
     assert sorted(needs) == sorted(wanted)
-    assert f'version = "{airflock.__version__}"' in recipe
+    for name in ("meta.yaml", "papers/meta.yaml"):
+        assert f'version = "{airflock.__version__}"' in (ROOT / "conda" / name).read_text(encoding="utf-8")
 
 
 def test_the_citation_names_this_version_and_every_publication_of_a_shipped_paper():

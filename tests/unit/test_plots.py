@@ -3,6 +3,7 @@
 import errno
 import json
 import math
+import sys
 
 import imageio.v3 as iio
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
+from typer.testing import CliRunner
 
 import airflock
+from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.errors import AirflockError, RecordingError
 from airflock.models import vasarhelyi_2018
@@ -398,7 +401,7 @@ def test_an_interrupted_or_truncated_video_leaves_nothing(tmp_path, monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         video(flight(seconds=5.0), tmp_path / "a.mp4", height=64, done=interrupt)
     assert not list(tmp_path.iterdir())
-    monkeypatch.setattr("airflock.plots.video.imageio_ffmpeg.count_frames_and_secs", lambda _: (1, 0.1))
+    monkeypatch.setattr("imageio_ffmpeg.count_frames_and_secs", lambda _: (1, 0.1))
     with pytest.raises(PictureError, match="kept 1 of"):
         video(flight(seconds=5.0), tmp_path / "a.mp4", height=64)
     assert not list(tmp_path.iterdir())
@@ -524,6 +527,16 @@ def test_pictures_of_one_panel_are_drawn_into_axes_that_are_given(kind):
     left, right = figure.subplots(1, 2)
     assert airflock.plot(flight(document=SQUARE), kind, ax=right) is figure
     assert not left.has_data() and right.has_data()
+
+
+def test_where_ffmpeg_is_not_installed_the_command_says_so_before_it_flies(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr("airflock.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    said = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--out", str(tmp_path / "a.mp4")])
+    assert "videos need imageio-ffmpeg: pip install 'airflock[video]'" in str(said.exception)
+    with pytest.raises(PictureError, match="videos need imageio-ffmpeg"):
+        video(flight(seconds=1.0), tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_chart_beside_a_video_moves_with_it():

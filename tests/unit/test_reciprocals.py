@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 
 from airflock.core import maths
+from airflock.engine.cuda import kernel
 from airflock.engine.cuda.reciprocals import Forms, spelled, with_reciprocals
+from airflock.engine.cuda.shape import shape_of
 from airflock.engine.generate import Source
+from airflock.engine.simulate import plan_of
 from airflock.models import vasarhelyi_2018
+from airflock.scenarios.files import load
 
 NAMES = {
     "math": math, "real": float, "least": min, "most": max, "ONE": 1.0, "inverse_root": lambda a: 1.0 / math.sqrt(a),
@@ -74,3 +78,16 @@ def test_a_stage_takes_a_root_and_its_reciprocal_at_once():
     assert f"s = {name}_per(r, q.v, per_r)" in text
     assert "per_r = inverse_root(square_r)" in text and "r = square_r * per_r" in text
     assert "t = s * per_q_v" in text and "u = s / t" in text  # nothing is known of t
+
+
+@pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "vasarhelyi_2018/real_gnss", "dimock_2003/physical"])
+def test_second_forms_are_called_where_they_stand_and_handed_to_nobody(name):
+    """A function that is handed to another one as an argument is one that Numba warns of."""
+    one = load(name)
+    plan = plan_of(one, precision=32).built(grid=False)
+    shape = shape_of(one.agents, 1, whole=bool(plan.model.flock))
+    tree = ast.parse(kernel.flight(plan, shape))
+    functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+    forms = {node.name for node in functions if node.name.endswith("_per")}
+    assert forms
+    assert not forms & {argument.arg for node in functions for argument in node.args.args}

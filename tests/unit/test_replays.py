@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import airflock
+from airflock.cli import main as run_main
 from airflock.errors import RecordingError
+from airflock.replays import check_colour
 from airflock.replays.pack import Packed, pack, unpack
 from airflock.stage.clusters import clusters
 
@@ -126,6 +128,29 @@ def test_unknown_colours_and_wrong_endings_are_one_line(recording, tmp_path):
         airflock.replay(recording, colour="spede")
     with pytest.raises(RecordingError, match="the only format written here"):
         airflock.replay(recording).save(tmp_path / "show.pdf")
+
+
+@pytest.mark.parametrize("name", ["vasarhelyi_2018/faulty", "kidger/city", "vicsek_1995/ordered", "couzin_2002/torus"])
+def test_colours_of_a_flight_are_known_before_it_is_flown(name):
+    few = {"agents": 30, "duration": 2.0} if name.endswith("faulty") else {"agents": 3, "duration": 2.0}
+    scenario = airflock.load(name, few)
+    flown = airflock.replay(airflock.simulate(scenario, 1, device="python")).text
+    ways = json.loads(re.search(r'<script type="application/json" id="about">(.*?)</script>', flown)[1])["ways"]
+    for way in ways:
+        check_colour(scenario, way)
+    with pytest.raises(RecordingError, match=f"knows: {', '.join(ways)}$"):
+        check_colour(scenario, "mood")
+
+
+def test_a_wrong_colour_is_refused_before_the_flight(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("airflock.plots.picture.simulate", lambda *_, **__: pytest.fail("it was flown"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["airflock", "replay", "vasarhelyi_2018/4ms", "--colour", "spede"])
+    with pytest.raises(SystemExit) as ended:
+        run_main()
+    told = capsys.readouterr().err
+    assert ended.value.code == 2 and told.count("\n") == 1 and "did you mean speed?" in told
+    assert not list(tmp_path.iterdir())
 
 
 def three():

@@ -1,13 +1,20 @@
 """Short scenario files: extends, keys by their last word, notes on what is hardly meant, and the list of all keys."""
 
+import re
+
 import pytest
 
-from airflock.core.parameters import Quantity, declarations, number_names
-from airflock.core.radio import Packets
+import airflock
+from airflock.body.registry import BODIES
+from airflock.core import fault
+from airflock.core.parameters import Quantity, declarations
 from airflock.errors import ScenarioError
-from airflock.radios.registry import RADIOS
-from airflock.scenarios import keys
+from airflock.faults.registry import KINDS
+from airflock.scenarios import groups, keys, making
 from airflock.scenarios.files import load, presets
+from airflock.scenarios.laws import MODELS, find_model
+from airflock.scenarios.sections import SECTIONS
+from airflock.sensors.registry import SENSORS
 
 NAME = "vasarhelyi_2018/real_6ms"
 
@@ -83,13 +90,17 @@ def test_a_last_word_that_one_section_has_is_that_key():
 @pytest.mark.parametrize(
     ("key", "fault"),
     [
-        ("noise", "noise is several keys; write body.noise or sensors.noise"),
+        (
+            "noise",
+            "noise is several keys; write body.noise (diffusion constant of the outer noise) or "
+            "sensors.noise (variance of the velocity error)",
+        ),
         ("delai", "delai: unknown key; did you mean radio.delay?"),
         ("agnets", "agnets: unknown key; did you mean agents?"),
     ],
 )
 def test_a_last_word_of_several_sections_or_none_is_refused(key, fault):
-    with pytest.raises(ScenarioError, match=fault.replace("?", r"\?")):
+    with pytest.raises(ScenarioError, match=re.escape(fault)):
         load(NAME, {key: 1.0})
 
 
@@ -113,11 +124,6 @@ def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path)
 
 
 def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario():
-    declared = {(of, name) for of, record in keys.records().items() for name, _, _ in declarations(record)}
-    declared -= {
-        (kind, name) for kind in RADIOS for name in number_names(Packets)
-    }  # told once, as those of the section
-    assert len(keys.keys()) == len(declared)
     for name in ("vasarhelyi_2018/4ms", "couzin_2002/torus", "kidger/city"):
         scenario = load(name)
         for record, section in ((scenario.parameters, "model"), (scenario.body, "body"), (scenario.radio, "radio")):
@@ -128,6 +134,26 @@ def test_the_list_of_keys_is_that_of_the_declarations_and_of_a_loaded_scenario()
                 value = getattr(record, key)
                 inside = found.low <= value <= found.high if isinstance(how, Quantity) else value in found.options
                 assert inside and found.meaning == how.meaning
+
+
+def test_every_name_that_a_file_may_hold_is_among_the_keys():
+    every = airflock.keys()
+    names = {key.name for key in every}
+    assert {name.partition(".")[0] for name in names} == {*making.TOP, "extends"}
+    for of, known in (("faults", fault.KEYS), ("groups", groups.KEYS)):
+        assert {key.name for key in keys.sections()[of].keys} == {f"{of}.{name}" for name in known}
+    records = {**BODIES, **SENSORS, **KINDS} | {name: find_model(name) for name in MODELS}
+    for name, found in records.items():
+        declared = {key for key, _, _ in declarations(found.Parameters)}
+        assert {key.name.partition(".")[2] for key in keys.sections()[name].keys} == declared, name
+    for name, record in SECTIONS.items():
+        assert {f"{name}.{key}" for key, _, _ in declarations(record)} <= names, name
+
+
+def test_the_keys_of_a_kind_of_fault_are_its_numbers_and_those_of_every_entry():
+    names = [key.name for key in keys.keys("motor")]
+    assert names[0] == "faults.share" and {"faults.at", "faults.per_hour", "faults.agents", "body.motor"} <= set(names)
+    assert {key.name for key in keys.keys("gnss_frozen")} == {f"faults.{name}" for name in fault.KEYS}
 
 
 def test_an_unknown_section_of_keys_is_told_with_the_nearest():

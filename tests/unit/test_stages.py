@@ -12,15 +12,17 @@ import pytest
 
 from airflock.core import random
 from airflock.engine import stages
-from airflock.engine.passes import decide, move, perceive
-from airflock.engine.passes.build import Builder
+from airflock.engine.passes import decide, driver, measure, perceive
 from airflock.engine.plan import WHOLE
 from airflock.engine.simulate import plan_of
 from airflock.engine.stages import decide as deciding
 from airflock.engine.stages import gusts, meet, neighbours, noise, receive, start, surfaces, words
+from airflock.engine.stages import measure as judging
 from airflock.engine.stages import move as motion
 from airflock.engine.stages import perceive as measuring
+from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import Itself
 from airflock.engine.tables import tables
 from flocks import ISLANDS, NOTCHED, scenario
 
@@ -83,19 +85,7 @@ class World:
         found = scenario(kind, agents=6, world__side=60.0, world__height=50.0, start__separation=4.0, **keys)
         self.plan = plan_of(found, precision=64)
         self.tables = tables(found, self.plan, seed)
-        self.build = Builder(self.plan)
-        for make in (
-            perceive.snapshot,
-            perceive.perceive,
-            perceive.receive,
-            perceive.meet,
-            decide.neighbours,
-            decide.boundaries,
-        ):
-            make(self.build)
-        decide.decide(self.build)
-        move.begin(self.build)
-        move.move(self.build)
+        self.build = driver.stages(self.plan)
         rng, n = np.random.default_rng(seed), 6
         dims = self.plan.dimensions
         self.state = {
@@ -144,15 +134,7 @@ class World:
         )
         whole, numbers = self.whole, self.numbers()
 
-        def take(name):
-            if name[0] == "u" and name[1:].isdigit():
-                return state["words"][int(name[1:])]
-            if name.startswith("packet"):
-                return state["store"][int(name[len("packet") :])]
-            # a row that no driver has holds what nobody asks for
-            return state["work"][self.build.row(name)] if self.build.row(name) < len(state["work"]) else np.zeros(n)
-
-        flock = Flock(take, plan.dimensions, words.Itself())
+        flock = self.flock(**state)
         measuring.snapshot(flock, 1, n, state["ring"], plan=plan)
         measuring.perceive(flock, numbers, whole, step, 0, n, state["ring"], plan=plan)
 
@@ -182,6 +164,19 @@ class World:
         )  # fmt: skip
         return state
 
+    def flock(self, work, words=None, store=None, **_):
+        """Rows of these tables by what they hold."""
+
+        def take(name):
+            if name[0] == "u" and name[1:].isdigit():
+                return words[int(name[1:])]
+            if name.startswith("packet"):
+                return store[int(name[len("packet") :])]
+            # a row that no driver has holds what nobody asks for
+            return work[self.build.row(name)] if self.build.row(name) < len(work) else np.zeros(work.shape[1])
+
+        return Flock(take, self.plan.dimensions, Itself())
+
     def numbers(self):
         """Records of numbers as a stage reads them."""
         found, at = types.SimpleNamespace(wing=None, aero=None), 0
@@ -196,10 +191,39 @@ class World:
         n, rest = 6, list(self.rest.values())[1:]
         text, direct = (np.zeros_like(self.state["work"]) for _ in range(2))
         ended = [self.text()["begin"](n, n, self.row, self.tables.whole.tolist(), text, *rest[:2], None, rest[2])]
-        flock = Flock(lambda name: direct[self.build.row(name)], self.plan.dimensions, words.Itself())
+        flock = self.flock(direct)
         far = partial(start.excursion, plan=self.plan)
         ended += [start.begin(flock, self.numbers(), self.whole, n, n, *rest[:2], None, rest[2], far, plan=self.plan)]
         return ended, text, direct
+
+    def samples(self, clock):
+        """Values of one instant, rows and memories: by the text of the driver, and by the stage as it stands."""
+        n, found = 6, []
+        edges, spans, scene = list(self.rest.values())[1:]
+        whole = self.tables.whole.tolist()
+        for text in (True, False):
+            work, values, memory = self.state["work"].copy(), np.zeros(40), np.ones((9, n))
+            parts = (edges, spans, scene, memory, np.zeros((2, n), int), values)
+            if text:
+                least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, *parts)
+            else:
+                metrics = measure.measured(self.plan, clock)
+                least = judging.measure(
+                    self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts,
+                    partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
+                    plan=self.plan, metrics=metrics, nearest=clock == "collision",
+                )  # fmt: skip
+            found.append((least, values, memory, work))
+        return found
+
+
+@pytest.mark.parametrize("clock", measure.CLOCKS)
+@pytest.mark.parametrize("name", CASES)
+def test_order_parameters_as_they_stand_are_those_of_the_driver_made_of_them(name, clock, seed):
+    text, direct = World(name, seed).samples(clock)
+    for expected, value in zip(text, direct, strict=True):
+        np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-12)
+    assert np.any(text[1]) or (clock == "collision" and 0.0 < text[0] < 100.0)
 
 
 @pytest.mark.parametrize("name", CASES)

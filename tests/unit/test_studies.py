@@ -23,8 +23,8 @@ from airflock.evolve.study import differences, load_study, shipped
 from airflock.evolve.together import Together
 from airflock.executors import Flight
 from airflock.executors.here import Here
-from airflock.papers.dimock_2003.units import gains
-from airflock.papers.vasarhelyi_2018.published import SPEEDS, optimum
+from airflock_papers.dimock_2003.units import gains
+from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
 
 
 def finished(folder, study=None, score=toys.bowl, **options):

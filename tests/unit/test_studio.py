@@ -1,6 +1,7 @@
 """The studio without a browser: pace, spans of sliders, moments, events, saving, and who may open the page."""
 
 import math
+import re
 import socket
 import threading
 import time
@@ -11,8 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
+from airflock.core.contract import model
+from airflock.core.parameters import Quantity, declarations, quantity
 from airflock.engine.flight import Flight
-from airflock.errors import RuleError, ScenarioError, StudioError
+from airflock.errors import ParameterError, RuleError, ScenarioError, StudioError
+from airflock.evolve.bounds import studied
+from airflock.evolve.study import load_study
+from airflock.models import vasarhelyi_2018
 from airflock.recordings.files import load_recording
 from airflock.scenarios.files import presets
 from airflock.stage import colours, shades
@@ -24,12 +30,14 @@ from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.controls import controls_of, span
 from airflock.studio.drawing import Flock, arrival
 from airflock.studio.moments import Moments
+from airflock.studio.opening import Opening
 from airflock.studio.pace import Pace
-from airflock.studio.perceiving import Perceiving
+from airflock.studio.perceiving import Perceiving, _vectors
 from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Origin, Side, value_of
+from airflock.studio.tuning import pair
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
@@ -73,13 +81,83 @@ def test_a_slider_stays_in_the_declared_range_and_holds_the_value(low, high, sha
 @pytest.mark.parametrize("name", sorted(presets()))
 def test_every_number_of_the_law_has_a_slider_that_can_reach_its_value(name):
     scenario = airflock.load(name)
-    for controls in controls_of(scenario).values():
+    found = controls_of(scenario, studied(scenario))
+    keys = [control.key for controls in found.values() for control in controls]
+    declared = [f"model.{name}" for name, kind, _ in declarations(scenario.parameters) if isinstance(kind, Quantity)]
+    assert len(keys) == len(set(keys)) and set(declared) <= set(keys)
+    for controls in found.values():
         for control in controls:
             assert control.value == value_of(scenario, control.key)
             if control.is_choice:
                 assert control.value in control.options
             else:
                 assert control.low <= control.value <= control.high and 0.0 < control.step <= control.high - control.low
+
+
+def test_sliders_span_what_a_study_searched_or_what_is_usual():
+    scenario = airflock.load("vasarhelyi_2018/8ms")
+    found = {c.key: c for controls in controls_of(scenario, studied(scenario)).values() for c in controls}
+    axes = {axis.key: axis for axis in load_study("vasarhelyi_2018/8ms").space.axes}
+    assert "model.p_rep" in axes
+    for key, axis in axes.items():
+        assert (found[key].low, found[key].high) == (axis.low, axis.high)
+    assert (found["wind.east"].low, found["wind.east"].high) == (-10.0, 10.0)
+    assert list(controls_of(scenario))[:4] == [f"model: {part}" for part in scenario.model.parts]
+    with pytest.raises(ParameterError, match="no span inside"):
+        quantity(1.0, "m", low=0.0, high=2.0, usual=(0.0, 3.0), meaning="too wide")
+
+
+def test_parts_of_a_law_name_its_parameters():
+    law = dict(vars(vasarhelyi_2018))
+    with pytest.raises(RuleError, match="PARTS"):
+        model({**law, "PARTS": {"repulsion": ("p_rap",)}}, "mistyped")
+
+
+def test_any_key_is_set_as_on_the_command_line(interpreted, player):
+    scenario = player.scenario
+    assert pair("delay = 400 ms", scenario) == ("radio.delay", "400 ms")
+    assert pair("goals.points=[[0, 5]]", scenario) == ("goals.points", [[0, 5]])
+    for wrong, word in (("p_rap = 1", "p_rep"), ("p_rep", "KEY = VALUE"), ("", "KEY = VALUE"), ("= 3", "KEY = VALUE")):
+        with pytest.raises(ScenarioError, match=word):
+            pair(wrong, scenario)
+    player.change(*pair("delay = 400 ms", scenario))
+    assert player.scenario.radio.delay == 0.4 and "--set 'radio.delay=400 ms'" in player.command
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "word"),
+    [
+        ("photo.toml", b"\x89PNG\r\n\x1a\n\xff", "UTF-8"),
+        ("story.toml", b"Once upon a time", "TOML"),
+        ("flight.nc", b"agents = 3", "end with .toml"),
+        ("empty.toml", b"agents = 3", "lacks|missing|model"),
+        ("code.toml", b'[model]\nkind = "evil.py"\n', "evil.py"),
+    ],
+)
+def test_an_upload_that_is_no_scenario_is_told_and_leaves_nothing(player, tmp_path, monkeypatch, name, content, word):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "evil.py").write_text("raise SystemExit\n")
+    player.fly(20)
+    flown, room = player.flight, object.__new__(Opening)
+    room.player, room.page = player, None
+    player.ask(lambda: room.take(name, content))
+    player.tick(0.0)
+    assert len(player.faults) == 1 and re.search(word, player.faults[0]) and name in player.faults[0]
+    assert player.flight is flown and player.note == player.faults[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["evil.py"]
+
+
+def test_an_uploaded_scenario_flies(interpreted, player, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (presets()["vasarhelyi_2018/6ms"]).read_bytes()
+    (tmp_path / "mine.toml").write_text("")  # a name that is taken
+    shown = []
+    room = object.__new__(Opening)
+    room.player = player
+    room._opened = lambda where: shown.append(player.open(where))
+    room.take("C:\\flocks\\mine.toml", text)
+    assert shown and player.scenario.parameters.v_flock == 6.0 and player.side.origin.where == "mine-2.toml"
+    assert (tmp_path / "mine-2.toml").read_bytes() == text
 
 
 def test_a_flight_that_was_tuned_is_saved_and_flown_again_with_the_same_bits(player, tmp_path):
@@ -436,11 +514,37 @@ def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
     np.testing.assert_allclose(heard[:, 1], [other.state[:3] for other in near])
     crossed = drawn.lines["ghosts"][0].reshape(-1, 4, 3).mean(axis=1)
     np.testing.assert_allclose(crossed, [other.state[:3] for other in seen.heard], atol=1e-6)
-    believed = drawn.lines["measured"][0].reshape(-1, 3).mean(axis=0)
-    np.testing.assert_allclose(believed, seen.own[:3])
+    believed = drawn.lines["measured"][0].reshape(-1, 4, 3).mean(axis=1)  # itself, then each that it hears
+    np.testing.assert_allclose(believed[0], seen.own[:3])
+    others = player.flight.measured[:2, [other.who for other in seen.heard]].T
+    np.testing.assert_allclose(believed[1:, :2], others, atol=1e-5)
     shaft = drawn.lines["command"][0][0]
     np.testing.assert_allclose((shaft[1] - shaft[0])[:2], np.array(seen.command) * 5.0 / 6.0)
     assert f"hears {len(seen.heard)} others" in drawn.words
+
+
+def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(interpreted):
+    """Arrows of a law whose neighbours act through one vector: Eqs 2-3, and Eqs 4-7 (Vásárhelyi et al. 2018)."""
+    player = Player(PRESET, {"agents": 30, "start.separation": 9.0}, seed=2)
+    player.fly(100)
+    seen, p = player.flight.look(4), player.scenario.parameters
+    push, align = np.zeros(2), np.zeros(2)
+    for other in seen.heard:
+        apart = np.array(other.state[:2]) - seen.own[:2]
+        r, dv = np.hypot(*apart), np.array(other.state[3:5]) - seen.own[3:5]
+        push -= p.p_rep * max(p.r0_rep - r, 0.0) * apart / r
+        far = r - p.r0_frict
+        brake = (
+            0.0
+            if far <= 0.0
+            else min(far * p.p_frict, np.sqrt(max(2 * p.a_frict * far - (p.a_frict / p.p_frict) ** 2, 0)))
+        )
+        align += p.c_frict * max(1.0 - max(p.v_frict, brake) / np.hypot(*dv), 0.0) * dv
+    vectors = {word: vector for word, vector, _ in _vectors(seen, player.scenario.model)}
+    assert np.hypot(*push) > 0.1 and np.hypot(*align) > 0.01
+    np.testing.assert_allclose(vectors["repulsion"][:2], push, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(vectors["alignment"][:2], align, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(vectors["repulsion"] + vectors["alignment"], [seen.sums.x, seen.sums.y, 0.0], atol=1e-5)
 
 
 def test_rays_of_a_selected_boid_end_where_the_world_begins():

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from airflock.papers.claims import judge, read_claims
-from airflock.papers.statements import load as load_statements
-from airflock.papers.vasarhelyi_2018 import evolved, table_s1
-from airflock.papers.vasarhelyi_2018.published import optimum
 from airflock.scenarios.files import load, presets
+from airflock_papers.claims import judge, read_claims
+from airflock_papers.statements import load as load_statements
+from airflock_papers.vasarhelyi_2018 import evolved, table_s1
+from airflock_papers.vasarhelyi_2018.published import optimum
 
 PARTIAL = ("f_speed", "f_coll", "f_disc", "f_wall", "f_cluster", "f_corr")
-STATEMENTS = load_statements("airflock.papers.vasarhelyi_2018")
+STATEMENTS = load_statements("airflock_papers.vasarhelyi_2018")
 
 
 def flights(fitness, f_wall=1.0, r_min_mean=13.5):

@@ -186,6 +186,13 @@ def test_annotations_of_a_users_own_stay():
     assert typed_copy(text).text == text
 
 
+def test_a_scenario_is_told_what_checks_it(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "vasarhelyi_2018/4ms"\n')
+    with pytest.raises(RuleError, match=f"airflock validate {re.escape(str(path))} checks it"):
+        check_types(path)
+
+
 @pytest.mark.parametrize(
     "text, fault",
     [

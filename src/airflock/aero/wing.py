@@ -31,7 +31,9 @@ class Parameters(Record):
     lift_slope: float = quantity(
         2.0 * math.pi, "1/rad", low=0.1, high=20.0, source=f"{PAPER}: 2 pi", meaning="lift curve slope of the profile"
     )
-    cd0: float = quantity(0.0, "1", low=0.0, high=1.0, source=OURS, meaning="profile drag coefficient")
+    cd0: float = quantity(
+        0.0, "1", low=0.0, high=1.0, source=OURS, usual=(0.0, 0.1), meaning="profile drag coefficient"
+    )
     cl_max: float = quantity(
         1.2, "1", low=0.1, high=5.0, source="our choice: usual at low Reynolds numbers", meaning="lift at stall"
     )

@@ -7,6 +7,8 @@ from typing import NamedTuple
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
+LIGHT = (-10.0, 10.0)  # m/s; winds in which small drones fly
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
@@ -16,10 +18,12 @@ class Parameters(Record):
         "simple", ("simple", "dryden"), source="MIL-F-8785C (dryden)",
         meaning="gusts: of gust and gust_time, the same on each axis; or turbulence after Dryden",
     )  # fmt: skip
-    east: float = quantity(0.0, "m/s", low=-100.0, high=100.0, meaning="steady wind towards the east")
-    north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, meaning="steady wind towards the north")
-    up: float = quantity(0.0, "m/s", low=-50.0, high=50.0, meaning="steady updraught")
-    gust: float = quantity(0.0, "m/s", low=0.0, high=50.0, meaning="standard deviation of the gusts, per axis")
+    east: float = quantity(0.0, "m/s", low=-100.0, high=100.0, meaning="steady wind towards the east", usual=LIGHT)
+    north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, meaning="steady wind towards the north", usual=LIGHT)
+    up: float = quantity(0.0, "m/s", low=-50.0, high=50.0, meaning="steady updraught", usual=(-5.0, 5.0))
+    gust: float = quantity(
+        0.0, "m/s", low=0.0, high=50.0, usual=(0.0, 5.0), meaning="standard deviation of the gusts, per axis"
+    )
     gust_time: float = quantity(
         5.0, "s", low=0.01, high=600.0, source="our choice, because gusts last seconds", meaning="correlation time"
     )

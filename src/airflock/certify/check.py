@@ -72,6 +72,9 @@ def checked(
         raise StudyError(f"{where}: is not a certificate; airflock certify writes one")
     if document["format"] != FORMAT:
         raise StudyError(f"{where}: is of format {document['format']}; this Airflock reads format {FORMAT}")
+    faults = _shape_faults(document)
+    if faults:
+        raise StudyError(f"{where}: is damaged: {'; '.join(faults)}")
     with from_outside(f"{where}: is damaged", StudyError):
         flown = document["flown"]
         if flown["airflock"] != __version__:
@@ -88,6 +91,49 @@ def checked(
             raise StudyError(f"{where}: its flights followed other rules (text {flown['rules']}, here {rules})")
         found, notes = _flown_again(document, campaign, threads, done), _differences(flown)
     return Checked(len(document["check"]["digests"]), int(document["flights"]["count"]), (*faults, *found), notes)
+
+
+MOST_DIGESTS = 1_000_000  # flights that a certificate may ask to be flown again
+Kinds = Mapping[str, tuple[type, ...]]
+_NUMBER = (int, float)
+_TABLES: dict[str, Kinds] = {
+    "flown": {"airflock": (str,), "rules": (str,), "precision": (int,), "device": (str,)},
+    "flights": {
+        "count": (int,), "looks": (str,), "uncertain": (bool,), "identity": (str,), "first_seed": (int,),
+    },
+    "check": {"every": (int,), "digests": (list,)},
+    "scenario": {"name": (str,)},
+}  # fmt: skip
+_LIMIT: Kinds = {"text": (str,), "looks": (list,), "high": _NUMBER, "low": _NUMBER, "shown": (bool,)}
+_LOOK: Kinds = {"flights": (int,), "events": (int,), "above": _NUMBER, "below": _NUMBER}
+
+
+def _shape_faults(document: Mapping[str, Any]) -> list[str]:
+    """Keys of a certificate that are missing or of another kind than it is written with."""
+    faults = [] if _is(document.get("confidence"), _NUMBER) else ["confidence"]
+    for name, kinds in _TABLES.items():
+        faults += _wrong(name, document.get(name), kinds)
+    limits = document["limit"]
+    for i, limit in enumerate(limits if isinstance(limits, list) and limits else [None]):
+        faults += _wrong(f"limit[{i}]", limit, _LIMIT)
+        looks = limit.get("looks") if isinstance(limit, Mapping) else None
+        for j, each in enumerate(looks if isinstance(looks, list) else []):
+            faults += _wrong(f"limit[{i}].looks[{j}]", each, _LOOK)
+    if not faults:
+        digests, every = document["check"]["digests"], document["check"]["every"]
+        if not all(isinstance(text, str) for text in digests) or len(digests) > MOST_DIGESTS or every < 1:
+            faults.append("check")
+    return [f"{fault} is missing or not what a certificate holds there" for fault in faults[:5]]
+
+
+def _wrong(name: str, table: Any, kinds: Kinds) -> list[str]:
+    if not isinstance(table, Mapping):
+        return [name]
+    return [f"{name}.{key}" for key, kind in kinds.items() if not _is(table.get(key), kind)]
+
+
+def _is(value: Any, kinds: tuple[type, ...]) -> bool:
+    return isinstance(value, kinds) and (not isinstance(value, bool) or bool in kinds)
 
 
 def _campaign(document: Mapping[str, Any], where: str, scenario: Scenario | None, trust: bool) -> Campaign:

@@ -121,6 +121,9 @@ def _copies(names: Sequence[str]) -> dict[str, TypedCopy]:
     copies: dict[str, TypedCopy] = {}
     faults = []
     for name in names:
+        if Path(name).suffix in (".toml", ".nc"):
+            faults.append(f"{name}: is not a file of rules, which ends in .py; airflock validate {name} checks it")
+            continue
         try:
             with from_outside(name, RuleError):
                 copies[name] = typed_copy(read_text(name))

@@ -171,13 +171,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **{name: LOADED[name] for name in SETTINGS}, "trust": "airflock.load", **TABLE,
             **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
             "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
+            "body": "airflock.load", **dict.fromkeys(("mode", "join"), "airflock.fleet.realtime.fly"),
         },
     ),
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),
     "paper": Counterpart(
         'airflock.paper("vasarhelyi_2018", only="s2")', "paper",
         {"name": "name", "only": "only", "quick": "quick", "seeds": "seeds", "threads": "threads",
-         "breaks": "airflock.papers.breaks.fly", "keep": "airflock.papers.quick.fly", **TABLE},
+         "breaks": "airflock_papers.breaks.fly", "keep": "airflock_papers.quick.fly", **TABLE},
     ),
     "presets": Counterpart(
         "airflock.presets()", "presets",

@@ -9,6 +9,7 @@ from airflock.cli import options, tables
 from airflock.endings import RECORDINGS
 
 VEHICLES = ("px4", "ardupilot")
+FLOWN = ("multirotor", "quadrotor")
 
 
 def fleet(
@@ -20,6 +21,28 @@ def fleet(
     agents: options.Agents = None,
     duration: options.Duration = None,
     vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
+    body: Annotated[
+        str | None,
+        typer.Option(
+            metavar="multirotor|quadrotor", help="What the vehicles move like.", show_default="the scenario's"
+        ),
+    ] = None,
+    mode: Annotated[
+        str,
+        typer.Option(
+            help="lockstep: on a virtual clock, the same bits each time. tasks, processes: on the real clock over UDP "
+            "on this computer, in one process or with a process for each node and each vehicle."
+        ),
+    ] = "lockstep",
+    join: Annotated[
+        int,
+        typer.Option(
+            min=1024,
+            max=65000,
+            help="On the real clock: port at which the first vehicle calls for MAVSDK, MAVProxy or QGroundControl; "
+            "the others call at the next ones.",
+        ),
+    ] = 14540,
     faults: Annotated[
         Path | None, typer.Option(metavar="FILE.toml", help=r"What goes wrong: tables \[\[fault]].")
     ] = None,
@@ -41,11 +64,13 @@ def fleet(
     save: options.SaveFile = None,
     as_json: options.Json = False,
 ) -> None:
-    """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step on a virtual clock.
+    """Fly a fleet in software: one node and one MAVLink vehicle per drone, in lock-step or on the real clock.
 
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
+
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 60 --mode processes --vehicle ardupilot
     """
-    from airflock.fleet import compare, individuals
+    from airflock.fleet import compare, individuals, realtime
     from airflock.fleet.faults import read_faults
     from airflock.recordings.scores import measure
     from airflock.scenarios.files import load
@@ -54,20 +79,27 @@ def fleet(
     with options.gathering(wrong):
         options.writable((save, RECORDINGS))
     with options.gathering(wrong):
-        found = load(scenario, options.settings(changes, agents, duration), trust=trust)
+        given = options.settings(changes, agents, duration)
+        found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
         period = found.sensors.period or found.flight.dt
         found = compare.sampled(found, period)
     if vehicle not in VEHICLES:
         wrong.append(f"--vehicle {vehicle} is none of {', '.join(VEHICLES)}")
+    if body not in (None, *FLOWN):
+        wrong.append(f"--body {body} is none of {', '.join(FLOWN)}")
+    if mode not in realtime.MODES:
+        wrong.append(f"--mode {mode} is none of {', '.join(realtime.MODES)}")
     if against not in (None, "simulator"):
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
     operator = _operator(ground)
     options.refuse(individuals.refused(found))
     stops = True if silence is None and not against else silence
-    given: dict[str, Any] = {"vehicle": vehicle, "operator": operator[1], "silent": stops}
+    live = mode != realtime.MODES[0]
+    given = {"vehicle": vehicle, "operator": operator[1], "silent": stops, "live": live}
     card = compare.software_card(found, **given, seed=first_seed)
     broken = read_faults(faults, card.members) if faults else ()
+    options.refuse(realtime.refused(found, broken) if live else [])
     rows: list[dict[str, Any]] = []
     beside: list[dict[str, Any]] = []
     runs, departed = [], None
@@ -75,16 +107,22 @@ def fleet(
     with options.progress(f"{found.name}: fleet", ticks, quiet=as_json) as done:
         for seed in range(first_seed, first_seed + seeds):
             card = compare.software_card(found, **given, seed=seed) if found.varied else card
-            flown = compare.fly(found, card, seed, faults=broken, ground=ground, operator=operator[0], done=done)
+            orders: dict[str, Any] = {"faults": broken, "operator": operator[0], "done": done}
+            if live:
+                start, at = None if ground else compare.first_states(found, seed), (realtime.JOIN[0], join)
+                flown: Any = realtime.fly(found, card, seed, mode, start=start, join=at, **orders)
+            else:
+                flown = compare.fly(found, card, seed, ground=ground, **orders)
             if against:
                 simulated, measured = compare.both(found, flown)
                 beside.append(simulated)
-                departed = departed or (compare.departure(flown) if not ground else None)
+                departed = departed or (compare.departure(flown) if not ground and not live else None)
             else:
                 measured = measure(compare.recording(flown))[0]
             rows.append(measured)
             phases = [phase.name for phase in flown.phases()]
-            runs.append({"seed": seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured})
+            run = {"seed": seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
+            runs.append(run | ({"load": flown.load._asdict()} if live else {}))
             _save(save, seed, seeds, flown)
     _tell(found, card, seeds, rows, beside, runs, departed, as_json)
 
@@ -121,6 +159,8 @@ def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, 
         return
     title = f"{found.name}: fleet of {found.agents} {card.autopilot.name}, {found.flight.duration:g} s, {seeds} seeds"
     tables.score_table(title, rows, {}, reports(found.measures))
+    for run in runs:
+        _tell_load(run.get("load"))
     for run in runs[:1]:
         for time, member, note in run["notes"][:40]:
             tables.say(f"{time:8.2f} s  drone {member:3d}  {note}")
@@ -137,3 +177,18 @@ def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, 
         )
     if beside and not lines:
         tables.say("note: one seed tells no table of differences; --seeds 2 or more do")
+
+
+def _tell_load(load: dict[str, Any] | None) -> None:
+    """Tell what a fleet on the real clock cost, and how late it was."""
+    if load is None:
+        return
+    parts = ""
+    if load["nodes"] is not None:
+        parts = f" (nodes {load['nodes']:.2f}, vehicles and ether {load['vehicles']:.2f})"
+    tables.say(f"processor: {load['cores']:.2f} of a core{parts}; load of this computer {load['others']:.1f}")
+    share = load["late"] / max(load["ticks"], 1)
+    tables.say(
+        f"ticks of the nodes: {load['ticks']}, {load['late']} ({share:.1%}) late by more than half a period, at most "
+        f"by {load['worst']:.2f} s"
+    )

@@ -127,7 +127,8 @@ def prepare(
     for name, _, share in loads:
         tables.say(f"{name} radio: {share:.0%} of its time, by an estimate from its bit rate")
     for guard in made.autopilot.guards:
-        tables.say(f"set {guard.name} within [{guard.low:g}, {guard.high:g}]: {guard.why}")
+        safe = "to the own system id" if guard.own else f"within [{guard.low:g}, {guard.high:g}]"
+        tables.say(f"set {guard.name} {safe}: {guard.why}")
 
 
 def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[tuple[str, str, float]]:
@@ -203,19 +204,15 @@ def replay(
     """
     from airflock.mavlink.keys import read_key
     from airflock.onboard.card import read_card
-    from airflock.onboard.log import replay as again
+    from airflock.onboard.log import read_log
 
     found, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
     ticks, different, notes = 0, [], []
-    try:
-        with open(log, encoding="utf-8") as lines:
-            for tick in again(lines, found, key):
-                ticks += 1
-                notes += [(tick.time, note) for note in tick.out.notes]
-                if not tick.same:
-                    different.append(tick.time)
-    except UnicodeDecodeError as fault:
-        raise CardError([f"{log}: is not a log of a flight on board"]) from fault
+    for tick in read_log(log, found, key):
+        ticks += 1
+        notes += [(tick.time, note) for note in tick.out.notes]
+        if not tick.same:
+            different.append(tick.time)
     if as_json:
         tables.emit_json({"ticks": ticks, "different": different, "notes": notes})
     else:

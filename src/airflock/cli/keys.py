@@ -14,8 +14,8 @@ def keys(
     section: Annotated[
         str | None,
         typer.Argument(
-            metavar="SECTION|MODEL|KEY",
-            help="For instance radio, couzin_2002, model, body, top, or delay.",
+            metavar="SECTION|KIND|KEY",
+            help="For instance radio, couzin_2002, faults, motor, top, or delay.",
             show_default=False,
         ),
     ] = None,
@@ -32,11 +32,10 @@ def keys(
         tables.emit_json([{**key._asdict(), "options": list(key.options)} for key in found])
         return
     if section is None:
-        names = list(known.records())
-        width = max(map(len, names))
-        for name in names:
-            count = len(known.keys(name))
-            typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {known.about(name)}")
+        width = max(map(len, known.sections()))
+        for name, listed in known.sections().items():
+            count = len(listed.keys)
+            typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {listed.about}")
         return
     _print(found)
 

@@ -85,15 +85,16 @@ def video(
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
-    """Make an MP4 or GIF of a flight.
+    r"""Make an MP4 or GIF of a flight. Needs pip install 'airflock\[video]'.
 
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.writable((out, VIDEOS))
     from airflock.plots.picture import flight_of
-    from airflock.plots.video import frame_count
+    from airflock.plots.video import ffmpeg, frame_count
     from airflock.plots.video import video as make_video
 
+    ffmpeg()  # before anything flies
     recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
@@ -123,9 +124,17 @@ def replay(
     """
     options.writable((page, PAGES))
     from airflock.plots.picture import flight_of
+    from airflock.replays import check_colour
     from airflock.replays import replay as make_replay
+    from airflock.scenarios.files import load
 
-    recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
+    settings = options.settings(changes, agents, duration)
+    if what.lower().endswith(".nc"):
+        recording = flight_of(what, seed, settings, law, trust=trust)
+    else:
+        scenario = load(what, settings, law, trust=trust)
+        check_colour(scenario, colour)
+        recording = flight_of(scenario, seed)
     made = make_replay(recording, rate=rate, colour=colour)
     made.save(page)
     tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.doors import FormatError, from_outside, toml
+from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
@@ -65,13 +65,7 @@ def settings(
 def value(text: str, where: str) -> Any:
     """A TOML value, or the text itself if it is none; `where` names the option in faults."""
     with from_outside(where):
-        try:
-            document = toml(f"value = {text}")
-        except FormatError:
-            return text.strip()
-        if list(document) != ["value"]:
-            raise ScenarioError([f"{where}: holds more than one value; repeat the option for each key"])
-        return document["value"]
+        return toml_value(text)
 
 
 @contextmanager

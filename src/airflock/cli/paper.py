@@ -26,6 +26,8 @@ def paper(
 ) -> None:
     """Recompute a paper's numbers and figures; print each claim with its verdict.
 
+    Needs pip install airflock-papers; in a clone of the repository: pip install -e ./papers
+
     `all --quick` flies the small form of every paper and fails if a verdict is not the committed one.
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
@@ -36,13 +38,13 @@ def paper(
     if breaks:
         _breaks(name, only, seeds, threads, as_json)
         return
-    from airflock.papers.recompute import paper as recompute
+    from airflock.papers import paper as recompute
 
     claims = recompute(name, only=only, quick=quick, seeds=seeds, threads=threads)
     if as_json:
         tables.emit_json([claim.as_dict() for claim in claims])
         return
-    from airflock.papers.claims import print_claims
+    from airflock_papers.claims import print_claims
 
     print_claims(claims)
 
@@ -51,7 +53,10 @@ def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, oth
     """Every paper in its small form, against the committed verdicts."""
     from airflock.cache import cache_folder
     from airflock.errors import AirflockError
-    from airflock.papers import quick as tier
+    from airflock.papers import installed
+
+    installed()
+    from airflock_papers import quick as tier
 
     wrong = [option for option, given in others.items() if given]
     if wrong or not quick:
@@ -72,10 +77,12 @@ def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, oth
 
 def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None, as_json: bool) -> None:
     """Each claim under the change that must break it."""
-    from airflock.papers import breaks
-    from airflock.papers.recompute import known
+    from airflock.papers import find
 
-    rows = breaks.fly(known(name), only=only, seeds=seeds, threads=threads)
+    paper = find(name)
+    from airflock_papers import breaks
+
+    rows = breaks.fly(paper, only=only, seeds=seeds, threads=threads)
     if as_json:
         tables.emit_json([row._asdict() for row in rows])
     else:

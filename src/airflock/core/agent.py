@@ -150,6 +150,10 @@ def reduced(record: type, how: Mapping[str, str], terms: Iterable[tuple[float, .
     fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
     ways = [how.get(name, "sum") for name in fields]
     totals = [START[way] for way in ways]
+    if not how:
+        for term in terms:
+            totals = [total + value for total, value in zip(totals, term, strict=True)]
+        return record(*totals)
     for term in terms:
         totals = [combined(way, total, value) for way, total, value in zip(ways, totals, term, strict=True)]
     return record(*totals)
@@ -163,10 +167,11 @@ def combined(how: str, total: float, value: float) -> float:
 def answer(rule: Callable[..., Any], kind: str, given: Mapping[str, Any], owner: str = "") -> Any:
     """Call a rule with what it asks for by name."""
     names = _asked(rule, kind, owner)
-    for name in names:
-        if given.get(name) is None:
+    values = [given.get(name) for name in names]
+    for name, value in zip(names, values, strict=True):
+        if value is None:
             raise RuleError(f"{owner}.{kind} asks for {name}, which {owner} does not provide".lstrip("."))
-    return rule(*(given[name] for name in names))
+    return rule(*values)
 
 
 @cache

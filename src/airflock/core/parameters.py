@@ -8,6 +8,7 @@ constants in a kernel.
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import cache
+from math import isfinite
 from typing import Any, NamedTuple
 
 from airflock.errors import ParameterError
@@ -28,6 +29,7 @@ class Quantity(NamedTuple):
     source: str
     optional: bool  # None is allowed and means "derived from the rest of the scenario"
     whole: bool = False  # only whole numbers make sense
+    usual: tuple[float, float] | None = None  # span that a slider shows; None: around the value
 
     @property
     def span(self) -> str:
@@ -64,8 +66,9 @@ Declaration = Quantity | Choice | Points | Text
 
 
 def quantity(
-    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False
-) -> Any:
+    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False,
+    usual: tuple[float, float] | None = None,
+) -> Any:  # fmt: skip
     """Declare a number of a record of parameters.
 
     Parameters
@@ -82,6 +85,9 @@ def quantity(
         Where the default comes from.
     whole : bool
         Only whole numbers make sense; searches take no others.
+    usual : (float, float), optional
+        The span in which it is usually set, inside the allowed range: the ends of its slider on a live page. Without
+        it a slider takes the bounds of a study of the same law, or else reaches from 0 to 4 times the value.
 
     Returns
     -------
@@ -101,7 +107,9 @@ def quantity(
     Traceback (most recent call last):
     airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
     """
-    record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole)
+    if usual is not None and not low <= usual[0] < usual[1] <= high:
+        raise ParameterError(f"usual = {usual} is no span inside [{low:g}, {high:g}] ({meaning})")
+    record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole, usual)
     return field(default=default, metadata={"airflock": record})
 
 
@@ -188,7 +196,7 @@ class Parameters:
         for name, declared, _ in declarations(self):
             value = getattr(self, name)
             if isinstance(declared, Quantity):
-                if isinstance(value, int) and not isinstance(value, bool):
+                if isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023:
                     value = float(value)
                     object.__setattr__(self, name, value)  # 1 and 1.0 must not compile two kernels
                 fault = quantity_fault(value, declared)
@@ -197,9 +205,9 @@ class Parameters:
             elif isinstance(declared, Text):
                 fault = "" if isinstance(value, str) else f"= {value!r} is no text"
             else:
-                value = _frozen(value)
-                object.__setattr__(self, name, value)
-                fault = ""
+                fault = points_fault(value, declared)
+                if not fault:
+                    object.__setattr__(self, name, _frozen(value))
             if fault:
                 faults.append(f"{type(self).__name__}.{name} {fault}")
         if faults:
@@ -222,7 +230,27 @@ def choice_fault(value: Any, declared: Choice) -> str:
     return "" if value in declared.options else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
+def points_fault(value: Any, declared: Points) -> str:
+    """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
+    try:
+        sound = _are_points(_frozen(value), declared.depth, declared.axes)
+    except (TypeError, ValueError, OverflowError):
+        sound = False
+    what = f"{'polygons, each a list of ' if declared.depth == 3 else ''}points of {declared.axes} finite numbers"
+    return "" if sound else f"is not a list of {what}"
+
+
+def _are_points(value: Any, depth: int, axes: int) -> bool:
+    if not isinstance(value, tuple):
+        return False
+    if depth > 1:
+        return all(_are_points(entry, depth - 1, axes) for entry in value)
+    return len(value) == axes and all(isinstance(number, float) and isfinite(number) for number in value)
+
+
 def _frozen(value: Any) -> Any:
+    if isinstance(value, (str, bool)):
+        raise TypeError(f"{value!r} is not a number")
     return tuple(_frozen(v) for v in value) if isinstance(value, (list, tuple)) else float(value)
 
 

@@ -14,7 +14,7 @@ from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
 from airflock.core.radio import Radio
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import back, complete, could_be_near, counts
+from airflock.core.silence import back, complete, could_be_near, counts, stands_until
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
@@ -171,6 +171,7 @@ class Pilot:
         self.topology, self.t = topology, t
         self.memory = first_memory(model)
         self.stopped: Vector | None = None
+        self.stands_until = 0.0
         self.packets: dict[int, Packet] = {}
         self.decisions = 0
         self.senses: Percept | None = None
@@ -236,8 +237,12 @@ class Pilot:
         return False
 
     def stay(self, own: State, now: float) -> Vector | None:
-        """Velocity (m/s) that keeps it where it stopped for a neighbour that it has lost; None while nobody is lost."""
-        if self.silence is None or not self.lost_near(own, now):
+        """Velocity (m/s) that keeps it where it stopped for a neighbour that it has lost; None while it may fly."""
+        if self.silence is None:
+            return None
+        near = 1.0 if self.lost_near(own, now) else 0.0
+        self.stands_until = stands_until(near, now, self.stands_until, self.silence)
+        if not now < self.stands_until:
             self.stopped = None
             return None
         x, y, z = self.stopped = self.stopped or own[:3]
@@ -288,6 +293,8 @@ class Pilot:
     def steer(self, own: State, now: float, goal: Vector | None = None) -> Vector:
         """Velocity (m/s) to ask an autopilot for: what the law decides now, through its body."""
         made = self.decide(own, now, goal=goal)
+        if self.model.command == "velocity":
+            return made.command
         if self.flat:
             own = level(own)
         stays = self.stay(own, now)

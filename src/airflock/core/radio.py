@@ -26,7 +26,9 @@ LINKS = ("fast", "slow")  # how `missed` asks how many packets the first and the
 class Packets(Parameters):
     """What every radio has: a delay, a range, and a loss that grows with the square of the distance."""
 
-    delay: float = quantity(1.0, "s", low=0.0, high=30.0, source=S5, meaning="age of neighbours' data on arrival")
+    delay: float = quantity(
+        1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
+    )
     range: float = quantity(80.0, "m", low=0.0, high=1e8, source=S5, meaning="largest distance of communication")
     loss: float = quantity(
         0.0,

@@ -27,11 +27,16 @@ class Reception:
 
         known : the distance (m), and what else of the vocabulary of `receive` is known
         """
-        given = self._given(receiver, sender, number, known)
-        if self.radio.receive is not None and not self._received(receiver, sender, given):
+        if not self.hears(receiver, sender, number, known):
             return False
         u = random.pair_uniform(self.seed, random.PACKET, 0, number, receiver, sender, self.agents)
-        return bool(u >= unheard(self.radio, self.k, number, self.period, given))
+        return bool(u >= unheard(self.radio, self.k, number, self.period, known))
+
+    def hears(self, receiver: int, sender: int, number: int, known: Mapping[str, float]) -> bool:
+        """Whether a packet arrives by the radio's own rule `receive`, where it has one."""
+        if self.radio.receive is None:
+            return True
+        return self._received(receiver, sender, self._given(receiver, sender, number, known))
 
     def late(self, receiver: int, sender: int, number: int, known: Mapping[str, float]) -> float:
         """How much later than its delay a packet of decision `number` comes, s."""

@@ -27,6 +27,7 @@ class Sampled(Parameters):
         "s",
         low=0.0,
         high=60.0,
+        usual=(0.0, 1.0),
         source="Vásárhelyi et al. 2018, Table S5",
         meaning="time between decisions; 0: at every step dt",
     )

@@ -2,8 +2,8 @@
 
 Nobody heard is not nobody there. Flocks whose agents forget a silent neighbour fly into it. An agent that follows this
 rule stops as soon as a neighbour whose data have grown old could be near by now, and stays where it stopped until it
-hears of it again or gives it up. Until data are that old, they count as heard. docs/decisions/0056 tells what was
-measured.
+hears of it again or gives it up, and for a pause beyond. Until data are that old, they count as heard.
+docs/decisions/0056 and 0095 tell what was measured.
 """
 
 from dataclasses import dataclass, replace
@@ -13,6 +13,7 @@ from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 
 SPARE = 0.5  # s; our choice: two decisions without news; with 1 s, four flights of 40 came below 3 m
+GRACE = 1e-3  # s; two clocks that count the same decisions differ by less
 USUAL = 4.0  # m/s; our choice: the speed at which the numbers were found
 OURS = "our choice, from flights of 10 drones at 4 m/s with 15 s of silence"
 
@@ -41,6 +42,10 @@ class Parameters(Record):
     hold: float = quantity(
         0.5, "1/s", low=0.0, high=10.0, source=OURS,
         meaning="speed per distance at which an agent that stopped goes back to where it stopped",
+    )  # fmt: skip
+    pause: float = quantity(
+        1.0, "s", low=0.0, high=60.0, source=OURS,
+        meaning="an agent that stopped goes on once nobody whom it had lost could have been near for so long",
     )  # fmt: skip
     forget: float = quantity(
         20.0, "s", low=0.0, high=3600.0, source=OURS, meaning="age of data after which a neighbour is given up"
@@ -73,6 +78,14 @@ def could_be_near(distance, age, s):
     """
     lost = (age > s.patience) & (age < s.forget)
     return 1.0 if lost & (distance - s.keep < s.closing * age) else 0.0
+
+
+def stands_until(near, now, until, s):
+    """Time (s) until which an agent stands, from that of the last decision and whether one it lost could be near now.
+
+    Who went on at the first decision in which it hears all would creep: 1 to 2 m each time, towards who does the same.
+    """
+    return now + s.pause + GRACE if near > 0.5 else until
 
 
 def back(dx, dy, dz, s):

@@ -9,6 +9,7 @@ from airflock.core import agent as one
 from airflock.core import radio, random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
+from airflock.core.maths import norm
 from airflock.core.pilot import carried
 from airflock.core.topology import met_of
 from airflock.engine.beginnings import NEVER
@@ -28,6 +29,7 @@ class View:
     heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
     met         : of each of them, in the same order, whether the topology lets it meet that one
     terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
+    alike       : of each of them what the rule would have made of it, had it flown as the agent does
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command
@@ -40,6 +42,7 @@ class View:
     heard: tuple[Heard, ...]
     met: tuple[bool, ...]
     terms: tuple[Any, ...]
+    alike: tuple[Any, ...]
     sums: Any
     walls: Any
     memory: Any
@@ -58,18 +61,22 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     p = _parameters(scenario, state, agent)
     met = _met(scenario, state, own, heard)
     near = one.answer(model.reach, "reach", {"p": p}, model.name) if model.reach else math.inf
-    terms = []
+    terms, alike = [], []
     for other, meets in zip(heard, met, strict=True):
         if model.neighbour is None:
             break
         given = one.pair_percept(own, Heard(other.who, _beside(scenario, own, other.state), other.age), agent)
         far = not meets or given["r"] > near
-        rule = one.answer(model.neighbour, "neighbour", given | {"p": p}, model.name)
-        terms.append(type(rule)(*(0.0 for _ in rule)) if far else rule)
+        same = given | {"dvx": 0.0, "dvy": 0.0, "dvz": 0.0, "dv": norm(0.0, 0.0, 0.0)}
+        same |= {f"n{name}": given[name] for name in ("hx", "hy", "hz")}
+        found = [one.answer(model.neighbour, "neighbour", case | {"p": p}, model.name) for case in (given, same)]
+        none = type(found[0])(*(0.0 for _ in found[0]))
+        terms.append(none if far else found[0])
+        alike.append(none if far else found[1])
     memory = model.Memory(*(float(x) for x in state.arrays["mem"][:, _slot(state, agent)])) if model.Memory else None
     command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
     return View(
-        agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms),
+        agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms), tuple(alike),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
     )  # fmt: skip
 

@@ -43,6 +43,17 @@ def usual_space(scenario: Scenario) -> tuple[Space, list[str]]:
     return Space(tuple(_ordered(axes))), notes
 
 
+def studied(scenario: Scenario) -> dict[str, tuple[float, float]]:
+    """Bounds of the shipped study of the same law that is nearest in speed, by key; none where no study is shipped."""
+    found = _nearest_study(scenario)
+    if found is None:
+        return {}
+    _, speed, known = found
+    ratio = _speed(scenario) / speed if speed else 1.0
+    scaled = [_scaled(scenario, known[own.key], own, ratio) for own in full_space(scenario).axes if own.key in known]
+    return {axis.key: (axis.low, axis.high) for axis in scaled}
+
+
 def unread(scenario: Scenario) -> set[str]:
     """Keys of the model's numbers that no rule reads under the scenario's choices."""
     from airflock.engine.simulate import driver_text

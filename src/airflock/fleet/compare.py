@@ -9,9 +9,11 @@ import numpy as np
 import xarray as xr
 
 from airflock.core.agent import State
+from airflock.fleet import realtime
 from airflock.fleet.faults import Fault
 from airflock.fleet.lockstep import Fleet, start_states
 from airflock.fleet.prepare import card_document, limits_of
+from airflock.fleet.starting import READY_TIME
 from airflock.many_tests import holm
 from airflock.onboard.card import Card, card_of, hash_of
 from airflock.recordings.flights import provenance, simulate
@@ -28,10 +30,11 @@ KEPT = ("x", "y", "z")
 
 def software_card(
     scenario: Scenario, *, vehicle: str = "px4", operator: bytes = b"", silent: bool | None = None,
-    margin: float = 40.0, as_simulated: bool = True, seed: int = 0,
+    margin: float = 40.0, as_simulated: bool = True, seed: int = 0, live: bool = False,
 ) -> Card:  # fmt: skip
     """Card of a fleet in software: one tick and one packet per decision, as the simulated agents.
 
+    live   : on the real clock instead: ticks and packets as often as real drones have them, neighbours carried forward
     silent : whether the rule of silence stops a drone; by default where the scenario says so
     seed   : of the tolerances of manufacture that groups have
     """
@@ -39,6 +42,9 @@ def software_card(
     members = range(1, scenario.agents + 1)
     layer = min(3.0, 100.0 / max(scenario.agents, 1))
     limits = {"tick": period, "status_period": period, "layer": max(layer, 0.5), "mission_time": 36000.0}
+    if live:
+        as_simulated = False
+        limits = {key: limits[key] for key in ("layer", "mission_time")}
     if scenario.dimensions == 3:
         limits["climb_max"] = min(limits_of(scenario).speed_max, 10.0)  # the law climbs as fast as it flies
     made = card_document(
@@ -58,7 +64,7 @@ def first_states(scenario: Scenario, seed: int) -> list[State]:
     return start_states(np.concatenate(rows), dims)
 
 
-def recording(fleet: Fleet) -> xr.Dataset:
+def recording(fleet: Fleet | realtime.Flown) -> xr.Dataset:
     """The flight of a fleet in the simulator's layout, with what each node knew of itself."""
     scenario, dims = fleet.scenario, fleet.scenario.dimensions
     rows = fleet.array()
@@ -87,7 +93,7 @@ def fly(
     start = None if ground else first_states(scenario, seed)
     fleet = Fleet(scenario, card, seed, start=start, faults=faults, operator=operator)
     if ground:
-        fleet.advance(12.0, done)
+        fleet.advance(READY_TIME, done)
         fleet.order(Do.START, at=fleet.now)
     fleet.advance(scenario.flight.duration + scenario.flight.dt, done)
     if ground:
@@ -107,7 +113,7 @@ class Departure(NamedTuple):
 
 
 def departure(
-    fleet: Fleet, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0), device: str = "cpu"
+    fleet: Fleet | realtime.Flown, times: Sequence[float] = (2.0, 5.0, 10.0, 20.0, 30.0, 60.0), device: str = "cpu"
 ) -> Departure:  # fmt: skip
     """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
@@ -173,7 +179,7 @@ def sampled(scenario: Scenario, period: float) -> Scenario:
     return replace(scenario, metrics=replace(scenario.metrics, period=period), document=document)
 
 
-def both(scenario: Scenario, fleet: Fleet) -> tuple[dict[str, Any], dict[str, Any]]:
+def both(scenario: Scenario, fleet: Fleet | realtime.Flown) -> tuple[dict[str, Any], dict[str, Any]]:
     """Order parameters of the simulated flight and of the fleet of one seed, measured alike from recordings."""
     simulated = simulate(scenario, fleet.seed, precision=64)
     return measure(simulated)[0], measure(recording(fleet))[0]

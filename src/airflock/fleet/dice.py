@@ -1,10 +1,11 @@
-"""Outer noise of all drones of a fleet, drawn for many motion steps at once: the numbers of the simulated agents."""
+"""Random numbers of a fleet, drawn for many steps at once: those of the simulated agents."""
 
 import numpy as np
 
 from airflock.core import random
 
 BLOCK = 256  # motion steps that are drawn together
+PERIODS = 16  # periods of the radio that are drawn together
 Vector = tuple[float, float, float]
 
 
@@ -12,10 +13,11 @@ class OuterNoise:
     """Normal random numbers of every drone at every motion step, to be asked in the order of time.
 
     seed : of the flight; count: of drones; three: in space, where a draw serves one step; in a plane it serves two
+    first : of the drones that are asked for, where not all are
     """
 
-    def __init__(self, seed: int, count: int, three: bool):
-        self._seed, self._count, self._three = seed, count, three
+    def __init__(self, seed: int, count: int, three: bool, first: int = 0):
+        self._seed, self._count, self._three, self._drone = seed, count, three, first
         self._first, self._rows = -BLOCK, []  # type: ignore[var-annotated]
 
     def __call__(self, step: int, drone: int) -> Vector:
@@ -23,7 +25,7 @@ class OuterNoise:
         if not self._first <= step < self._first + BLOCK:
             self._first = step - step % BLOCK
             self._rows = self._drawn(self._first)
-        row: Vector = self._rows[step - self._first][drone]
+        row: Vector = self._rows[step - self._first][drone - self._drone]
         return row
 
     def _drawn(self, first: int) -> list[list[Vector]]:
@@ -31,7 +33,7 @@ class OuterNoise:
         steps = np.arange(first, first + BLOCK, 1 if self._three else 2, dtype=np.uint64)
         if not self._three:
             steps //= np.uint64(2)
-        drones = np.arange(self._count, dtype=np.uint64)
+        drones = np.arange(self._drone, self._drone + self._count, dtype=np.uint64)
         drawn = random.words(self._seed, random.OUTER, 0, steps[:, None], drones[None, :])
         tables = [np.broadcast_to(words, (len(steps), self._count)).tolist() for words in drawn]
         rows: list[list[Vector]] = []
@@ -43,3 +45,32 @@ class OuterNoise:
             else:
                 rows += [[(x, y, 0.0) for x, y in pairs] for pairs in (one, two)]
         return rows
+
+
+class PacketDice:
+    """Uniform random numbers by which packets are lost, of every pair in every period, to be asked in order of time.
+
+    seed : of the flight; count: of drones
+    """
+
+    def __init__(self, seed: int, count: int):
+        self._seed, self._count = seed, count
+        self._first, self._tables = -PERIODS, []  # type: ignore[var-annotated]
+
+    def __call__(self, number: int, to: int, who: int) -> float:
+        """Number between 0 and 1 of a period, a receiver and a sender, by their places among the drones."""
+        if not self._first <= number < self._first + PERIODS:
+            self._first = number - number % PERIODS
+            self._tables = self._drawn(self._first)
+        drawn: float = self._tables[number - self._first][to][who]
+        return drawn
+
+    def _drawn(self, first: int) -> list[list[list[float]]]:
+        """A table of receivers and senders for each of PERIODS periods."""
+        periods = np.arange(first, first + PERIODS, dtype=np.uint64)[:, None, None]
+        to = np.arange(0, self._count, 4, dtype=np.uint64)[None, :, None]  # four receivers share their words
+        who = np.arange(self._count, dtype=np.uint64)[None, None, :]
+        words = random.words(self._seed, random.PACKET, 0, periods, random.pair_number(to, who, self._count))
+        table = random.uniform(np.stack(words, axis=2)).reshape(PERIODS, -1, self._count)
+        found: list[list[list[float]]] = table[:, : self._count].tolist()
+        return found

@@ -11,8 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from airflock.core.radio import Radio
-from airflock.core.reception import Reception
+from airflock.core.reception import Reception, unheard
+from airflock.fleet.dice import PacketDice
 from airflock.fleet.faults import Fault
+from airflock.fleet.rogue import forged
+from airflock.mavlink.coordinates import Site
 
 SLACK = 1e-6  # s
 Vector = tuple[float, float, float]
@@ -23,17 +26,19 @@ class Ether:
 
     radio, k : kind of radio and its numbers; members: system ids; period: s between two packets of a drone
     clear : whether nothing stands between two places, m; None: nothing stands anywhere
+    site : of the flight, by which forged packets tell places
     reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
         self, radio: Radio, k: Any, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
         reach: Callable[[int, int, float], float] | None = None,
-        clear: Callable[[Vector, Vector], bool] | None = None,
+        clear: Callable[[Vector, Vector], bool] | None = None, site: Site | None = None,
     ):  # fmt: skip
         self._radio, self._k, self._members, self._period, self._faults = radio, k, list(members), period, faults
-        self._reception = Reception(radio, k, seed, len(members), period)
-        self._reach, self._clear = reach, clear
+        self._reception, self._clear = Reception(radio, k, seed, len(members), period), clear
+        self._site = site
+        self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
@@ -45,6 +50,11 @@ class Ether:
             if to != who:
                 late = self._late(to, now) + self._slow(now, who, to, at)
                 self._push(now + self._k.delay + late, who, to, datagram)
+        for f in self._faults:
+            if f.kind in ("rogue", "impostor") and f.holds(self._members[who], now) and self._site is not None:
+                false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
+                for to in range(len(self._members)):
+                    self._push(now + self._k.delay, who, to, false)
 
     def _slow(self, now: float, who: int, to: int, at: Sequence[Vector]) -> float:
         """How much later a packet comes by the rule of the radio, s."""
@@ -76,7 +86,7 @@ class Ether:
 
     def deliver(self, now: float, at: Sequence[Vector]) -> Iterator[tuple[int, bytes]]:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
-        number = round(now / self._period)
+        number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + SLACK:
             _, _, who, to, datagram = heapq.heappop(self._queue)
             self.sent += 1
@@ -90,13 +100,17 @@ class Ether:
     def _passes(self, now: float, number: int, who: int, to: int, at: Sequence[Vector]) -> bool:
         """Whether a packet gets through between two drones at these places, m."""
         distance = math.dist(at[who], at[to])
-        if distance > self._k.range or self._cut(now, who, to):
+        if distance > self._k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
-        if self._reach is not None and distance > self._reach(who, to, now):
+        if self._faults and (
+            self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
+        ):
             return False
-        if any(self._dice.random() < f.amount for f in self._of("loss", to, now)):
+        known = self._known(who, to, at)
+        if not self._reception.hears(to, who, number, known):
             return False
-        return self._reception.passes(to, who, number, self._known(who, to, at))
+        missed = unheard(self._radio, self._k, number, self._period, known)
+        return bool(missed <= 0.0 or self._drawn(number, to, who) >= missed)
 
     def _cut(self, now: float, who: int, to: int) -> bool:
         if self._of("outage", who, now) or self._of("outage", to, now):

@@ -1,11 +1,11 @@
 """Faults of a fleet: what goes wrong, for whom, and when; read from TOML, checked at once."""
 
-import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from airflock.errors import ScenarioError, reason
+from airflock.doors import from_outside, read_toml
+from airflock.errors import ScenarioError
 
 KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",
@@ -14,6 +14,8 @@ KINDS = {
     "jitter": "packets to these drones are late by up to `amount` s more",
     "duplicate": "packets to these drones arrive twice with probability `amount`",
     "corrupt": "packets to these drones arrive with a wrong bit with probability `amount`",
+    "rogue": "somebody without the key sends packets as these drones, `amount` m east of them",
+    "impostor": "somebody with the key sends packets as these drones, `amount` m east of them",
     "node": "the node is dead: it hears and says nothing",
     "motor": "the motors are off: the vehicle falls",
     "gnss": "the position that the autopilot tells is frozen",
@@ -23,7 +25,7 @@ KINDS = {
 }
 AMOUNTS = {
     "loss": (0.0, 1.0), "duplicate": (0.0, 1.0), "corrupt": (0.0, 1.0), "jitter": (0.0, 30.0), "battery": (0.0, 100.0),
-    "clock": (-3600.0, 3600.0),
+    "clock": (-3600.0, 3600.0), "rogue": (-1e4, 1e4), "impostor": (-1e4, 1e4),
 }  # fmt: skip
 
 
@@ -47,12 +49,8 @@ class Fault:
 
 def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
     """Faults from a TOML file of tables [[fault]]; ScenarioError with one line per mistake."""
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as wrong:
-        raise ScenarioError([f"{path}: {reason(wrong)}"]) from wrong
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as wrong:
-        raise ScenarioError([f"{path}: {wrong}"]) from wrong
+    with from_outside(path):
+        document = read_toml(path)
     found, mistakes = [], [f"{path}: {key} is not known; write [[fault]]" for key in document if key != "fault"]
     tables = document.get("fault", [])
     for number, table in enumerate(tables if isinstance(tables, list) else [tables]):

@@ -5,33 +5,27 @@ At each motion step: telemetry and packets that are due arrive, nodes whose tick
 
 import hashlib
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.agent import State
-from airflock.core.parameters import number_names
 from airflock.core.sensing import Sensing
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import Faults, records_of
-from airflock.fleet.vehicle import OURS, PILOT, Vehicle
-from airflock.mavlink import orders
+from airflock.fleet.starting import KEY, Station, in_the_air, lift_of, vehicle_of
 from airflock.mavlink.coordinates import Geodetic
-from airflock.mavlink.orders import Do, Order
-from airflock.mavlink.signing import Signer
+from airflock.mavlink.orders import Do
 from airflock.onboard.card import Card
 from airflock.onboard.mission import FLY, Phase
 from airflock.onboard.node import Node
 from airflock.scenarios.scenario import Scenario
 
 STARTED = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
-KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
 NEVER = -1e8  # s; a peer whose last state held before this has not been heard
-READY_TIME = 12.0  # s on the ground before a start is ordered
 
 
 class Fleet:
@@ -54,41 +48,30 @@ class Fleet:
         self._befalls = befalls = Faults(scenario, seed)
         self._bodies = [b for _, b in records_of(scenario, len(card.members), seed)]
         self._noise = OuterNoise(seed, len(card.members), not card.flat)
-        self.vehicles = [self._vehicle(i) for i in range(len(card.members))]
+        self.vehicles = [vehicle_of(scenario, card, i, b, self._noise, STARTED) for i, b in enumerate(self._bodies)]
+        for vehicle in self.vehicles:
+            vehicle.faults = befalls or None
+            vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
         self.nodes = [
             Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
             for who in card.members
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
-        found_radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
-        self.ether = Ether(*found_radio, card.members, seed, period, faults, reach, self._clear)
+        radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
+        self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
         found = scenario.sensor, scenario.sensors
         self._sensing = [Sensing(*found, seed, i, flat=card.flat) for i in range(len(card.members))]
-        self._given = 0
-        self._operator, self._orders = operator, Signer(KEY, orders.OPERATOR)
+        self._station = Station(card, operator)
         if start is not None:
             self._begin(start)
 
     def _clock_fault(self, who: int) -> int:
         return sum(round(f.amount * 1e6) for f in self.faults if f.kind == "clock" and f.holds(who, f.begin))
 
-    def _vehicle(self, i: int) -> Vehicle:
-        """A vehicle on the ground; grounds are a row of places 4 m apart."""
-        card, b = self.card, self._bodies[i]
-        side = max(1, round(len(card.members) ** 0.5))
-        at = (4.0 * (i % side) - 2.0 * (side - 1), 4.0 * (i // side) - 2.0 * (side - 1), 0.0)
-        noisy = "noise" in number_names(b) and b.noise > 0.0
-        draw = partial(self._noise, drone=i) if noisy else lambda step: (0.0, 0.0, 0.0)
-        made = Vehicle(card.autopilot.name, card.members[i], card.site, at, self.scenario.vehicle, b, draw, STARTED)
-        made.faults, made.place = self._befalls or None, i
-        made.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
-        return made
-
     def _begin(self, start: Sequence[State]) -> None:
         """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""
         for vehicle, node, s in zip(self.vehicles, self.nodes, start, strict=True):
-            vehicle.state = s._replace(z=s.z + (self.card.height if self.card.flat else self.lift))
-            vehicle.armed, vehicle.mode, vehicle.target_at, vehicle.first_at = True, OURS, 0.0, -9.0
+            in_the_air(vehicle, self.card, s)
             node.phase, node.home = Phase.FLOCK, (*vehicle.home[:2], self.card.layer(node.member))
             node.autopilot(vehicle.frame_origin(), 0.0)
             node.autopilot(vehicle.telemetry(0.0), 0.0)
@@ -112,16 +95,12 @@ class Fleet:
     @property
     def lift(self) -> float:
         """Height (m) above the site at which the law counts zero."""
-        return -self.card.law_state(State(*(0.0,) * 6)).z
+        return lift_of(self.card)
 
     def order(self, do: Do, target: int = 0, at: float = 0.0, point: Geodetic | None = None) -> None:
         """Give an order as the operator's station would; it reaches every drone at once."""
-        utc = max(STARTED + round(self.now * 1e6), self._given + 1)  # no two orders at one time
-        self._given = utc
-        p = point or Geodetic(0.0, 0.0, 0.0)
-        place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
-        given = Order(do, target, self.card.mission, utc, STARTED + round(at * 1e6), place)
-        datagram = self._orders(orders.message(given, self._operator), utc)
+        utc, due = (STARTED + round(t * 1e6) for t in (self.now, at))
+        datagram = self._station.order(do, utc, target=target, at=due, point=point)
         for node in self.nodes:
             node.radio(datagram, self.now)
 
@@ -179,15 +158,7 @@ class Fleet:
     def _break(self, now: float) -> None:
         """Let faults of vehicles act."""
         for vehicle in self.vehicles if self.faults else ():
-            who = vehicle.system
-            vehicle.motor = not self._is("motor", who, now)
-            frozen = self._is("gnss", who, now)
-            vehicle.frozen = vehicle.frozen if frozen and vehicle.frozen else vehicle.measured if frozen else None
-            for f in self.faults:
-                if f.kind == "battery" and f.holds(who, now):
-                    vehicle.battery = f.amount
-                if f.kind == "pilot" and f.holds(who, now) and now - f.begin < self._dt:
-                    vehicle.mode = PILOT
+            vehicle.suffer(self.faults, now, self._dt)
 
     def _err(self, number: int) -> None:
         """Advance the error of each drone's navigation by one period, with the simulator's numbers."""

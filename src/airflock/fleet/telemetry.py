@@ -39,8 +39,8 @@ def _system_time(v: Any) -> Any:
 def _gps(v: Any) -> Any:
     at = v.site.geodetic(*v.measured[:3])
     return dialect.common().MAVLink_gps_raw_int_message(
-        round(v.now * 1e6), 3, round(at.latitude * 1e7), round(at.longitude * 1e7), round(at.altitude * 1e3), 80, 120,
-        0, 0, 14, 0, round(v.accuracy * 1e3),
+        round((v.now - v.booted) * 1e6), 3, round(at.latitude * 1e7), round(at.longitude * 1e7),
+        round(at.altitude * 1e3), 80, 120, 0, 0, 14, 0, round(v.accuracy * 1e3),
     )  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def _version(v: Any) -> Any:
 
 
 def _boot(v: Any) -> int:
-    return int(round(v.now * 1e3)) & 0xFFFFFFFF
+    return int(round((v.now - v.booted) * 1e3)) & 0xFFFFFFFF
 
 
 def _origin_numbers(v: Any) -> tuple[int, int, int]:

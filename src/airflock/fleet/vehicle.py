@@ -2,13 +2,13 @@
 
 receive(bytes) takes frames and gives answers; telemetry(now) gives what is due; step(now, dt) moves it. Inside
 east-north-up, north-east-down only in frames. It keeps the autopilots' rules that matter to a node: PX4 enters
-OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot takes off by command
-and brakes GUID_TIMEOUT after the last setpoint.
+OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot takes off by command,
+brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS.
 """
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from operator import itemgetter
 from typing import Any
 
@@ -18,23 +18,14 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.fleet import telemetry
+from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import Faults
+from airflock.fleet.modes import HOLD, LAND, MODES, ON_LOSS, ON_SILENCE, OURS, PARAMETERS, PILOT, RTL, TAKEOFF
 from airflock.mavlink import dialect
 from airflock.mavlink.autopilots import AUTOPILOTS, px4_mode
 from airflock.mavlink.coordinates import Site, turned
 from airflock.mavlink.frames import Packer, Stream
 
-OURS, LAND, RTL, HOLD, TAKEOFF, PILOT = "OURS", "LAND", "RTL", "HOLD", "TAKEOFF", "PILOT"
-MODES = {
-    "px4": {OURS: px4_mode(6), LAND: px4_mode(4, 6), RTL: px4_mode(4, 5), HOLD: px4_mode(4, 3),
-            TAKEOFF: px4_mode(4, 2), PILOT: px4_mode(3)},
-    "ardupilot": {OURS: 4, LAND: 9, RTL: 6, HOLD: 17, PILOT: 5},
-}  # fmt: skip
-PARAMETERS: dict[str, dict[str, float | int]] = {
-    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 4, "GF_ACTION": 3, "MIS_TAKEOFF_ALT": 10.0, "MAV_SYS_ID": 1},
-    "ardupilot": {"GUID_TIMEOUT": 1.0, "FENCE_ENABLE": 1, "FS_GCS_ENABLE": 1, "SYSID_THISMAV": 1},
-}
-ON_LOSS = {3: RTL, 4: LAND, 5: HOLD}  # COM_OBL_RC_ACT of PX4
 ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED = 0x0007
 VELOCITY_IGNORED = 0x0038
@@ -65,19 +56,21 @@ class Vehicle:
         self.state, self.home, self.started = State(*at, 0.0, 0.0, 0.0), at, started
         self.origin = site.geodetic(at[0], at[1], 0.0)
         self.mode, self.armed, self.battery = (HOLD if kind == "px4" else PILOT), False, 100.0
-        self.parameters = PARAMETERS[kind] | {"MAV_SYS_ID" if kind == "px4" else "SYSID_THISMAV": system}
+        ours = ("MAV_SYS_ID",) if kind == "px4" else ("SYSID_THISMAV", "SYSID_MYGCS")
+        self.parameters = PARAMETERS[kind] | dict.fromkeys(ours, system)
         self.target: Vector = (0.0, 0.0, 0.0)
         self.target_at, self.first_at, self.climb_to = -1e9, -1e9, 0.0
+        self.booted = 0.0  # s
+        self.beat_at: float | None = None  # when the last heartbeat of its station came; None: none ever
         self.now, self.due, self.rates = 0.0, dict.fromkeys(telemetry.RATES, 0.0), dict(telemetry.RATES)
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
         self.lifting = False
-        for name in asks(body.move, "move", body.name):
+        asked = asks(body.move, "move", body.name)
+        for name in asked:
             if name not in GIVEN:
                 raise RuleError(f"body {body.name} asks for {name}, which a vehicle of a fleet does not have")
-        asked = asks(body.move, "move", body.name)
         self._take = itemgetter(*map(GIVEN.index, asked))
-        self._measures = not {"mx", "my", "mz"}.isdisjoint(asked)
         self._old = choices(b).get("integration", body.integration) == "old"
         self.memory = body.Memory() if body.Memory is not None else None
         self.faults: Faults | None = None  # of the scenario, with its own place among the drones
@@ -139,6 +132,11 @@ class Vehicle:
                 for message in handler(self, frame.values(), (frame.system, frame.component)):
                     out += self.frame(message)
         return out
+
+    def _heartbeat(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
+        if sender[0] == self.parameters.get("SYSID_MYGCS"):
+            self.beat_at = self.now
+        return []
 
     def _timesync(self, v: dict[str, Any], sender: tuple[int, int]) -> list[Any]:
         if v["tc1"] != 0:
@@ -248,16 +246,33 @@ class Vehicle:
         return True
 
     _HANDLERS = {
-        111: _timesync, 21: _list, 20: _read, 23: _write, 84: _setpoint, 11: _set_mode, 76: _command, 75: _command,
+        0: _heartbeat, 11: _set_mode, 20: _read, 21: _list, 23: _write, 75: _command, 76: _command, 84: _setpoint,
+        111: _timesync,
     }  # fmt: skip
 
     # ----------------------------------------------------------------------------------------------------- motion
+
+    def suffer(self, faults: Sequence[Fault], now: float, dt: float) -> None:
+        """Let faults act that befall it in the step from now on: motors, navigation, battery, a pilot's hand."""
+        kinds = {f.kind for f in faults if f.holds(self.system, now)}
+        self.motor = "motor" not in kinds
+        frozen = "gnss" in kinds
+        self.frozen = self.frozen if frozen and self.frozen else self.measured if frozen else None
+        for f in faults if kinds else ():
+            if f.kind == "battery" and f.holds(self.system, now):
+                self.battery = f.amount
+            if f.kind == "pilot" and f.holds(self.system, now) and now - f.begin < dt:
+                self.mode = PILOT
 
     def wish(self) -> Vector:
         """Velocity that the autopilot makes for now, m/s."""
         late = self.now - self.target_at
         if self.mode == OURS and self.kind == "px4" and late > self.parameters["COM_OF_LOSS_T"]:
             self.mode = ON_LOSS.get(int(self.parameters["COM_OBL_RC_ACT"]), HOLD)
+        if self.mode == OURS and self.kind == "ardupilot" and self.beat_at is not None:
+            action = int(self.parameters["FS_GCS_ENABLE"])
+            if action and self.now - self.beat_at > self.parameters["FS_GCS_TIMEOUT"]:
+                self.mode = ON_SILENCE.get(action, RTL)
         if self.mode == LAND:
             return 0.0, 0.0, -SINK
         if self.mode == RTL:
@@ -284,7 +299,8 @@ class Vehicle:
         command = c if self.motor else (vx, vy, vz - 5.0)
         if self.faults is not None:
             command = self.faults.overruled(self.place, now, command)
-        measured = self.navigated[3:] if self._measures else STILL
+        eu, ev, ew = self.error[3:]
+        measured = vx + eu, vy + ev, vz + ew
         known = (vx, vy, vz, *measured, *command, *self._draw(number), 0.0, 0.0, 0.0, dt, self.b, self.memory)
         moved = self.body.move(*self._take(known))
         velocity, self.memory = moved[:3], moved[3] if self.memory is not None else None

@@ -27,12 +27,20 @@ STREAMS = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message →
 
 
 class Guard(NamedTuple):
-    """A parameter of the autopilot that must lie between two values before anything arms, and why."""
+    """A parameter of the autopilot that must lie between two values before anything arms, and why.
+
+    own : it must be the autopilot's own system id instead
+    """
 
     name: str
     low: float
     high: float
     why: str
+    own: bool = False
+
+    def range(self, member: int) -> tuple[float, float]:
+        """Least and largest value that is safe for a member of a flock."""
+        return (float(member), float(member)) if self.own else (self.low, self.high)
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,9 @@ AUTOPILOTS = {
         guards=(
             Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes: 16 m at 4 m/s with 3 s"),
             Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence acts"),
-            Guard("FS_GCS_ENABLE", 1.0, 7.0, "acts when heartbeats end; the node's if SYSID_MYGCS is its own id"),
+            Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; whoever hovers is hit in the end"),
+            Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),
+            Guard("SYSID_MYGCS", 1.0, 250.0, "whose heartbeats count: those of the node, of the same system", own=True),
         ),
     ),
 }  # fmt: skip

@@ -24,14 +24,17 @@ class Layout(NamedTuple):
 
     unpack : payload of full length → values in wire order; size : of that payload, bytes
     crc_extra : byte that goes into the checksum and stands for the message's definition
-    fields : name, index of its first value, how many values (0: a single one), whether it is text
+    single, texts : names of numbers and of texts, with the index of the value
+    arrays : name, index of the first value, how many values
     """
 
     name: str
     unpack: Any
     size: int
     crc_extra: int
-    fields: tuple[tuple[str, int, int, bool], ...]
+    single: tuple[tuple[str, int], ...]
+    arrays: tuple[tuple[str, int, int], ...]
+    texts: tuple[tuple[str, int], ...]
 
 
 @cache
@@ -40,13 +43,20 @@ def layout(message: int) -> Layout | None:
     kind = common().mavlink_map.get(message)
     if kind is None:
         return None
-    fields, index = [], 0
+    single, arrays, texts, index = [], [], [], 0
     by_place = sorted(zip(kind.orders, kind.fieldnames, kind.fieldtypes, strict=True))
     for (_, name, type_), count in zip(by_place, kind.array_lengths, strict=True):
-        text = type_ == "char"
-        fields.append((name, index, 0 if text else count, text))
-        index += max(1, 0 if text else count)
-    return Layout(kind.msgname, kind.unpacker.unpack, kind.unpacker.size, kind.crc_extra, tuple(fields))
+        if type_ == "char":
+            texts.append((name, index))
+        elif count:
+            arrays.append((name, index, count))
+        else:
+            single.append((name, index))
+        index += 1 if type_ == "char" else max(1, count)
+    unpacker = kind.unpacker
+    return Layout(
+        kind.msgname, unpacker.unpack, unpacker.size, kind.crc_extra, tuple(single), tuple(arrays), tuple(texts)
+    )
 
 
 def values(message: int, payload: bytes) -> dict[str, Any]:
@@ -58,12 +68,11 @@ def values(message: int, payload: bytes) -> dict[str, Any]:
     if known is None or len(payload) > known.size:
         raise LinkError(f"message {message} with {len(payload)} bytes is not in the common dialect")
     flat = known.unpack(payload.ljust(known.size, b"\0"))
-    found: dict[str, Any] = {}
-    for name, index, count, text in known.fields:
-        if text:
-            found[name] = flat[index].split(b"\0", 1)[0].decode("ascii", "replace")
-        else:
-            found[name] = flat[index : index + count] if count else flat[index]
+    found: dict[str, Any] = {name: flat[index] for name, index in known.single}
+    for name, index, count in known.arrays:
+        found[name] = flat[index : index + count]
+    for name, index in known.texts:
+        found[name] = flat[index].split(b"\0", 1)[0].decode("ascii", "replace")
     return found
 
 

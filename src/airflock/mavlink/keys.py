@@ -14,8 +14,12 @@ def write_key(path: Path, key: bytes) -> None:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError as fault:
         raise LinkError(f"{path}: exists; a key is never overwritten") from fault
-    with os.fdopen(handle, "w", encoding="ascii") as file:
-        file.write(key.hex() + "\n")
+    try:
+        with os.fdopen(handle, "w", encoding="ascii") as file:
+            file.write(key.hex() + "\n")
+    except OSError as fault:  # a full disk; half a key is none
+        path.unlink(missing_ok=True)
+        raise LinkError(f"{path}: cannot be written: {reason(fault)}") from fault
 
 
 def read_key(path: Path) -> bytes:

@@ -22,6 +22,7 @@ from airflock.core.parameters import quantity
 COMMAND = "heading"
 TERMS = {"r": ("repulsion", ""), "o": ("orientation", ""), "a": ("attraction", "")}
 USUAL = {"fov_deg": 360.0}
+PARTS = {"zones": ("r_r", "dr_o", "dr_a"), "perception": ("fov_deg", "sigma")}
 TABLE = "Couzin et al. 2002, Table 1"
 
 

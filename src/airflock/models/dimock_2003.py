@@ -34,6 +34,12 @@ from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
 TERMS = {"c": ("cohesion", "m"), "a": ("avoidance", "m; pairwise: m/s")}
+PARTS = {
+    "cohesion": ("k_c", "r_c", "cohesion", "centroid"),
+    "avoidance": ("k_a", "r_a", "avoidance"),
+    "drag descent": ("k_d", "gradient"),
+    "flight": ("v_max", "steps"),
+}
 VIOLATES = {
     "rotation": "forward is along x, in a frame that flies along (wing.frame)",
     "units": "Eq. 4 takes the direction of a weighted offset, be it ever so short; below 1e-6 m its guard shows",

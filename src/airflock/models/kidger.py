@@ -31,6 +31,13 @@ from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
 TERMS = {"s": ("separation", ""), "a": ("alignment", "m/s"), "c": ("cohesion", "m")}
+PARTS = {
+    "radii": ("r_sep", "r_align", "r_cohes"),
+    "drone": ("speed", "accel", "gravity", "radius", "margin"),
+    "scales": ("s_obst", "s_sep", "s_goal", "s_align", "s_cohes", "s_prev"),
+    "rays": ("r_ray", "rays", "cast", "ahead", "first", "fan"),
+    "oracles": ("scheme", "most", "method", "separation", "cohesion"),
+}
 VIOLATES = {
     "rotation": "the spiral of rays that looks for a way out begins on a fixed side",
     "mirror": "the spiral of rays turns one way",

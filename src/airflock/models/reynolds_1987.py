@@ -33,6 +33,12 @@ VIOLATES = {
     "units": "the program smooths by clip(9 dt, 0.15, 0.4), 9 per second; as printed, weights turn metres into newtons",
 }
 USUAL = {"fov_s_deg": 360.0, "fov_a_deg": 360.0, "fov_c_deg": 360.0}
+PARTS = {
+    "separation": ("r_s", "fov_s_deg", "w_s"),
+    "alignment": ("r_a", "fov_a_deg", "w_a"),
+    "cohesion": ("r_c", "fov_c_deg", "w_c"),
+    "boid": ("m_b", "f_m", "f_unit", "r_floor", "look_ahead", "form"),
+}
 TABLE = "Zapotecatl et al. 2016, Table 1"
 PROGRAM = "authors' program of Zapotecatl et al. 2016"
 

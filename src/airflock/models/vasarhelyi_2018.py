@@ -27,6 +27,12 @@ from airflock.core.parameters import choice, quantity
 
 COMMAND = "velocity"
 S1 = "Table S1, column 4 m/s"
+PARTS = {
+    "self-propulsion": ("v_flock", "v_max", "limit"),
+    "repulsion": ("r0_rep", "p_rep"),
+    "alignment": ("r0_frict", "c_frict", "v_frict", "p_frict", "a_frict"),
+    "walls and obstacles": ("r0_shill", "v_shill", "p_shill", "a_shill"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,6 +25,12 @@ from airflock.core.parameters import quantity
 COMMAND = "velocity"
 FIG1 = "Vásárhelyi et al. 2018, Fig. 1, caption"
 OURS = "our choice (not printed)"
+PARTS = {
+    "self-propulsion": ("v_flock", "v_max"),
+    "repulsion": ("r0_rep", "p_rep"),
+    "friction": ("c_frict", "r_min_frict"),
+    "walls": ("c_shill", "v_shill", "d_wall"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,22 +9,21 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from airflock import atomic
-from airflock.body.registry import BODIES
 from airflock.core.agent import State
-from airflock.core.contract import Model, model
-from airflock.core.maths import FAR
+from airflock.core.contract import Model
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError, reason
+from airflock.doors import from_outside, json_value, read_text
+from airflock.errors import AirflockError, CardError
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
 from airflock.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
+from airflock.onboard.laws import body_of, law_of, look_of, own_of
 from airflock.onboard.safety import Safety
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
@@ -93,7 +92,7 @@ class Card:
         index = self.members.index(member)
         p, b = self.own[index] if self.own else (self.parameters, self.body_parameters)
         return Pilot(
-            self.model, p, self.place.seen(_look(self.model, p)), index=index, period=self.period,
+            self.model, p, self.place.seen(look_of(self.model, p)), index=index, period=self.period,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
@@ -129,13 +128,8 @@ def write_card(path: Path, document: Mapping[str, Any]) -> Card:
 
 def read_card(path: Path) -> Card:
     """Card from its file; CardError with one line per fault."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise CardError([f"{path}: {reason(fault)}"]) from fault
-    except (ValueError, RecursionError) as fault:
-        raise CardError([f"{path}: is not JSON: {fault}"]) from fault
-    return card_of(document, str(path))
+    with from_outside(path, CardError):
+        return card_of(json_value(read_text(path)), str(path))
 
 
 def card_of(document: Any, where: str = "card") -> Card:
@@ -186,9 +180,9 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     elif polygon_fault(corners):
         faults.append(f"fence.corners {polygon_fault(corners)}")
     operator = hexadecimal(d["operator"], faults)
-    law, parameters = _law(d["law"], faults)
-    body, numbers = _body(d["body"], faults)
-    own = _own(d, law, body, faults)
+    law, parameters = law_of(d["law"], faults)
+    body, numbers = body_of(d["body"], faults)
+    own = own_of(d, law, body, faults)
     world = record(arena.Parameters, d["world"], "world", faults)
     silence = record(Silence, d["silence"], "silence", faults)
     topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
@@ -200,7 +194,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         return None
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=_look(law, parameters), casts=law.sight is not None,
+        look=look_of(law, parameters), casts=law.sight is not None,
     )  # fmt: skip
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
@@ -255,60 +249,3 @@ def _outline(world: arena.Parameters) -> list[tuple[float, float]]:
     if world.arena == "circle":
         return [(r, 0.0), (0.0, r), (-r, 0.0), (0.0, -r), (0.7 * r, 0.7 * r), (-0.7 * r, -0.7 * r)]
     return [(h, h), (-h, h), (-h, -h), (h, -h)] if world.arena == "square" else []
-
-
-def find_law(name: str) -> Model:
-    """A law of the package by its name."""
-    if not name.isidentifier():
-        raise CardError([f"law.kind = {name!r} is not a law of this version"])
-    try:
-        return model(import_module(f"airflock.models.{name}"))
-    except ModuleNotFoundError as fault:
-        raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
-
-
-def _law(table: Any, faults: list[str]) -> tuple[Model | None, Any]:
-    try:
-        found = find_law(str(table["kind"]))
-    except (AirflockError, KeyError, TypeError) as fault:
-        faults.append(str(fault) if isinstance(fault, AirflockError) else "law.kind is missing")
-        return None, None
-    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, "law", faults)
-
-
-def _body(table: Any, faults: list[str]) -> tuple[Any, Any]:
-    kind = table.get("kind") if isinstance(table, dict) else None
-    if not isinstance(kind, str) or kind not in BODIES:
-        faults.append(f"body.kind = {kind!r} is none of {', '.join(BODIES)}")
-        return None, None
-    return BODIES[kind], record(
-        BODIES[kind].Parameters, {k: v for k, v in table.items() if k != "kind"}, "body", faults
-    )  # fmt: skip
-
-
-def _own(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Any, Any], ...]:
-    """Numbers of law and body of each member; none where all are alike."""
-    rows = d["own"]
-    parts = {"law": getattr(law, "Parameters", None), "body": getattr(body, "Parameters", None)}
-    if rows == [] or None in parts.values():
-        return ()
-    if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
-        faults.append("own: give a table with law and body for each member, or an empty list")
-        return ()
-    found = []
-    for number, row in enumerate(rows):
-        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in parts)
-        if not sound:
-            faults.append(f"own[{number}] = {row!r}: give the tables law and body")
-            continue
-        made = []
-        for part, kind in parts.items():
-            usual = {key: value for key, value in d[part].items() if key != "kind"}
-            made.append(record(kind, usual | row[part], f"own[{number}].{part}", faults))
-        found.append((made[0], made[1]))
-    return tuple(found)
-
-
-def _look(law: Model, p: Any) -> float:
-    """How far (m) a law with these numbers looks for what stands in the world."""
-    return FAR if law.wall_reach is None else float(law.wall_reach(p))

@@ -36,5 +36,5 @@ class Fence:
     def outside(self, x: float, y: float) -> float:
         """Distance beyond the fence, m; negative inside."""
         if self.planes:
-            return max(-(a * x + b * y + d) for a, b, _, d in self.planes)
+            return -min([a * x + b * y + d for a, b, _, d in self.planes])
         return float(polygon.obstacle(x, y, 0.0, self.edges, 0, len(self.edges)).distance)

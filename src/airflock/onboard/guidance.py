@@ -24,6 +24,13 @@ def keep(own: State, point: tuple[float, float, float], s: Safety) -> Velocity:
     return vx, vy, climb(own, point[2], s)
 
 
+def stay_at(own: State, point: tuple[float, float, float], s: Safety) -> Velocity:
+    """Velocity back to a point where the drone came to stand, height and all."""
+    dx, dy, dz = point[0] - own.x, point[1] - own.y, point[2] - own.z
+    vx, vy, _ = shorten(KEEP_GAIN * dx, KEEP_GAIN * dy, 0.0, 1.0)
+    return vx, vy, float(clamp(KEEP_GAIN * dz, -s.climb_max, s.climb_max))
+
+
 def make_for(own: State, point: tuple[float, float, float], s: Safety) -> Velocity:
     """Velocity towards a point of the ground plan, with which one can still stop there."""
     dx, dy = point[0] - own.x, point[1] - own.y

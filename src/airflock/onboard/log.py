@@ -5,15 +5,19 @@ A log can be flown again through the same node, bit for bit: what was decided an
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from airflock.doors import FormatError, TextError, from_outside, json_object, json_value, read_text
 from airflock.errors import LinkError
 from airflock.onboard.card import Card
 from airflock.onboard.node import Memory, Node, Out
 
 VERSION = 1
+MOST_RADIOS = 16
+LONGEST_GAP = 3600.0  # s between two lines; a node ticks many times a second
+FAR = 1e12  # s; clocks count from the start of a computer
 
 
 class Logged:
@@ -71,33 +75,75 @@ class Replayed(NamedTuple):
 
 def replay(lines: Iterable[str], card: Card, key: bytes) -> Iterator[Replayed]:
     """Fly a log again; LinkError where it is of another card or is no log."""
-    rows = iter(_rows(lines))
-    head = next(rows, {})
+    rows = enumerate(_rows(lines), 1)
+    _, head = next(rows, (0, {}))
     if head.get("log") != VERSION:
         raise LinkError("this is not a log of a flight on board")
-    if head["card"] != card.hash:
+    if head.get("card") != card.hash:
         raise LinkError("the log is of another card")
-    heard = {int(k): v for k, v in head["heard"].items()}
-    memory = Memory(head["sent"], heard, head["order"])
-    node = Node(
-        card, head["member"], key, now=head["now"], utc=head["utc"], memory=memory, radios=tuple(head["radios"]),
+    node = _node(head, card, key)
+    now = float(head["now"])
+    for number, row in rows:
+        now, data = _row(row, number, now)
+        if "a" in row:
+            node.autopilot(data, now)
+        elif "r" in row:
+            node.radio(data, now)
+        else:
+            out = node.tick(now)
+            yield Replayed(now, row, out, digest(out) == row["out"])
+
+
+def _node(head: Mapping[str, Any], card: Card, key: bytes) -> Node:
+    """The node as it was when the log began; LinkError where the first line does not tell it."""
+    heard, radios = head.get("heard"), head.get("radios")
+    stamps = [head.get(name) for name in ("sent", "order", "utc", "since")]
+    stamps += list(heard.values()) if isinstance(heard, dict) else [None]
+    periods: list[Any] = radios if isinstance(radios, list) and 0 < len(radios) <= MOST_RADIOS else [None]
+    sound = all(type(stamp) is int and 0 <= stamp < 2**63 for stamp in stamps) and head.get("member") in card.members
+    sound = sound and all(_is_number(period) and period > 0.0 for period in periods) and _is_number(head.get("now"))
+    if not sound or not isinstance(heard, dict) or not all(who.isascii() and who.isdigit() for who in heard):
+        raise LinkError("line 1: does not tell how the node began")
+    memory = Memory(head["sent"], {int(who): stamp for who, stamp in heard.items()}, head["order"])
+    return Node(
+        card, head["member"], key, now=float(head["now"]), utc=head["utc"], memory=memory, radios=tuple(periods),
         since=head["since"],
     )  # fmt: skip
-    for row in rows:
-        if "a" in row:
-            node.autopilot(bytes.fromhex(row["a"]), row["t"])
-        elif "r" in row:
-            node.radio(bytes.fromhex(row["r"]), row["t"])
-        else:
-            out = node.tick(row["t"])
-            yield Replayed(row["t"], row, out, digest(out) == row["out"])
+
+
+def _row(row: Mapping[str, Any], number: int, before: float) -> tuple[float, bytes]:
+    """Time (s) and bytes of a line; LinkError where it is none that a node wrote."""
+    now: Any
+    try:
+        now, data = row["t"], bytes.fromhex(row.get("a", row.get("r", "")))
+    except (KeyError, TypeError, ValueError):
+        now, data = None, b""
+    if not _is_number(now) or not before <= now <= before + LONGEST_GAP or not {"a", "r", "out"} & set(row):
+        raise LinkError(f"line {number}: is not one that a node wrote")
+    return float(now), data
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < FAR
+
+
+def read_log(path: Path, card: Card, key: bytes) -> Iterator[Replayed]:
+    """Fly the log of a file again; LinkError, which names the file, where it is of another card or is no log."""
+    with from_outside(path, LinkError):
+        try:
+            with open(path, encoding="utf-8") as lines:
+                yield from replay(lines, card, key)
+        except LinkError as fault:
+            raise LinkError(f"{path}: {fault}") from fault
+        except UnicodeDecodeError as fault:
+            raise LinkError(f"{path}: this is not a log of a flight on board") from fault
 
 
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     for line in lines:
         try:
-            row = json.loads(line)
-        except ValueError:
+            row = json_value(line)
+        except FormatError:
             return  # the last line of a log that ended with the power
         if isinstance(row, dict):
             yield row
@@ -106,11 +152,11 @@ def _rows(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
 def read_memory(path: Path) -> Memory:
     """What outlived a restart; nothing where there is no file yet."""
     try:
-        row = json.loads(path.read_text(encoding="utf-8"))
+        row = json_object(read_text(path))
         return Memory(int(row["sent"]), {int(k): int(v) for k, v in row["heard"].items()}, int(row["order"]))
     except FileNotFoundError:
         return Memory()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+    except (OSError, TextError, ValueError, OverflowError, KeyError, TypeError, AttributeError) as fault:
         raise LinkError(f"{path}: cannot be read as the memory of a node; remove it on the ground only") from fault
 
 

@@ -8,18 +8,19 @@ from math import isfinite
 from typing import NamedTuple
 
 from airflock.core.agent import State
+from airflock.core.maths import norm
 from airflock.errors import AirflockError
 from airflock.mavlink import orders, status
 from airflock.mavlink.autopilots import TAKE_OFF, Speaker
 from airflock.mavlink.orders import Do
 from airflock.mavlink.signing import Receiver, Signer
-from airflock.onboard import guidance
+from airflock.onboard import guidance, saying
 from airflock.onboard.card import Card
 from airflock.onboard.limiter import STILL, Velocity, limit
 from airflock.onboard.mission import FLY, Facts, Phase, look
 from airflock.onboard.operator import Operator
 from airflock.onboard.peers import Peers
-from airflock.onboard.situation import Timers, facts
+from airflock.onboard.situation import SLOW, Timers, facts
 from airflock.onboard.wire import Wire
 
 EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
@@ -84,6 +85,7 @@ class Node:
         self._stream_since: float | None = None
         self._tried_at, self._beat_at, self._asked_at = -1e9, -1e9, -1e9
         self._overloads, self._failed, self._fenced = 0, False, False
+        self._stands_at: tuple[float, float, float] | None = None  # where it came to stand in HOLD
         self._stay: Velocity | None = None  # what keeps it where it stopped for somebody who is not heard
         self._told: tuple[str, ...] = ()
         self._notes: list[str] = []
@@ -228,7 +230,7 @@ class Node:
             return
         self._stream_since = now if self._stream_since is None else self._stream_since
         own = self.wire.state
-        self.command = STILL if own is None else self._limited(self._velocity(own, now), own)
+        self.command = STILL if own is None else self._limited(self._velocity(own, now, known), own)
         out.autopilot.append(say.velocity(self.command, round(now * 1e3)))
 
     def _climb(self) -> float:
@@ -249,9 +251,14 @@ class Node:
         self._fenced = made.fenced
         return made.velocity
 
-    def _velocity(self, own: State, now: float) -> Velocity:
+    def _velocity(self, own: State, now: float, known: Facts) -> Velocity:
         """What the phase wishes to fly, m/s."""
         s, phase = self.card.safety, self.phase
+        if phase == Phase.HOLD and known.navigates:
+            if self._stands_at is None and norm(*own[3:]) < SLOW:
+                self._stands_at = own[:3]
+            return STILL if self._stands_at is None else guidance.stay_at(own, self._stands_at, s)
+        self._stands_at = None
         if phase in (Phase.TAKEOFF, Phase.GATHER) and self.home is not None:
             return guidance.keep(own, self.home, s)
         if phase == Phase.RETURN and self.home is not None:
@@ -295,7 +302,7 @@ class Node:
             out.autopilot.append(self._say.heartbeat())
         if now - self._asked_at >= RETRY - EPSILON and self.phase in (Phase.BOOT, *TELL):
             self._asked_at = now
-            out.autopilot.extend(self._questions())
+            out.autopilot.extend(saying.questions(self._say, self.card.autopilot, self.wire))
         due = [k for k, at in enumerate(self._next_status) if now >= at - EPSILON]
         if not due:
             return
@@ -309,25 +316,7 @@ class Node:
         own = self.wire.state
         if own is None:
             return []
-        return [self._sign(status.message(self._status(own, now), self.card.site), self.utc(now))]
-
-    def _questions(self) -> list[bytes]:
-        """What is still to be asked of the autopilot."""
-        asked = [self._say.request_parameter(g.name) for g in self.card.autopilot.guards]
-        asked = [
-            q for q, g in zip(asked, self.card.autopilot.guards, strict=True) if g.name not in self.wire.parameters
-        ]
-        if self.wire.origin is None:
-            asked.append(self._say.request_message(49))
-        if self.wire.state is None or self.wire.landed is None or not self.wire.clocks:
-            asked += self._say.request_streams()
-        return asked
-
-    def _status(self, own: State, now: float) -> status.Status:
-        offset = self.wire.clock_offset()
-        return status.Status(
-            time=self.utc(self.wire.state_at), position=own[:3], velocity=own[3:], accuracy=min(self.wire.h_acc, 65.0),
-            phase=int(self.phase), airborne=self.wire.landed is False, mission=self.card.mission,
-            card=bytes.fromhex(self.card.hash)[:4], battery=round(self.wire.battery or 0.0),
-            clock_error=abs(offset) if offset is not None else 2.5, peers=self.peers.heard(now),
-        )  # fmt: skip
+        told = saying.own_status(
+            self.card, self.wire, own, self.utc(self.wire.state_at), self.phase, peers=self.peers.heard(now)
+        )
+        return [self._sign(status.message(told, self.card.site), self.utc(now))]

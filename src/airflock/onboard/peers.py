@@ -11,7 +11,7 @@ from airflock.onboard.mission import AIR, FLOCKING, Phase
 FRESH = 2.0  # s; a peer whose last status is younger is heard
 AGES = 10  # packets whose ages tell of a clock
 BEYOND = 100.0  # m; a member may be this far beyond the fence and still be believed
-PHASES = frozenset(map(int, Phase))
+PHASES = {int(phase): phase for phase in Phase}
 REASONS = ("mission", "card", "phase", "fast", "far", "jump", "time")
 
 
@@ -52,7 +52,7 @@ class Peers:
             return False
         was = peer.phase
         peer.status, peer.at, peer.heard_at, peer.other_card = status, at, now, False
-        peer.phase, peer.state = Phase(status.phase), State(*status.position, *status.velocity)
+        peer.phase, peer.state = PHASES[status.phase], State(*status.position, *status.velocity)
         peer.ages.append(now - at)
         self.joined = self.joined or (was not in FLOCKING and peer.phase in FLOCKING)
         return True

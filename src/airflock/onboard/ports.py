@@ -78,13 +78,27 @@ class Udp:
             raise
         self._answers = place.there is None
 
+    @property
+    def here(self) -> tuple[str, int]:
+        """Where it listens."""
+        host, port = self._socket.getsockname()
+        return str(host), int(port)
+
     def fileno(self) -> int:
         """Number of the open file."""
         return self._socket.fileno()
 
+    def aim(self, there: tuple[str, int]) -> None:
+        """Send there from now on, whoever speaks."""
+        self._there, self._answers = there, False
+
     def read(self) -> list[bytes]:
         """All datagrams that have arrived."""
-        found: list[bytes] = []
+        return [data for data, _ in self.read_from()]
+
+    def read_from(self) -> list[tuple[bytes, tuple[str, int]]]:
+        """All datagrams that have arrived, each with who sent it."""
+        found: list[tuple[bytes, tuple[str, int]]] = []
         while True:
             try:
                 data, sender = self._socket.recvfrom(LONGEST)
@@ -92,14 +106,16 @@ class Udp:
                 return found
             if self._answers:
                 self._there = sender
-            found.append(data)
+            found.append((data, sender))
 
     def write(self, data: bytes) -> bool:
         """Send a datagram."""
-        if self._there is None:
-            return False
+        return self._there is not None and self.send(data, self._there)
+
+    def send(self, data: bytes, there: tuple[str, int]) -> bool:
+        """Send a datagram to an address; False if the port could not take it now."""
         try:
-            self._socket.sendto(data, self._there)
+            self._socket.sendto(data, there)
         except OSError:
             return False
         return True

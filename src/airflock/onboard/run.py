@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from airflock import atomic
 from airflock.errors import AirflockError, CardError, LinkError
@@ -123,7 +123,7 @@ async def fly(
     card: Card, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
     say: Callable[[str], None], until: Callable[[], bool] = lambda: False,
 ) -> None:  # fmt: skip
-    """Tick the node on the real clock, and pass bytes; the first port is the autopilot's."""
+    """Make a node, and let it live on the real clock with a log and a memory; the first port is the autopilot's."""
     s, memory = card.safety, read_memory(memory_file)
     radios = (s.status_period, *(s.slow_period,) * (len(ports) - 2))
     now, utc = time.monotonic(), time.time_ns() // 1000
@@ -133,32 +133,64 @@ async def fly(
         log.write(line + "\n")
 
     logged = Logged(node, write, now=now, memory=memory, radios=radios)
+
+    def save() -> None:
+        atomic.write(memory_file, memory_text(node.memory))
+        log.flush()
+
+    def tell(note: str) -> None:
+        say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
+
+    try:
+        ticks = await live(logged, ports, s.tick, tell, until, save)
+    finally:
+        atomic.write(memory_file, memory_text(node.memory))
+    tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
+
+
+class Ticks(NamedTuple):
+    """Ticks of a node on the real clock: how many, how many were late by more than half a period, the worst (s)."""
+
+    total: int
+    late: int
+    worst: float
+
+
+async def live(
+    node: Node | Logged, ports: Sequence[Port], period: float, tell: Callable[[str], None],
+    until: Callable[[], bool], save: Callable[[], None] = lambda: None,
+) -> Ticks:  # fmt: skip
+    """Tick a node every `period` s on the real clock until it is told to end, and pass bytes.
+
+    ports : the autopilot's first, then those of the radios; tell: takes the node's notes; save: called every second
+    """
     loop = asyncio.get_running_loop()
-    loop.add_reader(ports[0].fileno(), _take, ports[0], logged.autopilot)
+    loop.add_reader(ports[0].fileno(), _take, ports[0], node.autopilot)
     for port in ports[1:]:
-        loop.add_reader(port.fileno(), _take, port, _datagrams(port, logged.radio))
-    due, save_at = now, now
+        loop.add_reader(port.fileno(), _take, port, _datagrams(port, node.radio))
+    due = save_at = time.monotonic()
+    count, late, worst = 0, 0, 0.0
     try:
         while not until():
             now = time.monotonic()
-            out = logged.tick(now)
+            count, late, worst = count + 1, late + (now - due > 0.5 * period), max(worst, now - due)
+            out = node.tick(now)
             for data in out.autopilot:
                 ports[0].write(data)
             for port, datagrams in zip(ports[1:], out.radios, strict=True):
                 for datagram in datagrams:
                     port.write(datagram)
             for note in out.notes:
-                say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
+                tell(note)
             if now >= save_at:
                 save_at = now + SAVE
-                atomic.write(memory_file, memory_text(node.memory))
-                log.flush()
-            due = max(due + s.tick, now)
+                save()
+            due = max(due + period, now)
             await asyncio.sleep(max(0.0, due - time.monotonic()))
     finally:
         for port in ports:
             loop.remove_reader(port.fileno())
-        atomic.write(memory_file, memory_text(node.memory))
+    return Ticks(count, late, worst)
 
 
 def _take(port: Port, hand: Callable[[bytes, float], None]) -> None:

@@ -10,7 +10,7 @@ from airflock.onboard.operator import Operator
 from airflock.onboard.peers import FRESH, Peers
 from airflock.onboard.wire import Wire
 
-SLOW = 0.5  # m/s; faster than this a drone does not begin to land
+SLOW = 0.5  # m/s; faster than this a drone does not stand, nor begin to land
 ALIVE = 3.0  # s; an autopilot that says nothing for longer is not there
 GATHERED = (Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD)
 BY_MODE = frozenset({Phase.RETURN, Phase.LAND, Phase.DONE})
@@ -30,26 +30,28 @@ class Timers:
         return max(now - self._since.setdefault(name, now), 1e-9)
 
 
-def misses(card: Card, wire: Wire, peers: Peers, utc: int, now: float) -> tuple[str, ...]:
+def misses(card: Card, member: int, wire: Wire, peers: Peers, utc: int, now: float) -> tuple[str, ...]:
     """What keeps a drone from arming, one line each."""
     found = []
     if utc >= card.expires * 1_000_000:
         found.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
     if not card.operator:
         found.append("operator: the card names no key, so nobody could start or stop the drone")
-    found += _parameter_misses(card, wire) + _own_misses(card, wire, now) + _clock_misses(card, wire, peers)
+    found += _parameter_misses(card, member, wire) + _own_misses(card, wire, now) + _clock_misses(card, wire, peers)
     return (*found, *_peer_misses(card, wire, peers, now))
 
 
-def _parameter_misses(card: Card, wire: Wire) -> list[str]:
+def _parameter_misses(card: Card, member: int, wire: Wire) -> list[str]:
     """Parameters of the autopilot that are not told or not safe."""
     found = []
     for guard in card.autopilot.guards:
         value = wire.parameters.get(guard.name)
         if value is None:
             found.append(f"{guard.name}: the autopilot has not told it")
-        elif not guard.low <= value <= guard.high:
-            found.append(f"{guard.name} = {value:g} lies outside [{guard.low:g}, {guard.high:g}]: {guard.why}")
+            continue
+        low, high = guard.range(member)
+        if not low <= value <= high:
+            found.append(f"{guard.name} = {value:g} lies outside [{low:g}, {high:g}]: {guard.why}")
     return found
 
 
@@ -143,7 +145,7 @@ def facts(
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
     calm = not (position_bad or gnss_for or few_for or clock_for or neighbour_near or more["overload"])
     calm = calm and not (operator_lost and s.operator_lost == "hold")
-    told = misses(card, wire, peers, utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
+    told = misses(card, member, wire, peers, utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
     layer = card.layer(member)
     at_home = False
     if own is not None and home is not None:
@@ -161,7 +163,7 @@ def facts(
         due=operator.due(utc, s.start_step * card.members.index(member)),
         at_layer=own is not None and abs(own.z - layer) < 0.5, climbing=own is not None and own.vz > 0.2,
         neighbour_near=neighbour_near,
-        gathered=own is not None and all(
+        gathered=phase == Phase.GATHER and own is not None and all(
             now - p.heard_at <= FRESH and p.phase in GATHERED and p.state is not None and apart(own, p.state) < s.gather
             for p in peers.all.values()
         ),

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import imageio_ffmpeg
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from airflock.endings import VIDEOS
 from airflock.errors import AirflockError
 from airflock.plots.film_stage import Stage
-from airflock.plots.save import complete_or_absent, positive
+from airflock.plots.save import PictureError, complete_or_absent, positive
 from airflock.plots.scene import window
 
 Array = NDArray[Any]
@@ -72,7 +71,8 @@ def video(
     Raises
     ------
     PictureError
-        When it cannot be written; then nothing is left behind.
+        When it cannot be written, then nothing is left behind; or without imageio-ffmpeg
+        (`pip install 'airflock[video]'`).
 
     Examples
     --------
@@ -83,6 +83,7 @@ def video(
     """
     instants = _instants(recording, fps, speed, start, stop)
     positive(height=height)
+    ffmpeg()
     with complete_or_absent(path, VIDEOS) as temporary:
         stage = Stage(recording, start, stop, tail=tail, height=height, speed=speed, space=space, chart=chart)
         film = _film(temporary, stage.size, fps)
@@ -98,6 +99,17 @@ def video(
             film.close()
         _complete(temporary, len(instants))
     return Path(path)
+
+
+def ffmpeg() -> Any:
+    """The package imageio_ffmpeg, which brings an ffmpeg; raises PictureError with what to install."""
+    try:
+        import imageio_ffmpeg
+    except ModuleNotFoundError as fault:
+        raise PictureError(
+            "videos need imageio-ffmpeg: pip install 'airflock[video]'; airflock replay makes a page without it"
+        ) from fault
+    return imageio_ffmpeg
 
 
 def frame_count(
@@ -131,7 +143,7 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
         given |= {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-filter_complex", PALETTE], "quality": None}
     else:
         given |= {"codec": "libx264", "quality": 8, "output_params": ["-movflags", "+faststart", "-f", "mp4"]}
-    film: Iterator[Any] = imageio_ffmpeg.write_frames(str(path), size, **given)
+    film: Iterator[Any] = ffmpeg().write_frames(str(path), size, **given)
     next(film)
     return film
 
@@ -139,7 +151,7 @@ def _film(path: Path, size: tuple[int, int], fps: float) -> Any:
 def _complete(path: Path, frames: int) -> None:
     """Raise unless the file holds what was handed over; ffmpeg itself says nothing about a full disk at the end."""
     try:
-        found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+        found, _ = ffmpeg().count_frames_and_secs(str(path))
     except (RuntimeError, OSError) as fault:
         raise RuntimeError("ffmpeg wrote no complete video; is the disk full?") from fault
     if found != frames:

@@ -160,7 +160,7 @@ def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
 def flown_document(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain values, of which code of the user's own is its bare name: no file, and no place of one."""
     document: dict[str, Any] = plain(scenario.document)
-    for section in ("model", "body", "metrics"):
+    for section in ("model", "body", "sensors", "metrics"):
         table = document.get(section, {})
         kind = table.get("kind") if isinstance(table, dict) else None
         if isinstance(kind, str) and kind.endswith(".py"):

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -26,24 +27,36 @@ FOREIGN = (".csv", ".tsv", ".parquet", ".ulg", ".bin", ".tlog", ".npy", ".npz", 
 READER = Path(__file__).with_name("reader.py")
 
 
-class Opening:
-    """A netCDF file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
+KINDS = {
+    "recording": "a netCDF recording", "netcdf": "a netCDF file",
+    "hdf5": "a HDF5 file", "dataflash": "a DataFlash log", "telemetry": "telemetry",
+}  # fmt: skip
+PACES = {"dataflash": 1e5, "telemetry": 1e5}  # bytes per second; read by Python, row by row
 
-    def __init__(self, path: str | os.PathLike[str], *, limit: float | None = None):
-        """Start the process; limit (s of a processor) is otherwise 15 s and a second for each 5 MB of the file.
+
+class Opening:
+    """A file that another process is opening. `answer` waits for it; `close` ends the process in any case."""
+
+    def __init__(self, path: str | os.PathLike[str], *, how: str = "recording", limit: float | None = None):
+        """Start the process; how: a recording, or one of `reader.READ`.
+
+        limit : s of a processor, by default 15 s and a second for each 5 MB of the file (0.1 MB of an ArduPilot log)
 
         Raises RecordingError where there is no such file or no process can be started.
         """
         self.path = Path(path)
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
-        if self.path.suffix.lower() in FOREIGN:
+        if how == "recording" and self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
                 f"{self.path}: holds tracks, not yet a recording: airflock import {self.path.name} --save FILE.nc"
             )
-        self.limit = LEAST_TIME + self.path.stat().st_size / PACE if limit is None else limit
+        self.how = how
+        self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit
         most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
-        asked = {"paths": [p for p in sys.path if os.path.isabs(p)], "file": str(self.path.absolute()), "most": most}
+        paths = [path for path in sys.path if os.path.isabs(path)]
+        asked = {"paths": paths, "file": str(self.path.absolute()), "most": most}
+        asked["how"] = "netcdf" if how == "recording" else how
         asked["seconds"] = math.ceil(self.limit)
         # isolated (-I, -S): neither the folder of the recording nor a start-up file decides what is imported
         command = [sys.executable, "-I", "-S", str(READER)]
@@ -74,15 +87,22 @@ class Opening:
         if self.process.stdout is not None:
             self.process.stdout.close()
 
-    def answer(self) -> Any:
-        """The file as an xarray Dataset, decoded; raises RecordingError where it is no netCDF, or takes too long."""
+    def answer(self, done: Callable[[float], None] | None = None) -> Any:
+        """The file as an xarray Dataset, a netCDF file decoded; `done` is told the share that has been read.
+
+        Raises RecordingError where it is of another kind, or takes too long.
+        """
         with self, from_outside(self.path, RecordingError):
-            length = int.from_bytes(self._take(bytearray(8)), "little")
-            if length > MOST_ABOUT:
-                raise RecordingError(f"{self.path}: its names and attributes take {length / 1e6:.0f} MB")
-            about = json.loads(self._take(bytearray(length)))
+            about: dict[str, Any] = {"share": 0.0}
+            while set(about) == {"share"}:
+                if done is not None:
+                    done(min(0.99, float(about["share"])))
+                length = int.from_bytes(self._take(bytearray(8)), "little")
+                if length > MOST_ABOUT:
+                    raise RecordingError(f"{self.path}: its names and attributes take {length / 1e6:.0f} MB")
+                about = json.loads(self._take(bytearray(length)))
             if "fault" in about:
-                raise RecordingError(f"{self.path}: is not a netCDF recording: {about['fault']}")
+                raise RecordingError(f"{self.path}: is not {KINDS[self.how]} that can be read: {about['fault']}")
             return self._dataset(about)
 
     def _dataset(self, about: dict[str, Any]) -> Any:
@@ -101,7 +121,7 @@ class Opening:
                 self._take(values.reshape(-1).view(np.uint8).data)
             variables[given["name"]] = xr.Variable(given["dims"], values, _attributes(given["attributes"]))
         raw = xr.Dataset(variables, attrs=_attributes(about["attributes"]))
-        return xr.decode_cf(raw)
+        return xr.decode_cf(raw) if self.how in ("recording", "netcdf") else raw
 
     def _late(self) -> RecordingError:
         return RecordingError(f"{self.path}: could not be opened within {self.limit:.0f} s; it may be damaged")

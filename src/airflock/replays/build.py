@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import resources
@@ -25,8 +26,9 @@ from airflock.metrics.registry import numbers_of
 from airflock.recordings import attributes
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
-from airflock.replays.layers import layers
+from airflock.replays.layers import flown_layers, layers
 from airflock.replays.pack import pack
+from airflock.scenarios.scenario import Scenario
 from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
 
@@ -91,11 +93,8 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
     whole = there.all()
     packed = pack(kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)]))
     own = [layer.shade.name for layer in rows]
-    ways = ["speed", "heading", *(["height"] if axes == 3 else []), "agent", *own]
-    if colour not in ways:
-        near = get_close_matches(colour, ways, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise RecordingError(f"colour = {colour!r} is none that this recording knows: {', '.join(ways)}{hint}")
+    ways = [*_motion(axes), *own]
+    _check_colour(colour, ways, "this recording")
     flat = np.zeros((kept.shape[2], 3))
     flat[:, :axes] = kept[0, :axes].T
     first = float(recording["time"].values[0])
@@ -114,6 +113,22 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
         "charts": [["mean speed (m/s)", _short(_mean(speed))], ["nearest pair (m)", _short(nearest[::stride])]],
     }  # fmt: skip
     return Replay(_page(name, about, packed.data), name)
+
+
+def check_colour(scenario: Scenario, colour: str) -> None:
+    """Raise RecordingError for a colour that a replay of a flight of a scenario would refuse: before it is flown."""
+    _check_colour(colour, [*_motion(scenario.dimensions), *flown_layers(scenario)], scenario.name)
+
+
+def _motion(axes: int) -> list[str]:
+    return ["speed", "heading", *(["height"] if axes == 3 else []), "agent"]
+
+
+def _check_colour(colour: str, ways: Sequence[str], whose: str) -> None:
+    if colour not in ways:
+        near = get_close_matches(colour, ways, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise RecordingError(f"colour = {colour!r} is none that {whose} knows: {', '.join(ways)}{hint}")
 
 
 def _page(name: str, about: dict[str, Any], data: bytes) -> str:

@@ -46,12 +46,22 @@ def layers(
         fixed += [shades.of_own(scenario, key, seed) for key in shades.own_numbers(scenario)]
         found += [_layer(shade, np.tile(shade.values, (frames, 1))) for shade in fixed]
     faults = attributes.faults(recording)
-    if faults:
+    armed = [] if scenario is None else [entry.fault.name for entry in scenario.faults]
+    if faults or armed:
         times = recording["time"].values[::stride]
-        kinds = tuple(dict.fromkeys(str(fault["kind"]) for fault in faults))
+        kinds = tuple(dict.fromkeys([*armed, *(str(fault["kind"]) for fault in faults)]))
         shade = shades.of_faults(faults, 0.0, agents, kinds)
         found.append(_layer(shade, np.array([shades.of_faults(faults, t, agents, kinds).values for t in times])))
     return [*found, *_variables(recording, stride)]
+
+
+def flown_layers(scenario: Scenario) -> list[str]:
+    """Names of the layers of a flight of a scenario, before it is flown."""
+    clustered = math.isfinite(reach_of(scenario))
+    return [
+        *(["cluster"] if clustered else []), *(["group"] if scenario.groups else []), *shades.own_numbers(scenario),
+        *(["fault"] if scenario.faults else []), "command",
+    ]  # fmt: skip
 
 
 def _clusters(scenario: Scenario, position: NDArray[Any], present: NDArray[np.bool_]) -> Iterator[Layer]:

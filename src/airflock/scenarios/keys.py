@@ -1,31 +1,36 @@
 """Every key that a scenario file may hold, from the declarations of its parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from difflib import get_close_matches
+from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.body.registry import BODIES
-from airflock.core import fault
 from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, number_names, with_unit
 from airflock.core.radio import Packets
 from airflock.errors import ScenarioError
+from airflock.faults.registry import KINDS
 from airflock.radios.registry import RADIOS
-from airflock.scenarios import groups
+from airflock.scenarios.faulty import Timing
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.scenarios.whole_keys import WHOLE_KEYS
 from airflock.sensors.registry import SENSORS
 
 TOP = "top"  # the keys before the first section
-LISTS = {"groups": groups.KEYS, "faults": fault.KEYS}
+FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
+OF_ALL = number_names(Packets)  # keys of every radio, which the section [radio] tells
+OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
 
 
 class Key(NamedTuple):
     """One key of a scenario file.
 
-    name    : as it is written after --set, for instance "radio.delay"
-    of      : the model, body, sensor or radio that the key belongs to; "" where it is always there
-    kind    : "number", "choice", "points" or "text"
-    default : None means "derived from the rest of the scenario"
+    name    : as it is written after --set, for instance "radio.delay"; of an entry of [[faults]] or [[groups]] behind
+    the name of the list
+    of      : the model, body, sensor, radio or kind of fault that the key belongs to; "" where it is always there
+    kind    : "number", "choice", "points", "text", "list" or "table"
+    default : None means "derived from the rest of the scenario", or that there is none
     unit    : SI unit; "1" for a plain number, "" for what has none
     low, high : allowed range of a number, both ends included; None otherwise
     options : what a choice may be
@@ -57,20 +62,43 @@ class Key(NamedTuple):
         return " | ".join(self.options) if self.options else self.kind
 
 
-def records() -> dict[str, type]:
-    """Section → record of its parameters: the top, every model, body, sensor and radio by its name, other sections."""
-    result: dict[str, type] = {TOP: Flight}
-    result |= {name: find_model(name).Parameters for name in MODELS}
-    result |= {name: body.Parameters for name, body in BODIES.items()}
-    result |= {name: sensor.Parameters for name, sensor in SENSORS.items()}
-    result |= {name: radio.Parameters for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
-    return result | {name: record for name, record in SECTIONS.items() if name not in ("body", "sensors")}
+class Section(NamedTuple):
+    """A section of a scenario file, or what one of its kinds brings.
+
+    head  : how it begins in a file
+    about : one sentence
+    keys  : in the order of the declarations
+    """
+
+    head: str
+    about: str
+    keys: tuple[Key, ...]
 
 
-def about(section: str) -> str:
-    """First sentence of what a section's record says about itself."""
-    text = (records()[section].__doc__ or "").strip().split("\n\n")[0]
-    return " ".join(text.split())
+@cache
+def sections() -> Mapping[str, Section]:
+    """Sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
+    result = {TOP: _section(TOP, "at the top", "", Flight)}
+    for name in MODELS:
+        result[name] = _section(name, f'model.kind = "{name}"', "model", find_model(name).Parameters, name)
+    for family, members in (("body", BODIES), ("sensors", SENSORS)):
+        for name, member in members.items():
+            result[name] = _section(name, f'{family}.kind = "{name}"', family, member.Parameters, name)
+    for name, record in SECTIONS.items():
+        if name not in FAMILIES:
+            result[name] = _section(name, f"[{name}]", name, record)
+    for name, radio in OTHER_RADIOS.items():
+        found = _section(name, f'radio.kind = "{name}"', "radio", radio.Parameters, name)
+        result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
+    groups = "Agents that have numbers of their own of the law or the body."
+    result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
+    shared = _section("faults", "[[faults]]", "faults", Timing)
+    result["faults"] = shared
+    for name, kind in KINDS.items():
+        about = kind.doc.strip().split("\n\n")[0].partition(": ")[2] or kind.doc
+        found = _section(name, f'[[faults]] kind = "{name}"', "faults", kind.Parameters, name)
+        result[name] = found._replace(about=" ".join(f"{about[:1].upper()}{about[1:]}".split()))
+    return result
 
 
 def keys(section: str | None = None) -> list[Key]:
@@ -79,9 +107,9 @@ def keys(section: str | None = None) -> list[Key]:
     Parameters
     ----------
     section : str, optional
-        A section ("radio"), "model", "body" or "sensors" for all models, bodies or sensors, one of them by its name
-        ("couzin_2002", "multirotor", "gnss"), "top" for the keys before the first section, or a key ("radio.delay",
-        "delay"). By default all.
+        A section ("radio"), "model", "body", "sensors" or "faults" for all models, bodies, sensors or kinds of fault,
+        one of them or of the radios by its name ("couzin_2002", "gnss", "jitter", "motor"), "top" for the keys before
+        the first section, or a key ("radio.delay", "delay"). By default all.
 
     Returns
     -------
@@ -102,38 +130,48 @@ def keys(section: str | None = None) -> list[Key]:
     >>> [key.name for key in airflock.keys("vicsek_1995")]
     ['model.r', 'model.eta']
     """
-    known = records()
-    every = [key for name, record in known.items() for key in _of(name, record) if not _of_all(key, name)]
+    known = sections()
+    every = [key for found in known.values() for key in found.keys]
     if section is None:
         return every
-    if section in known:
-        return list(_of(section, known[section]))
-    found = [key for key in every if section in (key.name, key.name.rpartition(".")[2], key.name.partition(".")[0])]
-    if section in LISTS:
-        raise ScenarioError([f"{section}: a list of tables [[{section}]], with the keys {', '.join(LISTS[section])}"])
+    if section in KINDS:  # all that an entry of this kind may hold, and keys of the same name
+        return [*known[section].keys, *known["faults"].keys, *(key for key in every if _last(key) == section)]
+    if section in OTHER_RADIOS:  # behind what all radios have
+        return [*(key for key in known["radio"].keys if _last(key) in OF_ALL), *known[section].keys]
+    if section in known and section not in FAMILIES:
+        return list(known[section].keys)
+    found = [key for key in every if section in (key.name, _last(key), key.name.partition(".")[0])]
     if not found:
-        words = {key.name: key.name for key in every} | {key.name.rpartition(".")[2]: key.name for key in every}
-        words |= {name: name for name in (*known, "model", "body", "sensors")}
+        words = {key.name: key.name for key in every} | {_last(key): key.name for key in every}
+        words |= {name: name for name in (*known, *FAMILIES)}
         near = get_close_matches(section, words, n=1, cutoff=0.5)
         hint = f"did you mean {words[near[0]]}?" if near else f"sections: model, body, sensors, {', '.join(known)}"
         raise ScenarioError([f"{section}: unknown section or key; {hint}"])
     return found
 
 
-def _of_all(key: Key, section: str) -> bool:
-    """Whether a key of a kind of radio is one that all radios have, which the section tells already."""
-    return section in RADIOS and key.name.partition(".")[2] in number_names(Packets)
+def _last(key: Key) -> str:
+    return key.name.rpartition(".")[2]
 
 
-def _of(section: str, record: type) -> Sequence[Key]:
+def _section(name: str, head: str, before: str, record: type, owner: str = "") -> Section:
+    """A section of a record, behind what of it is read as a whole."""
+    about = " ".join((record.__doc__ or "").strip().split("\n\n")[0].split())
+    whole = () if owner else _whole(before)
+    return Section(head, about, (*whole, *_declared(before, owner, record)))
+
+
+def _whole(section: str) -> list[Key]:
+    return [
+        Key(f"{section}.{name}".lstrip("."), "", key.kind, None, "", None, None, key.options, key.meaning, "")
+        for name, key in WHOLE_KEYS.get(section, {}).items()
+    ]
+
+
+def _declared(before: str, owner: str, record: type) -> list[Key]:
     """Keys of one record."""
-    owners = {**dict.fromkeys(MODELS, "model"), **dict.fromkeys(BODIES, "body"), **dict.fromkeys(SENSORS, "sensors")}
-    owners |= dict.fromkeys(RADIOS, "radio")
-    before = "" if section == TOP else owners.get(section, section)
-    owner = section if section in owners else ""
     found = []
     for name, declared, default in declarations(record):
-        whole = f"{before}.{name}".lstrip(".")
         unit, low, high = getattr(declared, "unit", ""), None, None
         options: tuple[str, ...] = ()
         if isinstance(declared, Quantity):
@@ -144,5 +182,6 @@ def _of(section: str, record: type) -> Sequence[Key]:
             kind = "points" if isinstance(declared, Points) else "text"
             assert isinstance(declared, (Points, Text))
         meaning, source = declared.meaning, declared.source
+        whole = f"{before}.{name}".lstrip(".")
         found.append(Key(whole, owner, kind, default, unit, low, high, options, meaning, source))
     return found

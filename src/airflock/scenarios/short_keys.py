@@ -1,5 +1,6 @@
 """Settings by a key's last word: `delay` stands for `radio.delay` where only one section has a delay."""
 
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
@@ -40,9 +41,17 @@ def whole_keys(
             result[where[0]] = value
             notes.append(f"{key} is read as {where[0]}")
         elif where:
-            faults.append(f"{key} is several keys; write {' or '.join(where)}")
+            meant = (f"{name} ({_meaning(name, records)})" for name in where)
+            faults.append(f"{key} is several keys; write {' or '.join(meant)}")
         else:
             near = get_close_matches(key, (*top, *known), n=1, cutoff=0.5)
             full = known.get(near[0], near) if near else []
             faults.append(f"{key}: unknown key; {f'did you mean {full[0]}?' if near else 'known: ' + ', '.join(top)}")
     return result, notes, faults
+
+
+def _meaning(key: str, records: Mapping[str, type]) -> str:
+    """What a whole key means, up to the first comma or semicolon."""
+    section, _, last = key.partition(".")
+    declared = next(found for name, found, _ in declarations(records[section]) if name == last)
+    return re.split(r"[;,(]", declared.meaning)[0].strip()

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.doors import from_outside
 from airflock.errors import SceneError
 from airflock.scenes.headers import check_header
 from airflock.scenes.tree import segments, triangles
@@ -20,6 +21,11 @@ LEAST, MOST = 1.0, 1e5  # m; a world for drones is neither smaller nor larger
 
 def load_mesh(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Triangles of scene.file, one a row, in m, z up; in a plane, its walls where it crosses height 0. And notes."""
+    with from_outside(f"scene.file = {p.file}", SceneError):  # what a damaged file holds may break at any later step
+        return _loaded(p, dimensions)
+
+
+def _loaded(p: scenery.Parameters, dimensions: int) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     mesh = read(Path(p.file))
     notes = []
     corners = np.asarray(mesh.vertices, float) * p.unit

@@ -32,11 +32,15 @@ class Acting(Room):
             self.towards = panel.menu("towards", tuple(TOWARDS), "east", lambda _: None)
             panel.row({"Gust": self.ask(self.gust), "Throw an obstacle in": self.ask(self._aim)})
             self.dragging = False
-            if has_goals(self.player.sides):
-                panel.checkbox("drag goals", False, told=lambda on: self.player.ask(lambda: self._drag(on)))
+            self.drags = panel.checkbox("drag goals", False, told=lambda on: self.player.ask(lambda: self._drag(on)))
             self.said = panel.text()
         self.drawing.handles = self._handles
         self._handles(self.drawing)
+
+    def stand(self) -> None:
+        """Goals can be dragged where there are any."""
+        self.drags.visible = has_goals(self.player.sides)
+        self.drags.value = self.dragging = self.dragging and self.drags.visible
 
     def gust(self) -> None:
         """Let the wind blow for three seconds."""

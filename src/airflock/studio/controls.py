@@ -1,6 +1,7 @@
 """Controls: what a page needs to know of each parameter to make a slider or a menu of it, from the declarations."""
 
 import math
+import shlex
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -37,30 +38,40 @@ class Control(NamedTuple):
         return bool(self.options)
 
 
-def controls_of(scenario: Scenario) -> dict[str, list[Control]]:
+def controls_of(scenario: Scenario, usual: Mapping[str, tuple[float, float]] | None = None) -> dict[str, list[Control]]:
     """Controls by section, in the order in which the paper's parameters are declared; empty sections are left out.
+
+    The law's section is sorted into the parts that the law names, "model: repulsion" and so on.
+    usual : spans of sliders by key, as a study of the law has them
 
     A number that is derived from the rest of the scenario (None) gets no control, nor do lists and texts.
     """
-    found = {}
+    parts = scenario.model.parts
+    part_of = {f"model.{name}": f"model: {part}" for part, names in parts.items() for name in names}
+    found: dict[str, list[Control]] = {f"model: {part}": [] for part in parts}
     for section in SECTIONS:
         record = scenario.parameters if section == "model" else getattr(scenario, section)
-        made = []
         for name, declared, _ in declarations(record):
             value = getattr(record, name)
+            key = f"{section}.{name}"
             if isinstance(declared, Quantity) and value is not None:
-                made.append(slider(f"{section}.{name}", declared, value))
+                made = slider(key, declared, value, (usual or {}).get(key))
             elif isinstance(declared, Choice):
                 hint = _hint(declared.meaning, "", declared.source)
-                made.append(Control(f"{section}.{name}", name, hint, value, options=declared.options))
-        if made:
-            found[section] = made
-    return found
+                made = Control(key, name, hint, value, options=declared.options)
+            else:
+                continue
+            found.setdefault(part_of.get(key, section), []).append(made)
+    return {part: made for part, made in found.items() if made}
 
 
-def slider(key: str, declared: Quantity, value: float) -> Control:
-    """Slider of a number: from 0 to 4 times the value, or as far on both sides of 0, within the declared range."""
-    low, high = span(declared.low, declared.high, value)
+def slider(key: str, declared: Quantity, value: float, studied: tuple[float, float] | None = None) -> Control:
+    """Slider of a number, over the span of a study or the usual one that is declared, widened to hold the value.
+
+    Without either from 0 to 4 times the value, or as far on both sides of 0, within the declared range.
+    """
+    usual = studied or declared.usual
+    low, high = (min(usual[0], value), max(usual[1], value)) if usual else span(declared.low, declared.high, value)
     label = with_unit(key.partition(".")[2], f"({declared.unit})" if declared.unit not in ("", "1") else "")
     hint = _hint(declared.meaning, declared.span, declared.source)
     step = _round_step((high - low) / STEPS)
@@ -76,10 +87,12 @@ def span(low: float, high: float, value: float) -> tuple[float, float]:
 
 def fields(settings: Mapping[str, Any]) -> str:
     """Keys and values as options of the command: --set model.p_rep=0.2 ..."""
-    return " ".join(f"--set {key}={_word(value)}" for key, value in settings.items())
+    return " ".join(f"--set {shlex.quote(f'{key}={_word(value)}')}" for key, value in settings.items())
 
 
 def _word(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 

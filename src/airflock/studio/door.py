@@ -2,7 +2,7 @@
 
 The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
 starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders and
-buttons have names for screen readers; folders open by the keyboard).
+buttons have names for screen readers; folders open by the keyboard; commands can be copied).
 """
 
 import hmac
@@ -46,6 +46,19 @@ addEventListener("DOMContentLoaded", () => {
       });
     }
   };
+  document.addEventListener("click", e => {
+    const text = e.target.closest?.("[data-copy]")?.dataset.copy;
+    if (text === undefined) return;
+    const done = () => { e.target.textContent = "Copied"; };
+    const by_hand = () => {  // where the address is not that of this machine, browsers keep the clipboard closed
+      const field = document.body.appendChild(document.createElement("textarea"));
+      field.value = text;
+      field.select();
+      if (document.execCommand("copy")) done();
+      field.remove();
+    };
+    navigator.clipboard ? navigator.clipboard.writeText(text).then(done, by_hand) : by_hand();
+  });
   new MutationObserver(name).observe(document.body, { childList: true, subtree: true });
 });
 </script>"""

@@ -24,6 +24,7 @@ MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than ha
 BROAD = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
 APART = 2.3  # half widths between the middles of two sides
 LISTED = 40  # collisions that are kept
+FOLLOWED = ("nothing", "the flock", "the selected agent")
 LINKS = ("none", "three nearest", "radio")
 NAMES = "AB"
 FLASH = 15  # frames for which a collision is shown
@@ -86,7 +87,7 @@ class Drawing:
 
     def __init__(self, player: Player, view: View):
         self.player, self.view = player, view
-        self.shading, self.trails, self.links, self.follow = Shading(), True, LINKS[0], False
+        self.shading, self.trails, self.links, self.follow = Shading(), True, LINKS[0], FOLLOWED[0]
         self.collisions: deque[Collision] = deque(maxlen=LISTED)
         self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
         self.stand()
@@ -185,9 +186,11 @@ class Drawing:
             self._pieces += 1
             anew = self._pieces % PIECE == 0
             self.view.trail(self._from(position), position, trail, anew)
-        if self.follow:
-            there = np.concatenate([flock.side.flight.present for flock in flocks])
+        there = np.concatenate([flock.side.flight.present for flock in flocks])
+        if self.follow == FOLLOWED[1] and there.any():
             self.view.follow(position[there].mean(axis=0).astype(float))
+        elif self.follow == FOLLOWED[2] and chosen is not None and there[chosen]:
+            self.view.follow(position[chosen].astype(float))
         links = [flock.links(self.links) for flock in flocks]
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
         if self._before is None or anew:

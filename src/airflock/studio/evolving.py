@@ -12,8 +12,8 @@ from airflock.errors import StudioError
 from airflock.studio.background import Progress, Study, around, varied
 from airflock.studio.controls import fields
 from airflock.studio.room import Room, note
-from airflock.studio.saving import toml_of
-from airflock.studio.tuning import free, stem
+from airflock.studio.saving import free, toml_of
+from airflock.studio.tuning import stem
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from airflock.studio.page import Page
 
 
+BAND = ("paper +", "paper −")
+
+
 class Measuring(Room):
     """Charts of one side, or of two in one picture."""
 
@@ -21,16 +24,17 @@ class Measuring(Room):
         super().__init__(page)
         self.tab = tab
         self._made: list[Any] = []
+        self._names: list[str] = []
         self.scores: list[dict[str, Any]] = []
+        self.name = ""  # of the order parameter that is drawn
 
     def stand(self) -> None:
-        """Make the charts for as many sides as there are."""
-        player, panel = self.player, self.panel
-        for made in self._made:
-            made.remove()
-        names = [name for name, value in player.sides[0].flight.scores().items() if isinstance(value, (int, float))]
-        published = player.sides[0].scenario.published
-        self.name = measures.chosen_score(dict.fromkeys(names), published)
+        """Begin anew, for as many sides as there are."""
+        player = self.player
+        scores = player.sides[0].flight.scores()
+        self._names = [name for name, value in scores.items() if isinstance(value, (int, float))]
+        if self.name not in self._names:
+            self.name = measures.chosen_score(dict.fromkeys(self._names), player.sides[0].scenario.published)
         self.sides = []
         for side, flock in zip(player.sides, self.drawing.flocks, strict=True):
             far = float(side.scenario.measured_by().r_cluster or 1.0)
@@ -38,12 +42,20 @@ class Measuring(Room):
             far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
             self.sides.append(measures.Measures(self.drawing.top, max(far, 1e-6)))
             self.sides[-1].name = self.name
-        two = len(player.sides) > 1
+        self._make()
+
+    def _make(self) -> None:
+        """Make the charts."""
+        panel, player = self.panel, self.player
+        for made in self._made:
+            made.remove()
+        two, names = len(player.sides) > 1, self._names
+        banded = self.name in player.sides[0].scenario.published
         tags = [f" {name}" for name in NAMES] if two else [""]
         with self.tab:
             self.menu = panel.menu("order parameter", names, self.name, lambda n: player.ask(lambda: self._name(n)))
             self.course = panel.chart(
-                "since the last change", [*(f"value{t}" for t in tags), "paper +", "paper −"], band=True
+                "since the last change", [*(f"value{t}" for t in tags), *(BAND if banded else ())], band=banded
             )
             words = ("mean", "slowest", "fastest")
             self.speeds = panel.chart("speed (m/s)", [f"{w}{t}" for t in tags for w in (words[:1] if two else words)])
@@ -56,10 +68,12 @@ class Measuring(Room):
         ]  # fmt: skip
 
     def _name(self, name: str) -> None:
+        """Draw another order parameter, from here on; with a band only where the paper tells its value."""
         self.name = name
         for side in self.sides:
             side.name = name
             side.course.clear()
+        self._make()
 
     def clear(self) -> None:
         """Forget the charts: the flight went elsewhere."""
@@ -102,9 +116,12 @@ class Measuring(Room):
             np.interp(time, course[:, 0], course[:, 1], left=math.nan) if len(course) else np.full(len(time), math.nan)
             for course in courses
         ]
-        mean, spread = self.player.sides[0].scenario.published.get(self.name, (math.nan, None))
-        edge, half = np.full(len(time), mean), spread or 0.0
-        self.course.data = time, *values, edge + half, edge - half
+        published = self.player.sides[0].scenario.published
+        edges = []
+        if self.name in published:
+            mean, spread = published[self.name]
+            edges = [np.full(len(time), mean + sign * (spread or 0.0)) for sign in (1.0, -1.0)]
+        self.course.data = time, *values, *edges
 
 
 def _joined(outlines: list[Any]) -> tuple[Any, ...]:

@@ -12,6 +12,7 @@ from airflock.studio.comparing import Comparing
 from airflock.studio.drawing import Drawing
 from airflock.studio.evolving import Evolving
 from airflock.studio.measuring import Measuring
+from airflock.studio.opening import Opening
 from airflock.studio.player import Player
 from airflock.studio.playing import Playing
 from airflock.studio.room import Room
@@ -32,9 +33,12 @@ class Page:
         self.drawing = Drawing(player, view)
         panel = view.panel
         self.title, self.trouble = panel.text(), panel.text()
+        self.rescue = panel.button("Back to the moment before", lambda: player.ask(self._rescued))
+        self.rescue.visible = False
         play, tune, measure, compare = panel.tabs("Play", "Tune", "Measure", "Compare")
         with play:
             self.playing, self.selecting, self.acting = Playing(self), Selecting(self), Acting(self)
+            self.opening = Opening(self)
         with tune:
             self.tuning = Tuning(self, tune)
             self.evolving = Evolving(self)
@@ -42,7 +46,8 @@ class Page:
         with compare:
             self.comparing = Comparing(self, compare)
         self.rooms: list[Room] = [
-            self.playing, self.selecting, self.acting, self.tuning, self.measuring, self.comparing, self.evolving,
+            self.playing, self.selecting, self.acting, self.opening, self.tuning, self.measuring, self.comparing,
+            self.evolving,
         ]  # fmt: skip
         for room in self.rooms:
             room.stand()
@@ -107,6 +112,10 @@ class Page:
         else:
             self.selecting.at(np.asarray(origin), np.asarray(way))
 
+    def _rescued(self) -> None:
+        """Go back to the last moment that was kept before the flight failed."""
+        self.playing.back(self.player.time)
+
     def _told(self) -> None:
         """Say where the flight is, what is wrong, and what has happened."""
         player = self.player
@@ -118,7 +127,6 @@ class Page:
             f"{agents} agents · seed {player.seed} · {state} · events: {done}</small></div>"
         )
         said = player.status
-        if player.failure:
-            said += " — press “Back” for the moment before"
+        self.rescue.visible = bool(player.failure)
         tone = "#b00020" if player.failure else "#555"
         self.trouble.content = f"<div style='padding:0 0.75em;color:{tone}'>{html.escape(said)}</div>" if said else ""

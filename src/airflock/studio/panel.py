@@ -69,6 +69,16 @@ class Panel:
         made.on_update(lambda event: told(int(event.target.value)) if event.client is not None else None)
         return made
 
+    def field(self, label: str, hint: str = "") -> Any:
+        """A field for a line of text: `.value`."""
+        return self.server.gui.add_text(label, "", hint=hint or None)
+
+    def upload(self, label: str, ending: str, told: Callable[[str, bytes], None], hint: str = "") -> Any:
+        """A button that takes a file from the reader's machine; `told` hears its name and content."""
+        made = self.server.gui.add_upload_button(label, mime_type=ending, hint=hint or None)
+        made.on_upload(lambda event: told(event.target.value.name, event.target.value.content))
+        return made
+
     def slide(
         self, label: str, low: float, high: float, step: float, value: float, told: Callable[[float], None],
         hint: str = "",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.contract import Model
+from airflock.core.vocabulary import asks
 from airflock.engine.look import View as Seen
 from airflock.engine.place import Course, Place
 from airflock.engine.state import State as Memory
@@ -20,6 +21,7 @@ from airflock.studio.side import Side
 NONE = np.zeros((0, 2, 3))
 WAKE = 6.0  # spans of a wake that are drawn
 REACH = 5.0  # darts; length of the longest arrow
+MOTION = {"dvx", "dvy", "dvz", "dv"}  # what a rule asks for to make velocities alike
 FREE, HIT = colours.GREEN, colours.RED
 
 
@@ -47,7 +49,7 @@ class Perceiving:
         """
         seen, scenario = side.flight.look(agent), side.scenario
         own = np.array(seen.true[:3])
-        lines = _neighbours(seen, own, size)
+        lines = _neighbours(seen, own, size, side.flight.measured)
         wish = np.zeros(3)
         wish[: len(seen.command)] = seen.command
         lines["command"] = arrow(own, own + wish * (REACH * size / max(top, 1e-9))), None
@@ -71,20 +73,16 @@ class Perceiving:
 
         Terms of a law have units of their own, so each is as long as it is beside the strongest of its kind so far.
         """
-        given = {name or "neighbours": vector for name, vector in values(seen.sums).items()} if seen.sums else {}
-        walls = {f"walls {name}".strip(): vector for name, vector in values(seen.walls).items()} if seen.walls else {}
         pieces, tones, words = [], [], []
-        for number, (name, vector) in enumerate((given | walls).items()):
+        for number, (name, vector, parts) in enumerate(_vectors(seen, model)):
             strength = float(np.linalg.norm(vector))
-            parts = [values(term)["" if name == "neighbours" else name] for term in seen.terms] if name in given else []
             longest = max([strength, *(float(np.linalg.norm(part)) for part in parts)])
             most = self._strongest[name] = max(self._strongest.get(name, 0.0), longest)
             tone, scale = colours.TERMS[number % len(colours.TERMS)], REACH * size / max(most, 1e-9)
             shafts = np.vstack([arrow(own, own + vector * scale), *([[own, own + part * scale]] for part in parts)])
             pieces.append(shafts)
             tones.append(np.tile(tone, (len(shafts), 1)))
-            word = word_of(model, name.replace("neighbours", ""))[0] if name in given else name
-            words.append(f"{_dash(tone)} {html.escape(word)} {strength:.3g}, at most {most:.3g}")
+            words.append(f"{_dash(tone)} {html.escape(name)} {strength:.3g}, at most {most:.3g}")
         if not pieces:
             return NONE, np.zeros((0, 3)), []
         return np.vstack(pieces), np.vstack(tones), words
@@ -104,20 +102,53 @@ class Perceiving:
         ends = np.array([[ray.free * ray.x, ray.free * ray.y, ray.free * ray.z] for ray in rays]).reshape(-1, 3)
         free = np.array([ray.free >= ray.length for ray in rays], bool)
         tones = np.where(free[:, None], FREE, HIT)
-        said = f"{_dash(FREE)} {int(free.sum())} rays free {_dash(HIT)} {int((~free).sum())} met something"
+        rays_cast = "1 ray" if len(free) == 1 else f"{len(free)} rays"
+        said = (
+            f"casts {rays_cast}: {_dash(FREE)} {int(free.sum())} free, {_dash(HIT)} {int((~free).sum())} met something"
+        )
         return (np.stack([np.broadcast_to(at, ends.shape), at + ends], 1), tones), said
 
 
-def _neighbours(seen: Seen, own: NDArray[Any], size: float) -> dict[str, Any]:
-    """Lines to those whom its law takes notice of; crosses where it believes all to be whom it hears, and itself."""
+def _vectors(seen: Seen, model: Model) -> list[tuple[str, NDArray[Any], list[NDArray[Any]]]]:
+    """What the law was given, by its own words: each vector, and what each neighbour adds to it; then the surfaces.
+
+    A law with one vector for all that a neighbour does has two here: repulsion, which a neighbour that flies alike
+    would cause, too, and alignment, which is the rest.
+    """
+    found: list[tuple[str, NDArray[Any], list[NDArray[Any]]]] = []
+    for name, vector in (values(seen.sums) if seen.sums else {}).items():
+        parts = [values(term)[name] for term in seen.terms]
+        if name or model.terms or model.neighbour is None or not MOTION & set(asks(model.neighbour, "neighbour")):
+            found.append((word_of(model, name)[0], vector, parts))
+            continue
+        alike = [values(term)[name] for term in seen.alike]
+        apart = [part - same for part, same in zip(parts, alike, strict=True)]
+        found += [
+            (word, sum(terms, np.zeros(3)), terms) for word, terms in (("repulsion", alike), ("alignment", apart))
+        ]
+    if seen.walls:
+        found += [(f"walls {name}".strip(), vector, []) for name, vector in values(seen.walls).items()]
+    return found
+
+
+def _neighbours(seen: Seen, own: NDArray[Any], size: float, measured: NDArray[Any]) -> dict[str, Any]:
+    """Lines to those whom its law takes notice of; crosses where it heard them, and where each now believes to be.
+
+    measured : (component, agent), what each believes of itself, m and m/s
+    """
     at = np.array([other.state[:3] for other in seen.heard]).reshape(-1, 3)
     noticed = at[np.array(_noticed(seen), bool)]
-    believed = np.array(seen.own[:3])[None]
-    far = float(np.linalg.norm(believed - own)) > 0.05 * size
+    believed = np.zeros((1 + len(at), 3))
+    who = [seen.agent, *(other.who for other in seen.heard)]
+    axes = len(measured) // 2
+    believed[:, :axes] = measured[:axes, who].T
+    believed[0] = seen.own[:3]
+    ghosts = np.vstack([crosses(believed[:1], 0.7 * size), crosses(believed[1:], 0.25 * size)])
+    off = float(np.linalg.norm(believed[0] - own)) > 0.0
     return {
         "heard": (np.stack([np.broadcast_to(own, noticed.shape), noticed], 1), None),
         "ghosts": (crosses(at, 0.5 * size), None),
-        "measured": (crosses(believed, 0.7 * size) if far else NONE, None),
+        "measured": (ghosts if off else NONE, None),
     }
 
 
@@ -143,7 +174,7 @@ def _about(seen: Seen, scenario: Scenario) -> list[str]:
         heard += f"; its law notices {sum(_noticed(seen))}"
     crossed = f"{_dash(colours.PURPLE, '✕')} where they were heard"
     if off > 0.0:
-        crossed += f" {_dash(colours.BLUE, '✕')} where it believes to be, {off:.2g} m off"
+        crossed += f" {_dash(colours.BLUE, '✕')} where each believes to be; this one is {off:.2g} m off"
     return [
         f"<b>agent {seen.agent}</b>, {math.hypot(*seen.true[3:]):.2f} m/s",
         f"{_dash(colours.ORANGE)} {heard}", crossed, f"{_dash(colours.RED)} command ({wish}){unit}",

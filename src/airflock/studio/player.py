@@ -243,6 +243,21 @@ class Player:
             raise
         self.note = ""
 
+    def open(self, where: str) -> None:
+        """Another scenario, of the same seed: a preset, or a file whose code may not run. A comparison ends.
+
+        Raises AirflockError, and flies on as before.
+        """
+        known, sides = self.origins, self.sides
+        self.origins = [Origin.of(where, {})]
+        try:
+            self._open()
+            self.start()
+        except AirflockError:
+            self.origins, self.sides = known, sides
+            raise
+        self.note = f"opened {where}"
+
     # ---------------------------------------------------------------------------------------------- comparing
 
     def fork(self) -> None:

@@ -1,8 +1,10 @@
 """Playing: pause, step, back, speed, seed and agents; how the flock is shown; collisions, with a way to their time."""
 
+import math
 from typing import TYPE_CHECKING
 
-from airflock.studio.drawing import LINKS, NAMES, Collision
+from airflock.errors import StudioError
+from airflock.studio.drawing import FOLLOWED, LINKS, NAMES, Collision
 from airflock.studio.room import Room, note
 from airflock.studio.shading import ways
 
@@ -23,10 +25,12 @@ class Playing(Room):
         panel, player, drawing = self.panel, self.player, self.drawing
         self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P", "PLAYER_PAUSE")
         panel.row({"Step": self.ask(player.step), f"Back {SOON} s": self.ask(self.back), "Reset": self.ask(self.reset)})
+        self.moment = panel.field("moment (s)", "any time that was flown; what came after it is given up")
+        panel.row({"Go to this moment": self.ask(self._go)})
         panel.menu("speed", tuple(SPEEDS), "1 ×", lambda chosen: self._speed(SPEEDS[chosen]))
-        panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
+        self.seed = panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
         most = max(1000, player.flight.agents)
-        panel.number(
+        self.agents = panel.number(
             "agents", player.flight.agents, 1, most, lambda n: player.ask(lambda: self.reset(agents=n)),
             "another number begins another flight",
         )  # fmt: skip
@@ -39,11 +43,11 @@ class Playing(Room):
             "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
             "to the three nearest, or to all in radio range, paler where packets are lost",
         )  # fmt: skip
-        drawing.follow = player.scenario.world.arena == "none" and not drawing.stages[0].solids
-        panel.checkbox("follow the flock", drawing.follow, told=lambda on: setattr(drawing, "follow", on))
+        self.follow = panel.menu("follow", FOLLOWED, FOLLOWED[0], self._follow)
         self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes to one second before it")
         self.listed = panel.text()
         self._told: list[Collision] = []
+        self._known = ""  # which scenario the camera is set for
         for key, label, action in (
             ("P", "Pause or fly", player.toggle), ("N", "Step", player.step), ("R", "Reset", self.reset),
             ("B", "Back", self.back),
@@ -51,12 +55,33 @@ class Playing(Room):
             panel.command(label, key, self.ask(action))
 
     def stand(self) -> None:
-        """What may colour the agents of these flights."""
+        """What may colour the agents of these flights; whom the camera follows in a scenario that is new here."""
+        player = self.player
+        self.seed.value, self.agents.value = player.seed, player.flight.agents
+        if self._known != player.side.origin.where:
+            self._known = player.side.origin.where
+            free = player.scenario.world.arena == "none" and not self.drawing.stages[0].solids
+            self.follow.value = self.drawing.follow = FOLLOWED[1 if free else 0]
         known = ways(self.drawing.flocks)
         if tuple(self.way.options) != known:
             self.way.options = known
             self.drawing.shading.way = self.drawing.shading.way if self.drawing.shading.way in known else known[0]
             self.way.value = self.drawing.shading.way
+
+    def _follow(self, whom: str) -> None:
+        self.drawing.follow = whom
+
+    def _go(self) -> None:
+        """Go to the moment that was typed."""
+        try:
+            time = float(self.moment.value)
+        except ValueError:
+            time = math.nan
+        if not 0.0 <= time <= self.player.time:
+            raise StudioError(
+                f"moment = {self.moment.value or 'nothing'}: give a time from 0 to {self.player.time:g} s"
+            )
+        self.back(time)
 
     def _speed(self, speed: float) -> None:
         self.player.pace.speed = speed

@@ -39,6 +39,14 @@ def toml_of(where: str, settings: Mapping[str, Any], given: Mapping[str, Any] | 
     return tomlkit.dumps(document)
 
 
+def free(path: Path) -> Path:
+    """A name that is not taken: flight.nc, flight-2.nc, ..."""
+    found, number = path, 2
+    while found.exists():
+        found, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
+    return found
+
+
 def flown_again(flight: Flight) -> xr.Dataset:
     """Recording of an open flight, flown again without a page from its scenario, seed and events.
 

@@ -4,11 +4,16 @@ import html
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airflock.errors import AirflockError
+from airflock.doors import from_outside, toml_value
+from airflock.errors import AirflockError, ScenarioError
+from airflock.evolve.bounds import studied
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.short_keys import whole_keys
 from airflock.studio.controls import Control, controls_of
 from airflock.studio.drawing import NAMES
 from airflock.studio.player import Player
 from airflock.studio.room import Room, note
+from airflock.studio.saving import free
 from airflock.studio.side import value_of
 
 if TYPE_CHECKING:
@@ -39,19 +44,21 @@ class Tuning(Room):
             }
         )
         self.command = panel.text()
+        self.typed = panel.field("any key", "for instance radio.delay = 400 ms, or goals.points = [[0, 50]]")
+        panel.row({"Set": self.ask(self._set)})
 
     def stand(self) -> None:
         """Make the controls of the side in hand; again only where another law or side is in hand."""
         preset, two = self.player.preset, len(self.player.sides) > 1
-        filled = preset.model, preset.records.keys(), self.player.hand if two else None
+        filled = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
         if filled != self._filled:
             for made in self._made:
                 made.remove()
             self._made, self._handles, self._filled = [], {}, filled
             with self.tab:
-                for section, controls in controls_of(preset).items():
+                for section, controls in controls_of(preset, studied(preset)).items():
                     name = f"{NAMES[self.player.hand]}: {section}" if two else section
-                    folder = self.panel.folder(name, section == "model")
+                    folder = self.panel.folder(name, section.startswith("model"))
                     self._made.append(folder)
                     with folder:
                         for control in controls:
@@ -79,6 +86,13 @@ class Tuning(Room):
             self.put({key: value_of(self.player.scenario, key)})
             raise
 
+    def _set(self) -> None:
+        """Set a key by its name, as --set does; also one that has no slider, or beyond the ends of its slider."""
+        key, value = pair(self.typed.value, self.player.scenario)
+        self.player.change(key, value)
+        self.typed.value = ""
+        self.refresh()
+
     def _save_toml(self) -> None:
         self._saved(self.player.save_toml(free(Path(f"{stem(self.player)}_tuned.toml"))))
 
@@ -94,18 +108,33 @@ class Tuning(Room):
         self.panel.say("Saved", str(path.absolute()))
 
     def chart(self) -> None:
-        """The command that opens this scenario again."""
-        self.command.content = note(f"<code>{html.escape(self.player.command)}</code>")
+        """The command that opens this scenario again, with a button that copies it."""
+        command = html.escape(self.player.command, quote=True)
+        self.command.content = note(f"<code>{command}</code><br>{copying(command)}")
+
+
+def copying(command: str) -> str:
+    """A button that copies a command, which is escaped, to the clipboard; the page's own script (`door`) does it."""
+    look = "border:1px solid #0072B2;border-radius:4px;background:none;color:#0072B2;cursor:pointer;margin-top:0.3em"
+    return f"<button type='button' style='{look}' data-copy=\"{command}\">Copy command</button>"
+
+
+def pair(text: str, scenario: Scenario) -> tuple[str, Any]:
+    """Key and value of a line such as `radio.delay = 400 ms`; raises ScenarioError where there is no such key."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not (key and equals and value):
+        raise ScenarioError([f"{text.strip() or 'any key'}: write KEY = VALUE, for instance model.p_rep = 0.14"])
+    with from_outside(key):
+        found = toml_value(value)
+    if "." in key:
+        return key, found
+    records = {section: type(record) for section, record in scenario.records.items()}
+    whole, _, faults = whole_keys({key: found}, records, ())
+    if faults:
+        raise ScenarioError(faults)
+    return next(iter(whole.items()))
 
 
 def stem(player: Player) -> str:
     """What files of the side in hand are called."""
     return Path(player.side.origin.where).with_suffix("").name
-
-
-def free(path: Path) -> Path:
-    """A name that is not taken: flight.nc, flight-2.nc, ..."""
-    found, number = path, 2
-    while found.exists():
-        found, number = path.with_name(f"{path.stem}-{number}{path.suffix}"), number + 1
-    return found

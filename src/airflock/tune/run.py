@@ -38,6 +38,7 @@ from airflock.tune.start import start_of
 PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
     "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
 )  # fmt: skip
+MOST_SEEDS = 1_000_000  # of each step of hardening
 PILOT = 4  # flights per core that tell how long one takes
 Note = Callable[[str], None]
 
@@ -218,10 +219,10 @@ def _planned(
     if (folder / PLAN).is_file():
         if not resume:
             raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
-        found = read(folder / PLAN)
-        if found.get("identity") != identity(start):
+        made, of = read_plan(folder / PLAN)
+        if of != identity(start):
             raise StudyError(f"{folder}: holds the tuning of another scenario; give another --out")
-        return Plan(dict(found["search"]), int(found["seeds"]), float(found["seconds"]), float(found["rate"]))
+        return made
     if resume:
         raise StudyError(f"{folder}: holds no tuning to resume ({PLAN} is missing)")
     if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
@@ -238,6 +239,19 @@ def _planned(
     except OSError as fault:
         raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
     return plan
+
+
+def read_plan(path: Path) -> tuple[Plan, str]:
+    """The plan that a folder keeps, and the identity of its scenario; StudyError where the file is damaged."""
+    found = read(path)
+    try:
+        search = {str(key): value for key, value in found["search"].items()}
+        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]))
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
+        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
+    if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
+        raise StudyError(f"{path}: is damaged: its numbers are no plan of a tuning; give another --out")
+    return made, str(found.get("identity"))
 
 
 def _document(scenario: Scenario) -> dict[str, Any]:
@@ -267,9 +281,7 @@ def _hardened(
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
-        with from_outside(folder / STEPS, StudyError):
-            told = json_object(read_text(folder / STEPS))
-            steps, why = [_measured(step) for step in told["steps"]], str(told["why"])
+        steps, why = read_steps(folder / STEPS)
         return load(folder / TUNED, trust=trust), steps, why
     best = load(folder / STUDY / "best.toml", trust=trust)
     steps, why = [], ""
@@ -286,8 +298,32 @@ def _hardened(
     return load(folder / TUNED, trust=trust), steps, why
 
 
+def read_steps(path: Path) -> tuple[list[Measured], str]:
+    """Steps of hardening that a folder keeps, and why there are none; StudyError where the file is damaged."""
+    with from_outside(path, StudyError):
+        told = json_object(read_text(path))
+    try:
+        return [_measured(step) for step in told["steps"]], str(told["why"])
+    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
+        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from fault
+
+
 def _measured(told: Mapping[str, Any]) -> Measured:
-    return Measured(**{**told, "cost": tuple(told["cost"]), "gain": tuple(told["gain"])})
+    """One step from plain values; raises what its constructors raise."""
+
+    def three(values: Any) -> tuple[float, float, float]:
+        mean, low, high = map(float, values)
+        return mean, low, high
+
+    def table(name: str) -> dict[str, float]:
+        return {str(key): float(value) for key, value in told[name].items()}
+
+    return Measured(
+        name=str(told["name"]), reason=str(told["reason"]), parameters=table("parameters"),
+        fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
+        cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
+        kept=bool(told["kept"]), verdict=str(told["verdict"]),
+    )  # fmt: skip
 
 
 def _certified(

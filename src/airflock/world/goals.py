@@ -38,8 +38,9 @@ class Parameters(Record):
         meaning="the centre is at the goal within",
     )
     speed: float = quantity(
-        0.0, "m/s", low=0.0, high=1e3, source=OURS, meaning="of the goal on its way to the next point; 0: it jumps"
-    )
+        0.0, "m/s", low=0.0, high=1e3, source=OURS, usual=(0.0, 20.0),
+        meaning="of the goal on its way to the next point; 0: it jumps",
+    )  # fmt: skip
     role: str = choice(
         "lead",
         ("lead", "herd"),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airflock.core.contract.namespaces import names_of
+from airflock.core.parameters import declarations
 from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
 from airflock.errors import RuleError
 
@@ -28,6 +29,7 @@ class Model:
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
     terms    : vectors among its Sums (their fields without x, y, z) → what the law calls them, and their unit (TERMS)
+    parts    : parts of the law in the paper's order → names of the parameters of each; a page sorts sliders so (PARTS)
     """
 
     name: str
@@ -52,6 +54,7 @@ class Model:
     doc: str = ""
     violates: Mapping[str, str] = field(default_factory=dict)
     terms: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))
@@ -129,7 +132,18 @@ def model(namespace: Any, name: str = "") -> Model:
         doc=str(found.get("__doc__") or ""),
         violates=dict(found.get("VIOLATES", {})),
         terms=_terms(found.get("TERMS", {}), found.get("Sums"), name),
+        parts=_parts(found.get("PARTS", {}), found["Parameters"], name),
     )
+
+
+def _parts(given: Any, parameters: type, name: str) -> dict[str, tuple[str, ...]]:
+    """Parts of a law; each names parameters that there are."""
+    known = {parameter for parameter, _, _ in declarations(parameters)} if given else set()
+    for part, names in dict(given).items():
+        unknown = [each for each in names if each not in known]
+        if isinstance(names, str) or unknown:
+            raise RuleError(f"model {name}: PARTS[{part!r}] = {names!r}; give names of its parameters")
+    return {part: tuple(names) for part, names in dict(given).items()}
 
 
 def _terms(given: Any, sums: Any, name: str) -> dict[str, tuple[str, str]]:

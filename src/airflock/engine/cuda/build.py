@@ -127,7 +127,7 @@ class CudaBuilder(Builder):
     def known(self) -> set[str]:
         """Names of the driver module."""
         constants = {t.id for s in parse(self.head) if isinstance(s, ast.Assign) for t in s.targets if hasattr(t, "id")}
-        here = set(self.source._names.values()) | self.plain | {stage.name for stage in self.stages.values()}
+        here = self.source.names() | self.forms.names | self.plain | {stage.name for stage in self.stages.values()}
         return constants | here | set(dir(builtins)) | {"math", "np", "cuda"}
 
     def same(self, name: str) -> str:

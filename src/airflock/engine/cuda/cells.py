@@ -12,10 +12,11 @@ from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.cuda.start import heading_off, tried
-from airflock.engine.passes import decide, move
 from airflock.engine.passes.build import branch, loop
+from airflock.engine.passes.driver import MADE
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import must_replace
+from airflock.engine.schedule import order
 from airflock.engine.stages import start
 from airflock.engine.stages.decide import NEAR as GATHERED
 from airflock.engine.stages.state import SCENE
@@ -51,10 +52,8 @@ def crowd(plan: Plan, simulated: bool = False) -> str:
     """Text of the driver of one big flock."""
     threads = 4 if simulated else 128
     build = CellBuilder(plan, Shape(32, 1, threads, simulated=simulated))
-    decide.neighbours(build)
-    decide.boundaries(build)
-    decide.decide(build)
-    move.move(build)
+    for name in _stages(build):
+        MADE[name](build)
     options = "fastmath=True" + ("" if simulated else ", cache=True")
     kernels = [SORT.format(options=options, scan=8 if simulated else 1024, near=NEAR)]
     kernels += ["\n".join(_kernel(options, "begin", "near", "rest", *COMMON, body=_begin(build)))]
@@ -64,6 +63,12 @@ def crowd(plan: Plan, simulated: bool = False) -> str:
     parts = [build.head, fours, *build.source.blocks, *build.functions, *kernels]
     constants = [f"REST = {rest_columns(plan)}", f"SCAN = {8 if simulated else 1024}"]
     return "\n\n".join([*parts, *constants]) + "\n"
+
+
+def _stages(build: CudaBuilder) -> tuple[str, ...]:
+    """What an agent does in a step: nobody is told anything but the truth, so nothing is perceived."""
+    events = order(build.plan)
+    return tuple(name for name in (*events["decide"], *events["move"]) if name != "perceive")
 
 
 def rest_columns(plan: Plan) -> int:
@@ -165,7 +170,7 @@ def _advance(build: CellBuilder) -> list[str]:
     fetch = [f"{name} = {sorted_[table]}[slot, {c}]" for name, (table, c) in state.items()]
     meet = ["i = integer(sorted_[slot, 3])", *fetch, *_edges(build)]
     meet += ["number = step // decide_every"]
-    meet += [build.stages[s].call(k_="number") for s in ("neighbours", "boundaries", "decide") if s in build.stages]
+    meet += [build.stages[name].call(k_="number") for name in _stages(build)[:-1]]
     body += ["i = integer(near[slot, 3])", *load, *branch("meet != 0", meet), build.stages["move"].call()]
     store = [f"{table}[slot, {c}] = {name}" for name, (table, c) in state.items()]
     return [*_common(build), *branch("slot < n", [*body, *store, "near[slot, 3] = real(i)"])]

@@ -4,46 +4,48 @@ A cluster grows from its first agent, one hop per round, until a round brings no
 thread keeps the links of its agent as bits, so that a round reads a few words; else a round looks at all pairs.
 """
 
+from typing import Any
+
 from airflock.core.contract import Metric
 from airflock.engine.passes.build import Builder, branch, loop
-from airflock.engine.passes.decide import START, combine
-from airflock.engine.passes.members import members
+from airflock.engine.plan import Plan
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.values import Components, argument
+from airflock.engine.stages.clusters import mean_over, member
+from airflock.engine.stages.measure import add, clear, filled, ways
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import HALF, START, ZERO, X, Y, Z, ask, real, reduced, totals, vector
+from airflock.world.edges import nearest_image
 
 VALID = "np.uint32(FULL) if n >= 32 * part + 32 else (np.uint32((1 << max(n - 32 * part, 0)) - 1))"
 
 
 def clusters(build: Builder, metric: Metric) -> list[str]:
     """Lines that sum the cluster rule of one metric over all clusters."""
-    if metric.cluster is None:
-        return []
     registers = build.shape.registers  # type: ignore[attr-defined]
-    fields = metric.Cluster._fields  # type: ignore[union-attr]
     build.bind(["mine", "earlier", "joins"])
-    lines = [f"u{c} = {START[metric.reduce.get(name, 'sum')]}" for c, name in enumerate(fields)]
+    totals_of = {"total": Components("u", "totals"), "record": metric.Cluster}
+    lines = specialise(build, clear, metric=metric, **totals_of).lines
     lines += loop("i in range(n)", ["mine[i] = ZERO; earlier[i] = ZERO; joins[i] = ZERO"])
     lines += _links(build, metric) if registers else []
     grow = _grow_by_masks() if registers else _grow_by_pairs(build, metric)
-    names = [f"head_{a}" for a in build.plan.axes]
-    heads = " + ".join(f"{name}[i] * {name}[i]" for name in names)
-    sums = [f"s{a} += mine[i] * head_{a}[i]" for a in build.plan.axes] + [f"hh += mine[i] * ({heads})"]
-    members, mean = _members(build, metric)
-    given = {"n": "real(size)", "hx": "sx", "hy": "sy", "hz": "sz", "mean": mean}
-    body = [*grow, "sx = ZERO; sy = ZERO; sz = ZERO; hh = ZERO", *loop("i in range(n)", sums), *members]
-    body += [f"t = {build.call(metric.cluster, 'cluster', given, metric.name)}"]
-    body += [combine(metric.reduce.get(name, "sum"), f"u{c}", f"t[{c}]") for c, name in enumerate(fields)]
+    made = specialise(
+        build, grown, mine=argument("mine"), size=argument("size"), mean=argument("mean"), metric=metric
+    )  # fmt: skip
+    body = [*grow, *made.lines, f"t = {made.answer}"]
+    body += specialise(build, add, t=argument("t"), metric=metric, **totals_of).lines
     body += loop("i in range(n)", ["earlier[i] = most(earlier[i], mine[i])"])
     body += ["done += size", "cuda.syncthreads()"]
     lines += ["done = integer(0)", "while done < n:", *[f"    {line}" for line in body]]
-    values = ", ".join(f"u{c}" for c in range(len(fields)))
-    return [*lines, f"clusters = {build.source.name(metric.Cluster)}({values})"]
+    return [*lines, f"clusters = {specialise(build, filled, **totals_of).answer}", "return clusters"]
 
 
 def _offset(build: Builder, other: str) -> list[str]:
     """Squared distance of agent i to another, by its text."""
-    axes = build.plan.axes
-    square = " + ".join(f"d{a} * d{a}" for a in axes)
-    return [*(f"d{a} = {other.format(a=a, c=c)} - {a}i" for c, a in enumerate(axes)), *build.image(axes),
-            f"r2 = {square} + TINY"]  # fmt: skip
+    axes, nearest = build.plan.axes, build.source.name(nearest_image) if build.plan.periodic else ""
+    lines = [f"d_{a} = {other.format(a=a, c=c)} - own_{a}" for c, a in enumerate(axes)]
+    lines += [f"d_{a} = {nearest}(d_{a}, w.half_{a})" for a in axes if nearest]
+    return [*lines, f"r2 = {' + '.join(f'd_{a} * d_{a}' for a in axes)} + TINY"]
 
 
 def _linked(build: Builder, metric: Metric) -> tuple[list[str], str]:
@@ -64,7 +66,7 @@ def _links(build: Builder, metric: Metric) -> list[str]:
         "e in range(4)", ["eight = np.uint32(0)", *eight, "bits = np.uint32(bits | (eight << np.uint32(8 * e)))"]
     )
     word += [f"links_[part] = np.uint32(bits & ({VALID}))"]
-    lines = [f"{a}i = {a}_i" for a in build.plan.axes] + loop("part in range(sub, WORDS, PER_AGENT)", word)
+    lines = [f"own_{a} = {a}_i" for a in build.plan.axes] + loop("part in range(sub, WORDS, PER_AGENT)", word)
     return [*lines, *loop("part in range(tid, WORDS, THREADS)", ["seen[part] = np.uint32(0)"]), "cuda.syncthreads()"]
 
 
@@ -97,7 +99,7 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
     axes = build.plan.axes
     root, link = _linked(build, metric)
     pair = [*_offset(build, "{a}[j]"), *root, f"hit = most(hit, (ONE if {link} & (mine[j] > HALF) else ZERO))"]
-    meet = [f"{a}i = {a}[i]" for a in axes] + ["hit = ZERO", *loop("j in range(m)", pair)]
+    meet = [f"own_{a} = {a}[i]" for a in axes] + ["hit = ZERO", *loop("j in range(m)", pair)]
     meet += ["joins[i] = hit if mine[i] + earlier[i] < HALF else ZERO", "fresh += joins[i]"]
     growth = ["fresh = ZERO", *loop("i in range(n)", meet), "size = integer(size + integer(fresh))"]
     growth += loop("i in range(n)", ["mine[i] = most(mine[i], joins[i])"])
@@ -112,12 +114,37 @@ def _grow_by_pairs(build: Builder, metric: Metric) -> list[str]:
     ]
 
 
-def _members(build: Builder, metric: Metric) -> tuple[list[str], str]:
-    """Lines that sum the member rule over the cluster at hand, after its own mean; and the name of that mean."""
-    if metric.member is None:
-        return [], "mean"
-    text = members(build, metric, "i")
-    lines = [*text.zeros, *loop("i in range(n)", [f"c_{x} += mine[i] * {x}[i]" for x in text.rows])]
-    terms = [f"(t[{c}] if mine[i] > HALF else {START[how]})" for c, how in enumerate(text.how)]
-    body = [*text.body, *(combine(text.how[c], f"m{c}", term) for c, term in enumerate(terms))]
-    return [*lines, *text.mean, *loop("i in range(n)", body), text.record], "own_mean"
+def grown(
+    mine: Any, size: Any, mean: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric
+) -> Any:  # fmt: skip
+    """What the cluster rule says of the agents that `mine` marks with 1; mean : over the flock."""
+    axes, h = range(plan.dimensions), flock.heading
+    heads, cs, cv, ch = vector(), vector(), vector(), vector()
+    for a in axes:
+        heads[a] = ZERO
+    hh = ZERO
+    for i in range(n):
+        for a in axes:
+            heads[a] = heads[a] + mine[i] * h[a][i]
+        hh += mine[i] * sum(h[a][i] * h[a][i] for a in axes)
+    if metric.member is not None:
+        for total in (cs, cv, ch):
+            for a in axes:
+                total[a] = ZERO
+        for i in range(n):
+            for total, row in ((cs, flock.position), (cv, flock.velocity), (ch, h)):
+                for a in axes:
+                    total[a] = total[a] + mine[i] * row[a][i]
+    own_mean = mean_over(size, cs, cv, ch, mean, plan=plan, metric=metric)
+    k = totals()
+    if metric.member is not None:
+        clear(k, metric.Member, metric)
+        for i in range(n):
+            t = member(i, own_mean, flock, numbers, metric=metric)
+            for c, way in enumerate(ways(metric.Member, metric)):
+                k[c] = reduced(way, k[c], t[c] if mine[i] > HALF else START[way])
+    members = filled(metric.Member, k) if metric.member is not None else None
+    return ask(
+        metric.cluster, n=real(size), hx=heads[X], hy=heads[Y], hz=heads[Z], hh=hh, members=members, mean=own_mean,
+        q=numbers.q,
+    )  # fmt: skip

@@ -4,37 +4,24 @@ from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
 from airflock.engine.cuda.state import memory
-from airflock.engine.passes import decide, flock, measure, move, perceive, scene
 from airflock.engine.passes.build import branch, columns, loop
+from airflock.engine.passes.driver import make
+from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
+from airflock.engine.schedule import ORDER, in_turn, order
+from airflock.engine.stages.flight import SLACK
 
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
     "starts", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums",
     "all_reached", "all_frames", "scratches", "scratch_rows",
 )  # fmt: skip
-CUT = 0.01  # m, slack that covers the rounding of positions in single precision
 
 
 def flight(plan: Plan, shape: Shape) -> str:
     """Text of the driver that flies one flock per block: kernel `fly`."""
     build = CudaBuilder(plan, shape)
-    perceive.snapshot(build)
-    perceive.perceive(build)
-    perceive.receive(build)
-    decide.neighbours(build)
-    decide.boundaries(build)
-    flock.flock(build)
-    decide.decide(build)
-    move.move(build)
-    if plan.goals:
-        scene.aim(build)
-    if plan.own:
-        scene.glide(build)
-    if plan.scene:
-        scene.appear(build)
-    for clock in clocks(plan):
-        measure.measure(build, clock)
+    make(build)
     body = _time(build)  # first: it may still name rules
     lines = [*memory(build), *begin(build), *body, *_end(build)]
     options = "fastmath=True" + ("" if shape.simulated else f", launch_bounds={shape.bounds}, cache=True")
@@ -44,18 +31,13 @@ def flight(plan: Plan, shape: Shape) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def clocks(plan: Plan) -> list[str]:
-    """Clocks that any metric of a plan runs on."""
-    return [clock for clock in measure.CLOCKS if any(metric.clock == clock for metric in plan.metrics)]
-
-
 # ------------------------------------------------------------------------------------------------------------ time
 
 
 def _time(build: CudaBuilder) -> list[str]:
     """The loop over time; counters instead of remainders, which a GPU divides for."""
     plan = build.plan
-    heard = plan.noisy or plan.delayed
+    heard = plan.late
     count = len(columns(plan.metrics))
     starts = {"min": "FAR", "max": "-FAR"}
     first = [starts.get(how, "ZERO") for _, how, _ in columns(plan.metrics)]
@@ -70,29 +52,20 @@ def _time(build: CudaBuilder) -> list[str]:
         lines += ["to_hear = integer((decide_every - delay % decide_every) % decide_every)"]
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
     step = ["time = real(step) * row_c.dt"]
-    if heard:
-        put = ["slot = slot_in", build.stages["snapshot"].call(), "to_hear = decide_every"]
-        put += ["slot_in = integer(slot_in + 1) if slot_in + 1 < slots else integer(0)"]
-        step += [*branch("to_hear == 0", put), "to_hear = integer(to_hear - 1)"]
-    step += _world(build)
-    step += _watch(build)
-    due = ["look"] if "collision" in clocks(plan) else []
-    meets = not plan.sequential
-    step += ["meet = to_decide == 0" if meets else "meet = False", "take = to_sample == 0"]
-    shown = [*branch("meet", _perceived(build))] if meets else []
-    show = ["cuda.syncthreads()", *_shown(build), *shown, "cuda.syncthreads()"]
-    step += branch(" or ".join(["meet", "take", *due]), show)
-    if meets:
-        step += [*branch("meet", _choose(build)), "to_decide = integer(to_decide - 1)"]
-    step += branch("look", _looked(build)) if due else []
-    if plan.stop:
-        found = [name for name, _, _ in columns(plan.metrics)].index("n_coll")
-        step += branch(f"value{found} > HALF", ["break"])
-    step += [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
-    step += branch("step < steps", _advance(build))
+    for event in ORDER:
+        step += PARTS[event](build)
     # counted by hand in 32 bits: a range counts in 64, twice
     turn = [f"    {line}" for text in [*step, "step = integer(step + 1)"] for line in text.splitlines()]
     return [*lines, "step = integer(0)", "while step <= steps:", *turn]
+
+
+def _send(build: CudaBuilder) -> list[str]:
+    """The state that is sent goes into the slot of the ring from which it will be heard."""
+    if not build.plan.late:
+        return []
+    put = ["slot = slot_in", build.stages["snapshot"].call(), "to_hear = decide_every"]
+    put += ["slot_in = integer(slot_in + 1) if slot_in + 1 < slots else integer(0)"]
+    return [*branch("to_hear == 0", put), "to_hear = integer(to_hear - 1)"]
 
 
 def _world(build: CudaBuilder) -> list[str]:
@@ -108,10 +81,41 @@ def _world(build: CudaBuilder) -> list[str]:
     return lines
 
 
+def _decide(build: CudaBuilder) -> list[str]:
+    """What is due of all that looks at the others, who show themselves for it once; then a decision."""
+    meets, watched = not build.plan.sequential, bool(order(build.plan)["watch"])
+    lines = _look(build) if watched else []
+    lines += ["meet = to_decide == 0" if meets else "meet = False", "take = to_sample == 0"]
+    shown = [*branch("meet", _perceived(build))] if meets else []
+    show = ["cuda.syncthreads()", *_shown(build), *shown, "cuda.syncthreads()"]
+    lines += branch(" or ".join(["meet", "take", *["look"] * watched]), show)
+    if meets:
+        lines += [*branch("meet", _choose(build)), "to_decide = integer(to_decide - 1)"]
+    return lines
+
+
 def _watch(build: CudaBuilder) -> list[str]:
+    """Look for collisions, and stop at the first one where a scenario says so."""
+    lines = branch("look", _looked(build)) if order(build.plan)["watch"] else []
+    if build.plan.stop:
+        found = [name for name, _, _ in columns(build.plan.metrics)].index("n_coll")
+        lines += branch(f"value{found} > HALF", ["break"])
+    return lines
+
+
+def _sample(build: CudaBuilder) -> list[str]:
+    return [*branch("take", _taken(build)), "to_sample = integer(to_sample - 1)"]
+
+
+def _move(build: CudaBuilder) -> list[str]:
+    return branch("step < steps", _advance(build))
+
+
+PARTS = {"send": _send, "world": _world, "decide": _decide, "watch": _watch, "sample": _sample, "move": _move}
+
+
+def _look(build: CudaBuilder) -> list[str]:
     """Whether to look for collisions: while nobody can have come near enough, a vote of all threads says no."""
-    if "collision" not in clocks(build.plan):
-        return []
     watched = _within(build) is not None
     vote = "cuda.syncthreads_or(integer(1) if moved >= gap else integer(0)) != 0" if watched else "True"
     body = [f"look = {vote}", "to_collide = collide_every", "count_collision = integer(count_collision + 1)"]
@@ -134,10 +138,7 @@ def _within(build: CudaBuilder) -> str | None:
 def _forget(build: CudaBuilder) -> list[str]:
     """Memories of the collision metrics back at their start values."""
     lines = []
-    for metric in build.plan.metrics:
-        if metric.clock != "collision":
-            continue
-        first = measure.memory_offset(build, metric)
+    for metric, _, first, _ in measured(build.plan, "collision"):
         for c, start in enumerate(getattr(metric.Memory, "_field_defaults", {}).values()):
             own = f"kept{first + c}_i" if build.shape.registers else f"memory[{first + c}, i]"
             lines += agents(build, [f"{own} = real({start})"])
@@ -166,9 +167,8 @@ def _choose(build: CudaBuilder) -> list[str]:
     """Meet neighbours and surfaces, decide."""
     barrier = [] if build.shape.registers else ["cuda.syncthreads()"]
     lines = []
-    for name in ("neighbours", "boundaries", "flock", "decide"):
-        if name in build.stages:
-            lines += [build.stages[name].call(k_="k"), *barrier]
+    for name in order(build.plan)["decide"][1:]:
+        lines += [build.stages[name].call(k_="k"), *barrier]
     lines += ["k = integer(k + 1); to_decide = decide_every"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
 
@@ -178,14 +178,14 @@ def _looked(build: CudaBuilder) -> list[str]:
     width = _within(build)
     if width is None:
         return lines
-    return [*lines, f"gap = answer - {width} - real({CUT})", "moved = ZERO; calm = False"]
+    return [*lines, f"gap = answer - {width} - real({SLACK})", "moved = ZERO; calm = False"]
 
 
 def _taken(build: CudaBuilder) -> list[str]:
     """One sample: order parameters and, where they are kept, positions, velocities and commands."""
     plan, axes = build.plan, build.plan.axes
     lines = ["to_sample = sample_every", "count_sample = integer(count_sample + 1)"]
-    if "sample" in clocks(plan):
+    if order(plan)["sample"]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
         names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
@@ -210,8 +210,9 @@ def _advance(build: CudaBuilder) -> list[str]:
     further = "moved += real(2.0) * math.sqrt(answer) * row_c.dt"
     if not build.plan.sequential:
         return [build.stages["move"].call(), further]
-    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in build.stages else []
-    alone = [build.stages[name].call(k_="step") for name in ("boundaries", "decide", "move") if name in build.stages]
+    due = in_turn(build.plan)
+    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in due else []
+    alone = [build.stages[name].call(k_="step") for name in due if name != "neighbours"]
     turn += [*branch("tid == 0", [*alone, "fastest_ = most(fastest_, answer)"]), "cuda.syncthreads()"]
     return ["fastest_ = ZERO", *loop("i in range(n)", turn), "answer = fastest_", further]
 

@@ -15,7 +15,9 @@ PREFIX = "per_"
 
 
 class Forms:
-    """Second forms of rules, made on demand from the text of a driver; `made` holds their text in order of need.
+    """Second forms of rules, made on demand from the text of a driver.
+
+    `made` holds their text in order of need until a driver takes it, `names` the names of all.
 
     A key says whose reciprocal a form takes: "r", an argument, or "p.tau", a field of an argument.
     """
@@ -23,6 +25,7 @@ class Forms:
     def __init__(self, blocks: list[str], decorator: str):
         self.blocks, self.decorator = blocks, decorator
         self.made: list[str] = []
+        self.names: set[str] = set()
         self._keys: dict[str, list[str] | None] = {}
         self._rules: dict[str, ast.FunctionDef] = {}
         self._read = 0
@@ -65,6 +68,7 @@ class Forms:
         node.decorator_list = []
         node.args.args += [ast.arg(spelled(key)) for key in change.found]
         self._keys[rule.name] = list(change.found) if root is None else None
+        self.names.add(node.name)
         self.made.append(f"{self.decorator}\n{ast.unparse(ast.fix_missing_locations(node))}")
 
     def is_root(self, name: str) -> bool:

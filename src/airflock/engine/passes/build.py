@@ -11,8 +11,8 @@ from airflock.engine import vectors
 from airflock.engine.generate import Source
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
-from airflock.engine.stages.state import SCENE, own_row
-from airflock.world import edges
+from airflock.engine.specialise.values import Function
+from airflock.engine.stages.state import SCENE
 
 JIT = "@njit(**JIT)"
 
@@ -36,7 +36,8 @@ class Builder:
         self.source = Source(JIT, plan.constants)
         self.rows: dict[str, int] = {}
         self.functions: list[str] = []
-        self.turns: list[tuple[list[str], str]] = []  # of each stage of a sequential step: what it reads, its call
+        self.stages: dict[str, Any] = {}  # functions of the driver by name, as other stages call them
+        self.turns: dict[str, tuple[list[str], Function]] = {}  # in a sequential step: what it reads, its call
 
     def bind(self, names: Iterable[str]) -> list[str]:
         """Lines that bind rows of the work table to local names."""
@@ -61,11 +62,6 @@ class Builder:
         """Whether a stage takes offsets between agents to the nearest image."""
         return self.plan.periodic
 
-    @property
-    def who(self) -> str:
-        """Number of the agent that a loop is at."""
-        return "order[i]" if self.slots else "i"
-
     def order(self) -> list[str]:
         """Lines that bind `order`: whole numbers in a row of the work table, so that they move with all other rows."""
         return [f"order = work[{self.row('order')}].view(np.int{self.plan.bits})"] if self.slots else []
@@ -80,15 +76,6 @@ class Builder:
                 lines.append(f"{letter} = {kind}({values})")
             offset += len(fields)
         return lines
-
-    def own(self, letter: str) -> tuple[list[str], str]:
-        """Lines that make the record of agent i of the rows of what differs among agents, and its name."""
-        if not self.plan.varies(letter):
-            return [], letter
-        fields = self.plan.records[letter]
-        kind = self.source.record(letter.upper() * 2, fields)
-        values = [f"{own_row(letter, f)}[i]" if (letter, f) in self.plan.varied else f"{letter}.{f}" for f in fields]
-        return [f"own_{letter} = {kind}({', '.join(values)})"], f"own_{letter}"
 
     def whole(self, *names: str) -> list[str]:
         """Lines that read integers of this world."""
@@ -112,13 +99,11 @@ class Builder:
         lines: list[str] = []
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
+        name, _, parameters = head.rstrip(")").partition("(")
+        self.stages[name] = Function(name, tuple(parameters.split(", ")))
         decorator = "@njit(parallel=True, **JIT)" if parallel else JIT
         lines = ["wide_vectors()", *lines] if vectors.bits() == 512 else lines
         self.functions.append(f"{decorator}\ndef {head}:\n" + indent("\n".join(lines), "    "))
-
-    def each(self, body: Iterable[str], lanes: str = "n") -> list[str]:
-        """Loop over all agents (n) or lanes (m); with a sequential update the body alone, for the agent in turn."""
-        return list(body) if self.in_turn else loop(f"i in range({lanes})", body)
 
     def stage(
         self, name: str, arguments: str, lines: list[str], body: list[str], answer: str = "0", apart: bool = False
@@ -142,24 +127,13 @@ class Builder:
         given = ", ".join(dict.fromkeys([*turn, *asked, *(w for w in read if w.isidentifier() and w in used)]))
         self.function(f"{name}_of({given})", first, body, f"return {answer}")
         if self.plan.sequential:
-            self.turns.append((lines, f"{name}_of({given})"))
+            self.turns[name] = lines, self.stages[f"{name}_of"]
         else:
             self.function(f"{name}({arguments})", lines, f"return {name}_of({given})")
 
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that run once for the whole flock, and see all that came before."""
         return list(lines)
-
-    def image(self, axes: Iterable[str], names: str = "d{}") -> list[str]:
-        """Lines that take offsets to the nearest image of a periodic box."""
-        if not self.plan.periodic:
-            return []
-        rule = self.source.name(edges.nearest_image)
-        return [f"{names.format(a)} = {rule}({names.format(a)}, w.half_{a})" for a in axes]
-
-    def z(self, text: str) -> str:
-        """A third coordinate, or a literal zero in a plane."""
-        return text if self.plan.dimensions == 3 else "ZERO"
 
 
 def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:

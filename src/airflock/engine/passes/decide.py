@@ -13,20 +13,10 @@ from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.words import live, wants
 
-EXTREME = {"min": "least", "max": "most"}
-START = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
-
-
-def combine(how: str, total: str, term: str) -> str:
-    """Text that reduces one more term into a total."""
-    return f"{total} += {term}" if how == "sum" else f"{total} = {EXTREME[how]}({total}, {term})"
-
 
 def neighbours(build: Builder) -> None:
     """Function neighbours: the neighbour rule over all others in range of each agent, all pairs or by cells."""
     plan, model = build.plan, build.plan.model
-    if model.neighbour is None:
-        return
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
     draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)
@@ -73,8 +63,6 @@ def _for_cells(
 
 def boundaries(build: Builder) -> None:
     """Function boundaries: the boundary rule over all surfaces."""
-    if build.plan.model.boundary is None:
-        return
     made = specialise(build, surfaces.boundaries)
     arguments = "n, row, whole, work, faces, edges, spans, scene"
     build.stage("boundaries", arguments, made.once, made.body, made.answer)
@@ -98,16 +86,14 @@ def decide(build: Builder) -> None:
 
 def stop(build: Builder) -> None:
     """Function stop: who has lost somebody stands still, where the scenario says so."""
-    if build.plan.silent:
-        made = specialise(build, silence.stop)
-        build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
+    made = specialise(build, silence.stop)
+    build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
 
 
 def overrule(build: Builder) -> None:
     """Function overrule: faults of the commands, where there are such kinds."""
-    if build.plan.suffers("overrule"):
-        made = specialise(build, faults.overrule, time=argument("time"))
-        build.stage("overrule", "n, time, row, work", made.once, made.body, made.answer)
+    made = specialise(build, faults.overrule, time=argument("time"))
+    build.stage("overrule", "n, time, row, work", made.once, made.body, made.answer)
 
 
 def _asked(build: Builder, sums: list[int]) -> list[int]:

@@ -44,17 +44,15 @@ def surveys(plan: Plan) -> list[Owner]:
 
 def flock(build: Builder) -> None:
     """Function flock: the model's rule, once per decision, on the true states."""
-    if build.plan.model.flock is None:
-        return
     owner = owners(build.plan)[0]
     records = "p wing aero" if "aero" in asks(owner.rule, owner.kind, owner.name) else "p wing"
     build.function("flock(n, row, work, scratch)", build.records(records), _call(build, owner), "return 0")
 
 
 def survey(build: Builder, metric: Metric) -> list[str]:
-    """Lines that run a metric's rule; `scratch`, `q` and `wing` are at hand."""
-    found = [owner for owner in surveys(build.plan) if owner.name == metric.name]
-    return _call(build, found[0]) if found else []
+    """Lines that run a metric's rule; `scratch` is at hand."""
+    (owner,) = (owner for owner in surveys(build.plan) if owner.name == metric.name)
+    return [*build.records("q wing"), *_call(build, owner), "return 0"]
 
 
 def _call(build: Builder, owner: Owner) -> list[str]:
@@ -75,20 +73,6 @@ def _call(build: Builder, owner: Owner) -> list[str]:
     lines += [f"shared_{owner.name} = {build.source.name(owner.Shared)}({', '.join(columns)})"]
     build.source.solver(owner.rule)
     return [*lines, *build.once([build.call(owner.rule, owner.kind, given, owner.name)])]
-
-
-def columns_of(build: Builder, record: Any, name: str) -> list[str]:
-    """Lines that bind the columns of Shared."""
-    return build.bind([f"shared_{name}_{field}" for field in record._fields])
-
-
-def shared(build: Builder, record: Any, name: str, bound: bool = False) -> list[str]:
-    """Lines that make the Shared of agent i, `shared`."""
-    values = [
-        f"shared_{name}_{field}[i]" if bound else f"work[{build.row(f'shared_{name}_{field}')}, i]"
-        for field in record._fields
-    ]
-    return [f"shared = {build.source.name(record)}({', '.join(values)})"]
 
 
 def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:

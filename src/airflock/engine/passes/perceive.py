@@ -30,9 +30,8 @@ def perceive(build: Builder) -> None:
 
 def tune(build: Builder) -> None:
     """Function tune: what faults leave of radios and clocks, where there are such kinds."""
-    if build.plan.suffers("radio", "clock"):
-        made = specialise(build, faults.tune, decision=argument("k_"))
-        build.function("tune(k_, m, row, work)", made.lines, "return 0")
+    made = specialise(build, faults.tune, decision=argument("k_"))
+    build.function("tune(k_, m, row, work)", made.lines, "return 0")
 
 
 def meet(build: Builder) -> None:

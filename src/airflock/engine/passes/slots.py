@@ -6,12 +6,10 @@ sort into cells and the sums on their way back go at random over all memory, and
 a small one. Of the numbers of an agent none depends on its slot; sums over the flock are taken in the order of slots.
 """
 
-from airflock.engine.passes.build import Builder, branch, loop
+from airflock.engine.passes.build import Builder, loop
 from airflock.engine.passes.flock import owners
 from airflock.engine.passes.grid import CHUNKS, opened
 from airflock.engine.plan import Plan
-
-EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
 
 
 def slotted(plan: Plan) -> bool:
@@ -24,21 +22,13 @@ def sorted_by_cells(plan: Plan) -> bool:
     return plan.grid and not plan.sequential and not owners(plan)
 
 
-def numbered(build: Builder) -> list[str]:
-    """Lines that put each agent into the slot of its number."""
-    return [*build.order(), *loop("i in range(m)", ["order[i] = i"])] if build.slots else []
-
-
-def rearrange(build: Builder) -> list[str]:
-    """Lines that now and then move all agents to where they were just sorted to; sums lend their memory meanwhile."""
-    if not sorted_by_cells(build.plan):
-        return []
+def rearrange(build: Builder) -> None:
+    """Function rearrange: moves all agents to where they were just sorted to; sums lend their memory meanwhile."""
     body = [*opened(build), "kept = totals_[:n]"]
     for table in ("work", "mem", "memory"):
         rows = [f"lane = {table}[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
         body += loop(f"c in range({table}.shape[0])", rows)
     build.function("rearrange(n, work, mem, memory, cells)", body, "return 0", parallel=True)
-    return branch(f"k % {EVERY} == 0", ["rearrange(n, work, mem, memory, cells)"])
 
 
 def _spread(line: str) -> list[str]:

@@ -34,6 +34,8 @@ def _without(statements: list[ast.stmt], needed: set[str], count: list[int]) -> 
         if isinstance(statement, ast.Assign):
             (target,) = statement.targets
             dead = isinstance(target, ast.Name) and target.id not in needed
+        elif isinstance(statement, ast.AugAssign):  # reads but itself
+            dead = isinstance(statement.target, ast.Name) and statement.target.id not in needed
         elif isinstance(statement, (ast.For, ast.If)):
             statement.body = _without(statement.body, needed, count)
             statement.orelse = _without(statement.orelse, needed, count)

@@ -18,6 +18,7 @@ from airflock.engine.specialise.values import (
     Bundle,
     Call,
     Components,
+    Function,
     StageError,
     Text,
     given,
@@ -272,6 +273,9 @@ class Expressions:
         known: dict[str, Any] = {}
         for keyword in node.keywords:
             known |= self.value(keyword.value, scope) if keyword.arg is None else {}
+        if isinstance(rule, Function):
+            taken = [self.expr(offered[n], scope) if n in offered else ast.Name(n, LOAD) for n in rule.parameters]
+            return ast.Call(ast.Name(rule.name, LOAD), taken, [])
         names = inspect.signature(rule).parameters
         for name in names:
             if name not in offered and name not in known:

@@ -197,7 +197,7 @@ class _Statements(Expressions):
         self, called: Callable[..., Any], node: ast.Call, scope: Scope
     ) -> tuple[list[ast.stmt], tuple[ast.expr, Scope] | None]:
         """Statements of a helper in place of its call, and the expression that it returns, as the helper knows it."""
-        inner = self.entered(called, node, [self.value(argument, scope) for argument in node.args], scope)
+        inner = self.entered(called, node, self._items(node.args, scope), scope)
         *body, last = inner.text.node.body
         if isinstance(last, ast.Return) and last.value is not None:
             done, answer = self.block(body, inner), (last.value, inner)

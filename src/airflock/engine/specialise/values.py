@@ -32,6 +32,14 @@ class Call:
     text: str
 
 
+@dataclass(frozen=True)
+class Function:
+    """Another stage as a function of the driver, to be asked: what it is not given it takes under the name it has."""
+
+    name: str
+    parameters: tuple[str, ...]
+
+
 class Bundle:
     """A tuple of arrays: it is handed on whole under its own name, and its parts are bound to names of theirs."""
 

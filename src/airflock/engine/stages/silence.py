@@ -8,7 +8,7 @@ from airflock.core import silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import by_clock
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, SIDES, TINY, ZERO, X, Y, Z, choose, integer, most, vector
+from airflock.engine.stages.words import HALF, ONE, SIDES, TINY, ZERO, X, Y, Z, choose, integer, most, vector
 from airflock.world.edges import nearest_image
 
 
@@ -16,7 +16,7 @@ def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float,
     """Let stand still who has lost somebody that could be near by now."""
     axes, w, c = range(plan.dimensions), numbers.w, flock.command
     for i in agents:
-        somebody = ZERO
+        somebody, now = ZERO, by_clock(time, i, flock, plan=plan)
         for j in range(n):
             d = vector()
             for a in axes:
@@ -25,14 +25,16 @@ def stop(agents: Iterable[int], flock: Flock, numbers: Any, n: int, time: float,
                 for a in axes:
                     d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
             distance = math.sqrt(sum(d[a] * d[a] for a in axes) + TINY)
-            age = by_clock(time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
+            age = now - flock.packet[2 * plan.dimensions][i, j]
             near = silence.could_be_near(distance, age, numbers.silence)
             somebody = most(somebody, choose(integer(j) == integer(i), ZERO, near))
         at, o = flock.stop_position, vector()
         for a in axes:
             at[a][i] = choose(flock.stopped[i] > HALF, at[a][i], flock.measured_position[a][i])
             o[a] = at[a][i] - flock.measured_position[a][i]
-        flock.stopped[i] = somebody
+        until = silence.stands_until(somebody, now, flock.stands_until[i], numbers.silence)
+        stands = choose(now < until, ONE, ZERO)
+        flock.stands_until[i], flock.stopped[i] = until, stands
         v = silence.back(o[X], o[Y], o[Z], numbers.silence)
         for a in axes:
-            c[a][i] = choose(somebody > HALF, v[a], c[a][i])
+            c[a][i] = choose(stands > HALF, v[a], c[a][i])

@@ -51,7 +51,8 @@ class Flock:
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
     clock                                : how far its clock is ahead, s
-    stopped, stop_position               : whether it stopped for somebody whom it has lost (1 or 0), and where
+    stopped, stop_position, stands_until : whether it stopped for somebody whom it has lost (1 or 0), where, and until
+                                           when it stands, s
     away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
@@ -60,6 +61,8 @@ class Flock:
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body, sense                          : what the body and the sensor remember, by field of their Memory
     goal, departed                       : where its own goal is, and where it started, m
+    speed, heading                       : m/s, and unit vector, of the true state
+    excursion                            : how far it is outside the arena or inside of what stands in it, m
     before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
     rays                                 : rays that it cast at its last decision
     errors, chances                      : normal and uniform numbers of the sensors
@@ -87,7 +90,18 @@ class Flock:
         self.sense, self.chances = Columns("sense", take), Columns("chance", take)
         self.packet = Columns("packet", take)
         self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
+        self.heading = axes("head_")
         self._take = take
+
+    @property
+    def speed(self) -> Row:
+        """Speed of each agent, m/s."""
+        return self._take("speed")
+
+    @property
+    def excursion(self) -> Row:
+        """How far each agent is outside, m."""
+        return self._take("excursion_")
 
     @property
     def touches(self) -> Row:
@@ -154,6 +168,11 @@ class Flock:
         """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
         return self._take("stopped")
 
+    @property
+    def stands_until(self) -> Row:
+        """Time until which each agent that stopped stands, s."""
+        return self._take("stands_until")
+
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
         return self._take(fault_row(kind, what))
@@ -161,6 +180,10 @@ class Flock:
     def shared(self, owner: str, name: str) -> Row:
         """A column of Shared, that a rule of the whole flock fills: of the "model" or of a metric, by its name."""
         return self._take(f"shared_{owner}_{name}")
+
+    def pair(self, metric: str, name: str) -> Row:
+        """What the pair rule of a metric found, one field of it."""
+        return self._take(f"{metric}_{name}")
 
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from airflock.errors import RecordingError
 from airflock.recordings.imports import headers
@@ -84,16 +85,18 @@ def _pickled(path: Path) -> str:
     )
 
 
-def read_idtracker(path: Path, options: Options, findings: Findings) -> list[Track]:
-    """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset."""
-    import h5py
+def read_idtracker(file: xr.Dataset, path: Path, options: Options, findings: Findings) -> list[Track]:
+    """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset.
 
-    with h5py.File(path, "r") as file:
-        if "trajectories" not in file:
-            shown = ", ".join(list(file)[:8]) or "nothing"
-            raise RecordingError(f"{path}: has no dataset trajectories, as idtracker.ai writes; it has {shown}")
-        values = np.asarray(file["trajectories"])
-        told = {**{k: v[()] for k, v in file.items() if v.shape == ()}, **dict(file.attrs)}
+    file : its arrays and attributes, as `recordings.opened` hands them over
+    """
+    if "trajectories" not in file:
+        shown = ", ".join([str(name) for name in file.variables][:8]) or "nothing"
+        raise RecordingError(f"{path}: has no dataset trajectories, as idtracker.ai writes; it has {shown}")
+    values = file["trajectories"].values
+    told = {**{str(k): v.values[()] for k, v in file.variables.items() if v.shape == ()}, **file.attrs}
+    if "identities_labels" in file:
+        told["identities_labels"] = file["identities_labels"].values
     fps = float(told["frames_per_second"]) if "frames_per_second" in told else None
     body = told.get("body_length")
     if body is not None and np.ndim(body) == 0:

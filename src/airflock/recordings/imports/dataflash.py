@@ -3,7 +3,7 @@
 Fields are asked for by name, because their sets change between releases.
 """
 
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ import numpy as np
 
 from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
+from airflock.recordings.opened import Opening
+from airflock.recordings.reader import PARTS
 
 GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
@@ -18,44 +20,30 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 
 def read_dataflash(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
-    reader, _ = _pymavlink(path)
-    try:
-        log = reader.DFReader_binary(str(path))
-    except Exception as fault:  # pymavlink raises struct.error, ValueError and others for other files
-        raise RecordingError(f"{path}: is not a DataFlash log: {type(fault).__name__}: {fault}") from fault
-    rows: dict[str, list[Any]] = {"PSCN": [], "PSCE": [], "PSCD": []}
-    origin, clock = None, []
-    kinds = [*rows, "ORGN", "GPS"]
-    while (message := log.recv_match(type=kinds)) is not None:
-        kind = message.get_type()
-        if kind == "ORGN":
-            origin = (float(message.Lat), float(message.Lng), float(message.Alt))
-        elif kind == "GPS":
-            if getattr(message, "GWk", 0) > 0 and getattr(message, "I", 0) == 0:
-                clock.append(
-                    (message.TimeUS * 1e-6, GPS_EPOCH - LEAP_SECONDS + message.GWk * 604800.0 + message.GMS * 1e-3)
-                )
-        else:
-            axis = kind[-1]
-            rows[kind].append([getattr(message, name, np.nan) for name in _fields(axis)])
-            if len(rows[kind]) % 5000 == 0:
-                options.done(min(0.99, getattr(log, "percent", 0.0) / 100.0))
-    if not rows["PSCN"] or not rows["PSCE"]:
+    _need_pymavlink(path)
+    told = Opening(path, how="dataflash").answer(options.done)
+    rows = {part: told[part].values for part in PARTS if part in told}
+    if "PSCN" not in rows or "PSCE" not in rows:
         raise RecordingError(f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later)")
     found = _joined(rows, path)
-    found.origin, found.clock, found.datum = origin, "boot", "amsl"
-    found.utc = np.array(clock) if len(clock) >= 2 else None
+    found.clock, found.datum = "boot", "amsl"
+    if "ORGN" in told:
+        latitude, longitude, height = (float(value) for value in told["ORGN"].values[-1])
+        found.origin = (latitude, longitude, height)
+    found.utc = _gps_times(told["GPS"].values) if "GPS" in told else None
     return [found]
 
 
-def _fields(axis: str) -> tuple[str, str, str, str]:
-    return "TimeUS", f"P{axis}", f"V{axis}", f"TV{axis}"
+def _gps_times(table: Any) -> Any:
+    """Times since the start and since 1970 (row, 2), s, where the first receiver knows the week; None below two."""
+    known = table[(table[:, 1] > 0.0) & (table[:, 3] == 0.0)]
+    utc = GPS_EPOCH - LEAP_SECONDS + known[:, 1] * 604800.0 + known[:, 2] * 1e-3
+    return np.stack([known[:, 0] * 1e-6, utc], axis=1) if len(known) >= 2 else None
 
 
-def _joined(rows: dict[str, list[Any]], path: Path) -> Track:
+def _joined(rows: dict[str, Any], path: Path) -> Track:
     """One table on the times of the north axis; the other axes are written within the same loop."""
-    north, east = np.array(rows["PSCN"], float), np.array(rows["PSCE"], float)
-    down = np.array(rows["PSCD"], float) if rows["PSCD"] else None
+    north, east, down = rows["PSCN"], rows["PSCE"], rows.get("PSCD")
     time = north[:, 0] * 1e-6
 
     def at(table: Any, column: int) -> Any:
@@ -81,45 +69,36 @@ def read_tlog(path: Path, options: Options, findings: Findings) -> list[Track]:
 
     All vehicles are stamped by the receiver's clock, so they share it; their positions are about their own origins.
     """
-    _, mavutil = _pymavlink(path)
-
-    try:
-        log = mavutil.mavlink_connection(str(path))
-    except Exception as fault:
-        raise RecordingError(f"{path}: is not a telemetry log: {type(fault).__name__}: {fault}") from fault
-    states: dict[int, list[Any]] = {}
-    wishes: dict[int, list[Any]] = {}
-    origins: dict[int, tuple[float, float, float]] = {}
-    kinds = ["LOCAL_POSITION_NED", "POSITION_TARGET_LOCAL_NED", "GPS_GLOBAL_ORIGIN"]
-    while (message := log.recv_match(type=kinds)) is not None:
-        who, when = message.get_srcSystem(), float(getattr(message, "_timestamp", 0.0))
-        if message.get_type() == "GPS_GLOBAL_ORIGIN":
-            origins[who] = (message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
-        elif message.get_type() == "LOCAL_POSITION_NED":
-            states.setdefault(who, []).append(
-                [when, message.y, message.x, -message.z, message.vy, message.vx, -message.vz]
-            )
-        else:
-            wishes.setdefault(who, []).append([when, message.vy, message.vx, -message.vz])
-        options.done(min(0.99, getattr(log, "percent", 0.0) / 100.0))
-    if not states:
+    _need_pymavlink(path)
+    told = Opening(path, how="telemetry").answer(options.done)
+    if "LOCAL_POSITION_NED" not in told:
         raise RecordingError(f"{path}: has no LOCAL_POSITION_NED; import the vehicles' own logs instead")
+    states = _by_vehicle(told, "LOCAL_POSITION_NED", (0, 2, 1, 3, 5, 4, 6), (1, 1, 1, -1, 1, 1, -1))
+    wishes = _by_vehicle(told, "POSITION_TARGET_LOCAL_NED", (0, 2, 1, 3), (1, 1, 1, -1))
+    origins = _by_vehicle(told, "GPS_GLOBAL_ORIGIN", (1, 2, 3), (1e-7, 1e-7, 1e-3))
     found = []
-    for who, rows in sorted(states.items()):
-        table = np.array(rows)
+    for who, table in sorted(states.items()):
         columns = dict(zip((*POSITION, *VELOCITY), table.T[1:].copy(), strict=True))
         if who in wishes:
-            ask = np.array(wishes[who])
+            ask = wishes[who]
             at = np.searchsorted(ask[:, 0], table[:, 0], side="right") - 1
             columns |= {n: np.where(at >= 0, ask[np.maximum(at, 0), c + 1], np.nan) for c, n in enumerate(COMMAND)}
         track = Track(f"vehicle_{who}", str(path), table[:, 0], columns, np.arange(len(table)), {}, "utc", datum="amsl")
-        track.origin = origins.get(who)
+        if who in origins:
+            latitude, longitude, height = (float(value) for value in origins[who][-1])
+            track.origin = (latitude, longitude, height)
         found.append(track)
     return found
 
 
-def _pymavlink(path: Path) -> Any:
-    try:
-        return import_module("pymavlink.DFReader"), import_module("pymavlink.mavutil")
-    except ImportError as fault:
-        raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'") from fault
+def _by_vehicle(told: Any, kind: str, columns: tuple[int, ...], factors: tuple[float, ...]) -> dict[int, Any]:
+    """Rows of each vehicle, of these columns (0: the time) times factors, in their order in the log."""
+    if kind not in told:
+        return {}
+    table = told[kind].values
+    return {int(who): table[table[:, 0] == who][:, 1:][:, columns] * factors for who in np.unique(table[:, 0])}
+
+
+def _need_pymavlink(path: Path) -> None:
+    if find_spec("pymavlink") is None:
+        raise RecordingError(f"{path}: ArduPilot logs need pymavlink (LGPL-3): pip install 'airflock[logs]'")

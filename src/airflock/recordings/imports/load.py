@@ -214,10 +214,18 @@ def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
     tracks = []
     for path in files:
         try:
-            tracks += registry.read(path, options, findings)
+            tracks += _placed(path, registry.read(path, options, findings))
         except RecordingError as fault:
             findings.faults += str(fault).splitlines()
         options.done(1.0)
+    return tracks
+
+
+def _placed(path: Path, tracks: list[Track]) -> list[Track]:
+    """Tracks that have a place at every time; raises RecordingError for one without."""
+    for track in tracks:
+        if not any(set(names) <= set(track.columns) for names in (POSITION[:2], GEODETIC[:2])):
+            raise RecordingError(f"{path}: {track.name} has no positions")
     return tracks
 
 

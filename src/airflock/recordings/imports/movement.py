@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import xarray as xr
 
@@ -11,28 +10,18 @@ from airflock.errors import RecordingError
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.arrays import read_idtracker
 from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
+from airflock.recordings.opened import Opening
 
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 
 
 def read_netcdf(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of a netCDF file of `movement`, or of trajectories.h5 of idtracker.ai."""
-    if path.suffix.lower() in (".h5", ".hdf5") and not _of_movement(path):
-        return read_idtracker(path, options, findings)
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            dataset = opened.load()
-    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
-        raise RecordingError(f"{path}: is not a netCDF file: {str(fault).splitlines()[0]}") from fault
-    return read_dataset(dataset, options, str(path))
-
-
-def _of_movement(path: Path) -> bool:
-    try:
-        with h5py.File(path, "r") as file:
-            return "position" in file
-    except OSError as fault:
-        raise RecordingError(f"{path}: is not a HDF5 file: {str(fault).splitlines()[0]}") from fault
+    if path.suffix.lower() in (".h5", ".hdf5"):
+        plain = Opening(path, how="hdf5").answer()
+        if "position" not in plain:
+            return read_idtracker(plain, path, options, findings)
+    return read_dataset(Opening(path, how="netcdf").answer(), options, str(path))
 
 
 def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") -> list[Track]:

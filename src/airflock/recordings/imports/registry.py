@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from airflock.doors import from_outside
 from airflock.errors import RecordingError
 from airflock.recordings.imports import arrays, dataflash, movement, tables, ulog
 from airflock.recordings.imports.track import Findings, Options, Track
@@ -38,4 +39,5 @@ def read(path: Path, options: Options, findings: Findings) -> list[Track]:
     if ending not in READERS:
         known = ", ".join(READERS)
         raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
-    return READERS[ending][1](path, options, findings)
+    with from_outside(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
+        return READERS[ending][1](path, options, findings)

@@ -1,0 +1,51 @@
+"""Pages of kinds: every fault and every topology with its rule and its numbers."""
+
+from inspect import getdoc, getsource
+from sys import modules
+
+from writing import key_table, plain, prose, put
+
+
+def faults() -> None:
+    """A section for each kind of fault: what it does, the rules that disturb a flight, its numbers."""
+    from airflock.core.fault import RULES
+    from airflock.faults.registry import KINDS
+    from airflock.scenarios.keys import sections
+
+    known = sections()
+    pieces = [
+        "# Kinds of fault\n\nThe entries of `[[faults]]`; [how to write them](../faults.md). Every entry may say when "
+        "it begins and ends, and whom it hits:\n\n",
+        key_table(known["faults"].keys),
+    ]
+    for name, kind in KINDS.items():
+        pieces.append(f'\n## kind = "{name}"\n\n{prose(kind.doc)}\n\n')
+        for stage, rule in kind.rules.items():
+            pieces.append(f"Its rule `{stage}` returns {RULES[stage][1]}.\n\n")
+            pieces.append(f"```python\n{getsource(rule)}```\n\n")
+        pieces.append(key_table(known[name].keys) if known[name].keys else "It has no numbers of its own.\n")
+    put("fault_kinds.md", "".join(pieces))
+
+
+def topologies() -> None:
+    """A section for each topology: what it means, its rule, the numbers that it reads."""
+    from airflock.scenarios.keys import sections
+    from airflock.topology.registry import TOPOLOGIES
+
+    pieces = [
+        "# Kinds of topology\n\nWhom an agent meets of those whom it hears; [the rules in full](../topology.md).\n"
+    ]
+    keys = sections()["topology"].keys
+    for name, topology in TOPOLOGIES.items():
+        pieces.append(f'\n## topology.kind = "{name}"\n\n')
+        if topology is None:
+            pieces.append("All whom it hears. It has no rule and no numbers.\n")
+            continue
+        module = modules[topology.meet.__module__]
+        code = getsource(topology.meet)
+        pieces.append(f"{prose(getdoc(module) or '')}\n\n```python\n{code}```\n\n")
+        whole = getsource(module)
+        read = [key for key in keys if f"t.{key.name.partition('.')[2]}" in whole]
+        pieces.append(key_table(read) if read else "It has no numbers.\n")
+    pieces.append(f"\n## All keys\n\n{plain(sections()['topology'].about)}\n\n{key_table(keys)}")
+    put("topologies.md", "".join(pieces))

@@ -1,0 +1,124 @@
+"""Breaks: each claim names a change under which it must turn red; here the changes are made and flown.
+
+A claim that no change could break would say nothing. Its `breaks` are keys of a scenario that are set in every flight
+of its part, or `sides = "exchanged"` for a difference that is taken the other way round. Both are flown with few
+seeds, as they are and changed: the bound has to hold before and fail after.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from airflock.errors import AirflockError
+from airflock_papers.claims import VERDICTS, Measured, judge
+from airflock_papers.flights import Flights, Progress, progress_bar
+from airflock_papers.paper import Paper
+from airflock_papers.statements import Statement, load
+from airflock_papers.statistics import Estimate
+
+GOOD = {kind: verdicts[0] for kind, verdicts in VERDICTS.items()}
+EXCHANGED = {"sides": "exchanged"}
+RED = "turned red"
+GREEN = "still holds"  # a claim that its own change does not break
+UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing
+
+
+class Break(NamedTuple):
+    """One claim under its change.
+
+    id, part : of the claim; change : what was set, in words; result : turned red, still holds, or does not hold with
+    so few flights
+    ours, changed : the measured value as it is, and under the change
+    """
+
+    id: str
+    part: str
+    change: str
+    result: str
+    ours: float
+    changed: float
+
+
+def fly(
+    paper: Paper,
+    *,
+    only: str | None = None,
+    seeds: int | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Break]:
+    """Make the change of each claim of a paper that names one, and judge it again.
+
+    only : one part; seeds : flights per number, else those of the quick form; threads : flights side by side
+    progress : called with (title, flights done, flights in all), else a bar
+
+    Raises AirflockError if the paper, or the part of it, has no claim with a change.
+    """
+    if progress is None:
+        with progress_bar() as bar:
+            return fly(paper, only=only, seeds=seeds, threads=threads, progress=bar)
+    return of(paper, load(paper.package).values(), only, Flights(True, seeds, threads, progress))
+
+
+def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights: Flights) -> list[Break]:
+    """The same of a paper and its statements; flights: how to fly."""
+    by_part: dict[str, list[Statement]] = {}
+    for statement in statements:
+        if statement.breaks:
+            by_part.setdefault(part_of(statement), []).append(statement)
+    chosen = {only: by_part.get(only, [])} if only else by_part
+    if not any(chosen.values()):
+        known = ", ".join(by_part) or "none"
+        raise AirflockError(f"{paper.title}: no claim of {only or 'it'} names a change; parts that do: {known}")
+    found = []
+    for part, members in chosen.items():
+        plain = _measured(paper, part, flights, {})
+        for changes in _different([statement.breaks for statement in members]):
+            if changes == EXCHANGED:
+                after = {key: replace(each, value=_mirrored(each.value)) for key, each in plain.items()}
+            else:
+                after = _measured(paper, part, flights, changes)
+            found += [_broken(s, part, plain[s.id], after[s.id]) for s in members if s.breaks == changes]
+    return found
+
+
+def _measured(paper: Paper, part: str, flights: Flights, changes: Mapping[str, Any]) -> dict[str, Measured]:
+    """Measurements of one part under changes, by id."""
+    told, progress = in_words(changes) or "as it is", flights.progress
+
+    def tell(title: str, done: int, total: int) -> None:
+        if progress:
+            progress(f"{part}, {told}: {title}", done, total)
+
+    return {found.id: found for found in paper.fly((part,), replace(flights, progress=tell, changes=changes))[0]}
+
+
+def part_of(statement: Statement) -> str:
+    """Part of the paper that measures a statement."""
+    return statement.part or statement.id.split(".")[0]
+
+
+def in_words(changes: Mapping[str, Any]) -> str:
+    """A change as one reads it: `model.p_rep = 0`, `model.r0_rep times 0.5`."""
+    return ", ".join(
+        f"{key} {v}" if isinstance(v, str) and v.startswith("times ") else f"{key} = {v}" for key, v in changes.items()
+    )
+
+
+def _different(found: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Each change once, in the order of the statements."""
+    return list({in_words(changes): changes for changes in found}.values())
+
+
+def _broken(statement: Statement, part: str, plain: Measured, after: Measured) -> Break:
+    """How a statement is judged as it is and under its change."""
+    alone = {statement.id: statement}
+    held, holds = (judge(alone, [each])[0].verdict == GOOD[statement.kind] for each in (plain, after))
+    result = UNSHOWN if not held else GREEN if holds else RED
+    return Break(statement.id, part, in_words(statement.breaks), result, plain.value.ours, after.value.ours)
+
+
+def _mirrored(value: Estimate) -> Estimate:
+    """A difference taken the other way round."""
+    low, high = (None if end is None else -end for end in (value.high, value.low))
+    return value._replace(ours=-value.ours, low=low, high=high)

@@ -1,0 +1,154 @@
+"""The paper's genetic algorithm on the paper's fitness, by seeds and under several readings; CMA-ES beside it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.evolve.cmaes import CMAES
+from airflock.evolve.genetic import decode, genetic
+from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task
+from airflock_papers.dimock_2003.units import Gains, gains
+
+LOST = 1e3  # W: loss of a controller that collides, or whose range of cohesion lies inside that of avoidance
+POPULATION, GENERATIONS = 50, 150
+SEEDS = (1, 2, 3)
+EARLY, MIDWAY = 5, 13  # generations of Figs 6 and 7
+Points = NDArray[np.float64]
+
+
+class Reading(NamedTuple):
+    """What the paper leaves open: what divides the weighted sums (Eq. 2), and the start of the V."""
+
+    centroid: str
+    start: Start
+
+    @property
+    def words(self) -> str:
+        """For a table."""
+        return f"{WEIGHTS[self.centroid]} weights, start ({self.start.sx:g}, {self.start.sy:g}) ft"
+
+
+WEIGHTS = {"others": "1/(n-1)", "n": "1/n"}
+READINGS = {
+    "mean": Reading("others", Start()),  # the prototype's
+    "near": Reading("others", Start(sx=5.0, sy=5.0)),  # the prototype's, tip to tip from the start
+    "n": Reading("n", Start()),  # those under which the published gains hold a V
+}
+
+
+@dataclass
+class Run:
+    """One run: by generation the best-ever and the mean power of the fit (W), share of K_a below 2 ft/s.
+
+    champions : the best-ever controller after each generation
+    flown     : flights; a controller that comes again is not flown again
+    flights   : of the best-ever after the paper's generations 5 and 13 and the last; full gradient of the last
+    """
+
+    reading: Reading
+    seed: int
+    best: list[float] = field(default_factory=list)
+    mean: list[float] = field(default_factory=list)
+    timid: list[float] = field(default_factory=list)
+    champions: list[Gains] = field(default_factory=list)
+    flown: int = 0
+    flights: dict[str, Flight] = field(default_factory=dict)
+
+    @property
+    def gains(self) -> Gains:
+        """The winner."""
+        return self.champions[-1]
+
+    def note(self, points: Points, losses: NDArray[np.float64]) -> None:
+        """One more generation: controllers (candidate, axis) in the unit cube, and their losses."""
+        fit = losses[losses < LOST]
+        i = int(np.argmin(losses))
+        better = not self.best or losses[i] < self.best[-1]
+        self.champions.append(gains(points[i]) if better else self.champions[-1])
+        self.best.append(float(losses[i]) if better else self.best[-1])
+        self.mean.append(float(fit.mean()) if fit.size else float("nan"))
+        self.timid.append(float(np.mean([gains(point).k_a < 2.0 for point in points])))
+
+
+@dataclass
+class Evolution:
+    """All runs of the genetic algorithm by the name of their reading, and of CMA-ES, seed by seed."""
+
+    runs: dict[str, list[Run]]
+    cmaes: list[Run]
+
+    @property
+    def winners(self) -> list[Gains]:
+        """Winners under the prototype's reading."""
+        return [run.gains for run in self.runs["mean"]]
+
+
+def evolve(birds: Birds, quick: bool = False) -> Evolution:
+    """Three readings and CMA-ES, three seeds each; quick: one seed, few generations."""
+    seeds, generations = (SEEDS[:1], 12) if quick else (SEEDS, GENERATIONS)
+    count, title = 0, "evolution"
+    total = len(seeds) * (len(READINGS) + 1)
+
+    def told(run: Run) -> Run:
+        nonlocal count
+        count += 1
+        if birds.progress:
+            birds.progress(title, count, total)
+        return run
+
+    runs = {
+        name: [told(with_genetic(birds, reading, seed, generations)) for seed in seeds]
+        for name, reading in READINGS.items()
+    }
+    return Evolution(runs, [told(with_cmaes(birds, READINGS["mean"], run.seed, run.flown)) for run in runs["mean"]])
+
+
+def with_genetic(birds: Birds, reading: Reading, seed: int, generations: int = GENERATIONS) -> Run:
+    """The paper's algorithm; the gradient holds the others' circulations, winners fly again with the full one."""
+    run = Run(reading, seed)
+    losses = losses_of(birds, run)
+    genetic(lambda bits: losses(decode(bits)), 50, population=POPULATION, generations=generations, seed=seed)
+    return _flown_again(birds, run)
+
+
+def with_cmaes(birds: Birds, reading: Reading, seed: int, flights: int, population: int = 20) -> Run:
+    """CMA-ES on the same fitness, for as many flights as the genetic algorithm took."""
+    run = Run(reading, seed)
+    losses, search = losses_of(birds, run), CMAES(5, population, seed)
+    while run.flown < flights and len(run.best) < flights // population:
+        points = search.ask()
+        search.tell(points, losses(points)[:, None])
+    return _flown_again(birds, run)
+
+
+def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]:
+    """Losses (W) of controllers (candidate, axis) of one generation: all that are new fly side by side."""
+    known: dict[bytes, float] = {}
+
+    def losses(points: Points) -> NDArray[np.float64]:
+        fresh = {point.tobytes(): gains(point) for point in points if point.tobytes() not in known}
+        inside = {key: found for key, found in fresh.items() if found.r_c >= found.r_a}
+        tasks = [Task(found, run.reading.start) for found in inside.values()]
+        flown = birds.fly("", tasks, centroid=run.reading.centroid)
+        run.flown += len(flown)
+        known.update(dict.fromkeys(fresh, LOST))
+        known.update((key, LOST if f.collided else f.power) for key, f in zip(inside, flown, strict=True))
+        every = np.array([known[point.tobytes()] for point in points])
+        run.note(points, every)
+        return every
+
+    return losses
+
+
+def _flown_again(birds: Birds, run: Run) -> Run:
+    last = len(run.best) - 1
+    moments = {"early": EARLY, "midway": MIDWAY, "final": last}
+    tasks = [Task(run.champions[min(at, last)], run.reading.start) for at in moments.values()]
+    flown = birds.fly("", tasks, centroid=run.reading.centroid)
+    run.flights = dict(zip(moments, flown, strict=True))
+    full = birds.fly("", tasks[-1:], centroid=run.reading.centroid, gradient="cells")[0]
+    run.flights["full gradient"] = full
+    return run

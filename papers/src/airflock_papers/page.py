@@ -1,0 +1,78 @@
+"""The committed page of a paper: claims.toml and README.md, its sentences first, other lines in tables of their own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from airflock import atomic
+from airflock_papers import claims as records
+from airflock_papers.claims import SEEDS, Claim
+
+
+@dataclass(frozen=True)
+class Section:
+    """Claims whose id begins with `start`, with words and pictures (names in figures/) above them."""
+
+    start: str
+    title: str
+    words: str = ""
+    pictures: tuple[str, ...] = ()
+
+
+def write(
+    folder: Path,
+    title: str,
+    command: str,
+    claims: Sequence[Claim],
+    sections: Sequence[Section],
+    about: str = "",
+    told: str = SEEDS,
+    names: tuple[str, str] = ("claims.toml", "README.md"),
+    more: Mapping[str, str] | None = None,
+) -> None:
+    """Write claims and page into a folder.
+
+    about : further words on top; told : which seeds were flown; names : of the files; more : keys of the header
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    records.write_claims(folder / names[0], claims, records.header(title, command, told=told) | dict(more or {}))
+    read = records.read_claims(folder / names[0])[1]  # so that both show the same rounded numbers
+    atomic.write(folder / names[1], page(title, command, read, sections, about))
+
+
+def page(title: str, command: str, claims: Sequence[Claim], sections: Sequence[Section], about: str = "") -> str:
+    """README.md of a paper."""
+    paper = [claim for claim in claims if claim.kind == "paper"]
+    lines = [f"# {title}", "", f"`{command}` computes this page again. {about}".strip(), ""]
+    if paper:
+        lines += [f"**{records.headline(claims)}.**", "", *_legend(claims)]
+    lines += _table("Not reproduced", [claim for claim in paper if claim.verdict == "not reproduced"])
+    for section in sections:
+        mine = [claim for claim in paper if claim.id.startswith(section.start) and claim.verdict != "not reproduced"]
+        pictures = [line for name in section.pictures for line in (f"![{name}](figures/{name}.png)", "")]
+        if mine or pictures or section.words:
+            lines += [f"## {section.title}", "", *([section.words, ""] if section.words else []), *pictures]
+            lines += [records.markdown(mine)] if mine else []
+    rest = [c for c in paper if c.verdict != "not reproduced" and not any(c.id.startswith(s.start) for s in sections)]
+    lines += _table("Other sentences", rest)
+    lines += _table("Agreement with the authors' program", [claim for claim in claims if claim.kind == "program"])
+    lines += _table("Ours: targets, extensions and findings", [claim for claim in claims if claim.kind == "ours"])
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _legend(claims: Sequence[Claim]) -> list[str]:
+    words = (
+        "A sentence counts as reproduced when the bound beside it holds for the quantity, the place and the time that "
+        "it names. Qualitative only: it names no number or sign that a bound could be taken from; our value is shown. "
+        "Every sentence of the paper, also those without a claim, stands in [sentences.csv](sentences.csv); quotes, "
+        "bounds and what would turn each red (`fails_if`) in [claims.toml](claims.toml)."
+    )
+    others = sum(claim.kind != "paper" for claim in claims)
+    return [
+        words + (f" {others} further lines, at the end, are not the paper's and are not counted." * bool(others)),
+        "",
+    ]
+
+
+def _table(title: str, claims: Sequence[Claim]) -> list[str]:
+    return [f"## {title}", "", records.markdown(claims)] if claims else []

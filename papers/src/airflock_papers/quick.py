@@ -1,0 +1,147 @@
+"""Quick: the small form of every page flown again; its verdicts must be those that are committed beside this file.
+
+A part that is done is kept in a folder with a hash of all texts that decide a flight, so that a run that was cut off
+goes on where it stopped. `python -m airflock_papers.quick` flies everything and commits what it finds.
+"""
+
+import csv
+import io
+import json
+import time
+from collections.abc import Callable, Iterable, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import NamedTuple
+
+from airflock import atomic
+from airflock.doors import TextError, json_object, read_text
+from airflock.errors import AirflockError
+from airflock_papers import PAPERS
+from airflock_papers.catalogue import find
+from airflock_papers.texts import texts
+
+COMMITTED = "quick.csv"
+LEFT_OUT = {("kidger", "cost"): "measures this machine", ("vasarhelyi_2018", "fig2"): "takes an hour"}
+EVERY = 10.0  # s between two lines of progress
+
+
+class Verdict(NamedTuple):
+    """Verdict on one claim in the small form."""
+
+    paper: str
+    part: str
+    id: str
+    verdict: str
+    ours: float
+
+
+class Changed(NamedTuple):
+    """A claim whose verdict is no longer the committed one; an empty verdict where it is not on one of the lists."""
+
+    paper: str
+    id: str
+    committed: str
+    found: str
+
+
+def parts() -> list[tuple[str, str]]:
+    """Papers and parts of the small form, in the order in which they fly."""
+    found = []
+    for name in PAPERS:
+        paper = find(name)
+        found += [(name, part) for part in paper.parts if (name, part) not in LEFT_OUT]
+    return found
+
+
+def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) -> list[Verdict]:
+    """Verdicts of every part; what is done is kept in the folder, with a log of the progress."""
+    folder.mkdir(parents=True, exist_ok=True)
+    now = texts()
+    found: list[Verdict] = []
+    todo = parts()
+    for number, (name, part) in enumerate(todo, 1):
+        path = folder / f"{name}.{part}.json"
+        kept = _kept(path, now)
+        if kept is None:
+            kept = _flown(name, part, threads, _teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}"))
+            atomic.write(path, json.dumps({"texts": now, "verdicts": kept}))
+        found += [Verdict(name, part, *row) for row in kept]
+    return found
+
+
+def _kept(path: Path, now: str) -> list[tuple[str, str, float]] | None:
+    """Rows of a part that was flown with these texts; of a file that is not there, or is damaged, none."""
+    try:
+        document = json_object(read_text(path))
+        return (
+            [(str(name), str(verdict), float(ours)) for name, verdict, ours in document["verdicts"]]
+            if (document.get("texts") == now)
+            else None
+        )
+    except (OSError, TextError, LookupError, TypeError, ValueError):
+        return None
+
+
+def _flown(
+    name: str, part: str, threads: int | None, tell: Callable[[str, int, int], None]
+) -> list[tuple[str, str, float]]:
+    paper = find(name)
+    claims = paper.run(only=part, quick=True, threads=threads, progress=tell)
+    return [(claim.id, claim.verdict, float(f"{claim.ours or 0.0:.4g}")) for claim in claims]
+
+
+def _teller(log: Path, say: Callable[[str], None], what: str) -> Callable[[str, int, int], None]:
+    """Progress as lines, to the log and to the caller, at most one every ten seconds."""
+    last = -EVERY
+
+    def tell(title: str, done: int, total: int) -> None:
+        nonlocal last
+        if time.monotonic() - last < EVERY:
+            return
+        last = time.monotonic()
+        line = f"{what}: {title}, {done} of {total}"
+        with log.open("a", encoding="utf-8") as file:
+            file.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {line}\n")
+        say(line)
+
+    return tell
+
+
+def committed() -> list[Verdict]:
+    """Verdicts that are committed.
+
+    Raises AirflockError if there are none.
+    """
+    try:
+        text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
+    except OSError as fault:
+        raise AirflockError(f"{COMMITTED}: {fault}; `python -m airflock_papers.quick` writes it") from fault
+    return [Verdict(**row | {"ours": float(row["ours"])}) for row in csv.DictReader(io.StringIO(text))]  # type: ignore[arg-type]
+
+
+def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed]:
+    """Claims whose verdicts differ, in their order."""
+    old = {(row.paper, row.id): row.verdict for row in before}
+    new = {(row.paper, row.id): row.verdict for row in after}
+    keys = list(old) + [key for key in new if key not in old]
+    return [Changed(*key, old.get(key, ""), new.get(key, "")) for key in keys if old.get(key, "") != new.get(key, "")]
+
+
+def write(rows: Sequence[Verdict], path: Path) -> None:
+    """Write verdicts as a table, complete or not at all."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(Verdict._fields)
+    table.writerows(rows)
+    atomic.write(path, text.getvalue())
+
+
+if __name__ == "__main__":
+    import argparse
+    import sys
+
+    parser = argparse.ArgumentParser(description="Fly the small form of every page and commit its verdicts.")
+    parser.add_argument("folder", type=Path, help="where what is done is kept")
+    asked = parser.parse_args()
+    rows = fly(asked.folder, lambda line: print(line, file=sys.stderr))  # noqa: T201
+    write(rows, Path(str(resources.files("airflock_papers"))) / COMMITTED)

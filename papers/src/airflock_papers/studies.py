@@ -1,0 +1,36 @@
+"""Evolutions behind claims: shipped studies, kept in Airflock's cache folder and continued where they were left."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from airflock.cache import cache_folder
+from airflock.evolve.after import Result
+from airflock.evolve.folder import STUDY, open_folder
+from airflock.evolve.run import executor_for, run
+from airflock.evolve.search import Progress
+from airflock.evolve.study import load_study
+from airflock_papers.flights import Flights
+
+QUICK = {"population": 12, "generations": 4, "pool": 24, "top": 4, "final_seeds": 10}
+
+
+def folder_of(name: str, number: int = 0, quick: bool = False) -> Path:
+    """Where a run of a study lies; number: of the run, which is its seed."""
+    return cache_folder() / "studies" / f"{name}_{number}{'_quick' if quick else ''}"
+
+
+def evolve(
+    flights: Flights, title: str, name: str, number: int = 0, settings: Mapping[str, Any] | None = None
+) -> Result:
+    """Result of a run of a shipped study, begun or continued; settings: keys of the scenario to change."""
+    search: dict[str, Any] = {"seed": number, **(QUICK if flights.quick else {})}
+    study = load_study(name, settings=settings, search=search)
+    folder = folder_of(name, number, flights.quick)
+    open_folder(folder, study, resume=(folder / STUDY).exists())
+
+    def watch(p: Progress) -> None:
+        if flights.progress:
+            flights.progress(title, p.done, p.total)
+
+    return run(study, folder, executor_for(study, threads=flights.threads), watch)

@@ -1,0 +1,27 @@
+"""Vásárhelyi et al., Science Robotics 3, eaat3536 (2018): optimised flocking of drones in confined environments.
+
+Parts: s2 (Table S2), fig1 (algorithm A against B), fig2 (range and delay), fig34 (outdoor flights), pressure (30 to
+1000 drones), tuning (what Tables S3 and S4 say of each parameter). Each part flies and measures; statements.toml says
+what the paper prints of it. And s1 (Table S1, the evolution itself), which takes hours and is flown only when it is
+asked for by name.
+"""
+
+from airflock_papers.paper import Paper, by_modules
+from airflock_papers.vasarhelyi_2018 import fig1, fig2, outdoor, pressure, table_s1, table_s2, tuning
+
+MODULES = {
+    "s1": table_s1,
+    "s2": table_s2,
+    "fig1": fig1,
+    "fig2": fig2,
+    "fig34": outdoor,
+    "pressure": pressure,
+    "tuning": tuning,
+}
+PAPER = Paper(
+    "Vásárhelyi et al. 2018, Optimized flocking of autonomous drones in confined environments",
+    __name__,
+    ("s2", "fig1", "fig2", "fig34", "pressure", "tuning"),
+    by_modules(MODULES),
+    long=("s1",),
+)

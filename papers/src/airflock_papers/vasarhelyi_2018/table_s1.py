@@ -1,0 +1,164 @@
+"""Table S1: the paper's evolution repeated, its optima and working ranges against ours.
+
+Long: three runs of 15,000 flights at 4, 6, 8 m/s, one at 16 and 32 m/s, so it is flown only when it is asked for by
+name. The studies lie in Airflock's cache folder and are continued where they were left. The search flies in coarser
+steps than the paper (`COARSE`); what is claimed of the optima is measured with the paper's own.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from airflock.evolve.after import Result
+from airflock.evolve.space import with_parameters
+from airflock_papers import statistics
+from airflock_papers.claims import Measured
+from airflock_papers.flights import Flights
+from airflock_papers.studies import evolve
+from airflock_papers.vasarhelyi_2018.published import REFIT, optimum
+
+RUNS = {4: 3, 6: 3, 8: 3, 16: 1, 32: 1}  # "at least three independent runs" at the first three speeds
+PAIRS = 400  # paired flights, ours against S1
+COARSE = {"dt": 0.05, "metrics.period": 1.0}  # our choice: changes a fitness by less than 0.005 and halves the time
+COLUMNS = (
+    "r0_rep",
+    "p_rep",
+    "r0_frict",
+    "c_frict",
+    "v_frict",
+    "p_frict",
+    "a_frict",
+    "r0_shill",
+    "v_shill",
+    "p_shill",
+    "a_shill",
+)
+
+
+class Data(NamedTuple):
+    """By speed: the result of every run, the best first; paired flights of its optimum, of S1, and of S1 refitted."""
+
+    runs: Mapping[int, list[Result]]
+    ours: Mapping[int, pd.DataFrame]
+    published: Mapping[int, pd.DataFrame]
+    refitted: Mapping[int, pd.DataFrame]
+
+
+def fly(flights: Flights, runs: Mapping[int, int] = RUNS) -> Data:
+    """All studies, and the paired flights; runs: independent runs by speed (m/s)."""
+    found = {
+        v: sorted(
+            (
+                evolve(flights, f"Table S1, evolution at {v} m/s, run {i + 1}", f"vasarhelyi_2018/{v}ms", i, COARSE)
+                for i in range(1 if flights.quick else several)
+            ),
+            key=lambda result: -result.fitness,
+        )
+        for v, several in runs.items()
+    }
+    pairs = flights.count(PAIRS, 20)
+    optima = {v: with_parameters(optimum(v), found[v][0].parameters) for v in found}
+    ours = flights.score("Table S1, our optima", optima, pairs)
+    published = flights.score("Table S1, published optima", {v: optimum(v) for v in found}, pairs)
+    fits = {v: optimum(v, REFIT[v]) for v in found if v in REFIT}
+    refitted = flights.score("Table S1, refitted inside its rounding", fits, pairs) if fits else pd.DataFrame()
+    return Data(
+        found,
+        {v: ours.loc[v] for v in found},
+        {v: published.loc[v] for v in found},
+        {v: refitted.loc[v] for v in fits},
+    )
+
+
+def measured(data: Data) -> list[Measured]:
+    """Everything that is said of the evolution."""
+    found = [_exponent(data, name) for name in ("r0_rep", "v_shill")] if len(data.runs) > 2 else []
+    for v, runs in data.runs.items():
+        ours, theirs, best = data.ours[v], data.published[v], runs[0]
+        p = {name: best.parameters[f"model.{name}"] for name in COLUMNS}
+        gap, reach = float(ours["r_min_mean"].mean()), optimum(v).radio.range
+        at = f"{v} m/s"
+        found += [
+            Measured(
+                f"s1.largest.{v}ms",
+                "fitness",
+                f"{at}, luckiest candidate",
+                statistics.one(max(run.largest for run in runs)),
+            ),
+            Measured(f"s1.mean.{v}ms", "fitness", at, statistics.mean(ours["fitness"])),
+            *gains(v, ours, theirs, data.refitted.get(v)),
+            Measured(
+                f"s1.soft.{v}ms",
+                "r0_rep over r_min_mean",
+                at,
+                statistics.one(p["r0_rep"] / gap),
+                f"r0_rep = {p['r0_rep']:.1f} m, nearest neighbours {gap:.1f} m apart",
+            ),
+            Measured(
+                f"s1.long.{v}ms",
+                "r0_frict over range",
+                at,
+                statistics.one(p["r0_frict"] / reach),
+                f"v_frict {p['v_frict'] / v:.2f} of v_flock",
+            ),
+            Measured(f"s1.twice.{v}ms", "v_shill over v_flock", at, statistics.one(p["v_shill"] / v)),
+            Measured(f"s1.count.{v}ms", "evaluations above the mean", at, statistics.one(best.above, best.candidates)),
+            *(
+                Measured(f"s1.range.{name}.{v}ms", f"evolved {name}", at, statistics.one(p[name]), _range(best, name))
+                for name in COLUMNS
+            ),
+            *([_alike(v, runs)] if len(runs) > 1 else []),
+        ]
+    return found
+
+
+def gains(v: int, ours: pd.DataFrame, printed: pd.DataFrame, refitted: pd.DataFrame | None) -> list[Measured]:
+    """Fitness of our optimum less that of Table S1, as printed and refitted, with and without F_wall.
+
+    Paired: all fly the same seeds.
+    """
+    found = []
+    for name, at, theirs in (("", "paired", printed), (".refit", "paired, S1 refitted", refitted)):
+        if theirs is None:
+            continue
+        pairs = {"": ours["fitness"] - theirs["fitness"], ".no_wall": without_wall(ours) - without_wall(theirs)}
+        for wall, gap in pairs.items():
+            words = f"{v} m/s, {at}" + ", without F_wall" * bool(wall)
+            found.append(Measured(f"s1.gain{name}{wall}.{v}ms", "fitness", words, statistics.mean(gap)))
+    return found
+
+
+def without_wall(scores: pd.DataFrame) -> pd.Series:
+    """Fitness of flights as if nobody had left the arena."""
+    return scores[["f_speed", "f_coll", "f_disc", "f_cluster", "f_corr"]].prod(axis=1)
+
+
+def _range(best: Result, name: str) -> str:
+    low, high = best.ranges[f"model.{name}"]
+    return f"our working range {low:.3g} to {high:.3g}"
+
+
+def _exponent(data: Data, name: str) -> Measured:
+    """Exponent of the flocking speed with which an evolved parameter grows; 1 is linear through 0."""
+    speeds = np.log(list(data.runs))
+    values = np.log([runs[0].parameters[f"model.{name}"] for runs in data.runs.values()])
+    fit = stats.linregress(speeds, values)
+    half = float(stats.t.ppf(0.975, len(speeds) - 2)) * fit.stderr
+    value = statistics.Estimate(fit.slope, None, fit.slope - half, fit.slope + half, len(speeds))
+    return Measured(f"s1.linear.{name}", f"exponent of {name}", "optima of all speeds", value)
+
+
+def _alike(v: int, runs: Sequence[Result]) -> Measured:
+    """Fitness of the best run less that of the worst."""
+    values = [result.fitness for result in runs]
+    printed = optimum(v).parameters
+    walls = ", ".join(
+        f"{name} {', '.join(f'{run.parameters[key]:.3g}' for run in runs)} (printed {getattr(printed, name):g})"
+        for name, key in (("v_shill", "model.v_shill"), ("a_shill", "model.a_shill"))
+    )
+    note = f"fitness {', '.join(f'{value:.3f}' for value in values)}; {walls}"
+    apart = statistics.one(max(values) - min(values), len(runs))
+    return Measured(f"s1.alike.{v}ms", "spread of runs", f"{v} m/s, {len(runs)} runs", apart, note)

@@ -1,0 +1,67 @@
+"""Schedule: the order of a step, which every driver reads.
+
+A step of a flight is a row of events. Each has stages, which run one after another, and is due at every step or at
+every so-manieth. `stages.flight` is the same as a function; kernels and cells take their stages from here.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from airflock.engine.passes.slots import sorted_by_cells
+from airflock.engine.plan import Plan
+
+
+@dataclass(frozen=True)
+class Event:
+    """What is done together in a step.
+
+    stages : in their order
+    every  : integer of a world: steps from one time to the next; empty: at each step
+    """
+
+    stages: tuple[str, ...]
+    every: str = ""
+
+
+ORDER: Mapping[str, Event] = {
+    "send": Event(("snapshot",), "decide_every"),  # ahead of the decision by the delay
+    "world": Event(("aim_", "glide_", "appear_")),
+    "decide": Event(
+        ("perceive", "tune", "neighbours", "rearrange", "boundaries", "flock", "decide", "stop", "overrule"),
+        "decide_every",
+    ),
+    "watch": Event(("measure_collision",), "collide_every"),
+    "sample": Event(("measure_sample",), "sample_every"),
+    "move": Event(("move",)),
+}
+AT_ONCE = ("perceive", "tune", "rearrange", "flock")  # for all agents: not where one after another decides and moves
+NEEDED: Mapping[str, Callable[[Plan], bool]] = {
+    "snapshot": lambda plan: plan.late,
+    "aim_": lambda plan: plan.goals,
+    "glide_": lambda plan: plan.own,
+    "appear_": lambda plan: plan.scene,
+    "tune": lambda plan: bool(plan.suffers("radio", "clock")),
+    "neighbours": lambda plan: plan.model.neighbour is not None,
+    "rearrange": sorted_by_cells,
+    "boundaries": lambda plan: plan.model.boundary is not None,
+    "flock": lambda plan: plan.model.flock is not None,
+    "stop": lambda plan: plan.silent,
+    "overrule": lambda plan: bool(plan.suffers("overrule")),
+    "measure_collision": lambda plan: any(metric.clock == "collision" for metric in plan.metrics),
+    "measure_sample": lambda plan: any(metric.clock == "sample" for metric in plan.metrics),
+}
+
+
+def order(plan: Plan) -> dict[str, tuple[str, ...]]:
+    """Stages of each event that a plan has, in the order of a step."""
+
+    def needed(stage: str) -> bool:
+        return stage not in NEEDED or NEEDED[stage](plan)
+
+    return {name: tuple(stage for stage in event.stages if needed(stage)) for name, event in ORDER.items()}
+
+
+def in_turn(plan: Plan) -> tuple[str, ...]:
+    """What each agent in turn does in a sequential step."""
+    events = order(plan)
+    return tuple(stage for stage in (*events["decide"], *events["move"]) if stage not in AT_ONCE)

@@ -1,0 +1,160 @@
+"""Clusters: who is linked to whom, one agent after another, and the rules of an order parameter over each cluster.
+
+A cluster grows from its first agent, which is expanded, then the next of its members, until all are. `state` is 0 of an
+agent that nobody has reached, 1 of one in the cluster that grows, 2 of one in an earlier cluster; `expanded` is 1 of
+those whose links have been looked at.
+"""
+
+import math
+from typing import Any
+
+from airflock.core.contract import Metric
+from airflock.core.vocabulary import Mean
+from airflock.engine.plan import Plan
+from airflock.engine.stages.measure import add, clear, filled, found, means, moving, offset
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import (
+    ONE,
+    ZERO,
+    X,
+    Y,
+    Z,
+    ask,
+    integer,
+    real,
+    totals,
+    vector,
+    wants,
+)  # fmt: skip
+
+
+def expand(e: int, state: Any, expanded: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric) -> Any:
+    """Take whoever is linked to agent e, and in no cluster yet, into the cluster that grows; returns how many."""
+    own = vector()
+    for a in range(plan.dimensions):
+        own[a] = flock.position[a][e]
+    expanded[e] = 1
+    fresh = integer(0)
+    for j in range(n):
+        d = vector()
+        r2 = offset(d, own, flock.position, j, numbers.w, plan=plan)
+        r = math.sqrt(r2)
+        joins = integer(ask(metric.linked, r=r, r2=r2, q=numbers.q) & (state[j] == 0))
+        state[j] |= joins
+        fresh += joins
+    return fresh
+
+
+def unexpanded(state: Any, expanded: Any, n: int) -> Any:
+    """The first member of the cluster that grows whose links have not been looked at; -1 if there is none."""
+    e = -1
+    for j in range(n):
+        if state[j] == 1 and expanded[j] == 0:
+            e = j
+            break
+    return e
+
+
+def grown(
+    first: int, done: int, state: Any, expanded: Any, flock: Flock, numbers: Any, n: int, *, plan: Plan, metric: Metric
+) -> Any:
+    """Let the cluster of agent `first` grow, where earlier ones hold `done` agents; returns how many it holds."""
+    state[first] = 1
+    size = 1
+    e = first
+    while e >= 0:
+        fresh = expand(e, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+        size += fresh
+        if done + size == n:
+            break
+        e = unexpanded(state, expanded, n)
+    return size
+
+
+def member(i: int, mean: Any, flock: Flock, numbers: Any, *, metric: Metric) -> Any:
+    """What the member rule of a metric says of agent i; mean : over its cluster."""
+    pair = found(metric.Pair, flock.pair, i, metric) if wants(metric.member, "pair") else None
+    return ask(metric.member, **moving(i, flock), pair=pair, mean=mean, q=numbers.q)
+
+
+def mean_over(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, metric: Metric) -> Any:
+    """Means of a cluster of so many members, from sums, where a rule for members asks for them; else of the flock."""
+    return (
+        Mean(*means(s, size, plan=plan), *means(v, size, plan=plan), *means(h, size, plan=plan), real(size))  # type: ignore[call-arg]
+        if metric.member is not None
+        else mean
+    )
+
+
+def mean_of(size: int, mean: Any, state: Any, flock: Flock, n: int, *, plan: Plan, metric: Metric) -> Any:
+    """Means of the cluster that has grown, which has so many members; those of the flock where no rule is for them."""
+    cs, cv, ch = vector(), vector(), vector()
+    if metric.member is not None:
+        for total in (cs, cv, ch):
+            for a in range(plan.dimensions):
+                total[a] = ZERO
+        for j in range(n):
+            if state[j] == 1:
+                for total, row in ((cs, flock.position), (cv, flock.velocity), (ch, flock.heading)):
+                    for a in range(plan.dimensions):
+                        total[a] = total[a] + row[a][j]
+    return mean_over(size, cs, cv, ch, mean, plan=plan, metric=metric)
+
+
+def members_of(mean: Any, state: Any, flock: Flock, numbers: Any, n: int, *, metric: Metric) -> Any:
+    """Sum the member rule of a metric over the cluster that has grown."""
+    k = totals()
+    if metric.member is not None:
+        clear(k, metric.Member, metric)
+        for j in range(n):
+            if state[j] == 1:
+                t = member(j, mean, flock, numbers, metric=metric)
+                add(k, t, metric.Member, metric)
+    return filled(metric.Member, k) if metric.member is not None else None
+
+
+def clusters_of(
+    metric: Metric, mean: Any, flock: Flock, numbers: Any, n: int, m: int, labels: Any, *, plan: Plan
+) -> Any:
+    """Sum the cluster rule of a metric over all clusters.
+
+    labels : two rows of integers: `state` and `expanded`
+    """
+    axes, h = range(plan.dimensions), flock.heading
+    u = totals()
+    if metric.cluster is not None:
+        state = labels[0]
+        expanded = labels[1]
+        clear(u, metric.Cluster, metric)
+        for i in range(m):
+            state[i] = 0
+            expanded[i] = 0
+        done = 0
+        first = 0
+        while done < n:
+            while state[first] != 0:
+                first += 1
+            size = grown(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
+            heads = vector()
+            for a in axes:
+                heads[a] = ZERO
+            hh = ZERO
+            for j in range(n):
+                inside = ONE if state[j] == 1 else ZERO
+                for a in axes:
+                    heads[a] = heads[a] + inside * h[a][j]
+                hh += inside * sum(h[a][j] * h[a][j] for a in axes)
+                if metric.member is None:
+                    state[j] = integer(2) if state[j] != 0 else integer(0)
+            own_mean = mean_of(size, mean, state, flock, n, plan=plan, metric=metric)
+            members = members_of(own_mean, state, flock, numbers, n, metric=metric)
+            if metric.member is not None:
+                for j in range(n):
+                    state[j] = integer(2) if state[j] != 0 else integer(0)
+            done += size
+            t = ask(
+                metric.cluster, n=real(size), hx=heads[X], hy=heads[Y], hz=heads[Z], hh=hh, members=members,
+                mean=own_mean, q=numbers.q,
+            )  # fmt: skip
+            add(u, t, metric.Cluster, metric)
+    return filled(metric.Cluster, u) if metric.cluster is not None else None

@@ -1,0 +1,176 @@
+"""Flight: the order of a step, and of a recording that is measured; what a step is made of are the other stages."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from airflock.core.contract import Metric
+from airflock.engine.plan import Plan
+from airflock.engine.stages.measure import Measured
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import HALF, ONE, ZERO, ask, most, real
+
+Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks for, of the rest it knows
+Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
+Sampled = Iterable[tuple[int, str]]  # places among all values, and how they add up over time
+EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
+SLACK = 0.01  # m, covers the rounding of positions in single precision
+
+
+def add_up(sums: Any, values: Any, sampled: Sampled, count: int) -> None:
+    """Add the values of one instant to the sums over time; sums[count] counts instants."""
+    for c, way in sampled:
+        if way in ("mean", "sum"):
+            sums[c] += values[c]
+        else:
+            sums[c] = min(sums[c], values[c]) if way == "min" else max(sums[c], values[c])
+    sums[count] += 1
+
+
+def width(metrics: tuple[Metric, ...], q: Any) -> Any:
+    """Distance beyond which no metric has anything to say of a pair, m."""
+    return most(width(metrics[:-1], q), ask(metrics[-1].within, q=q)) if metrics else ZERO
+
+
+def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
+    """Put what metrics remember back to its start."""
+    for one in metrics:
+        for c, start in enumerate(getattr(one.metric.Memory, "_field_defaults", {}).values()):
+            for i in range(n):
+                memory[one.row + c, i] = float(start)
+
+
+def record(flock: Flock, frames: Any, frame: int, n: int, *, plan: Plan) -> None:
+    """Keep positions, velocities and commands as a frame: frames[frame, component, agent]."""
+    rows = (flock.position, flock.velocity, flock.command)
+    for i in range(n):
+        for part, row in enumerate(rows):
+            for a in range(plan.dimensions):
+                frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
+
+
+def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
+    """Each agent in turn meets its neighbours, decides and moves, so that the next one sees it there.
+
+    Returns the largest squared speed.
+    """
+    fastest = ZERO
+    for i in range(n):
+        for name in order[:-1]:
+            ask(stages[name], i=i)
+        fastest = most(fastest, ask(stages[order[-1]], i=i))
+    return fastest
+
+
+def advance(  # noqa: C901 - tests of the plan leave one way through
+    first: int, last: int, half: int, held: Any, flock: Flock, numbers: Any, whole: Any, n: int, m: int, past: Any,
+    memory: Any, values: Any, sums: Any, frames: Any,
+    *, plan: Plan, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
+    watched: tuple[Measured, ...], collided: int, slots: bool,
+) -> int:  # fmt: skip
+    """Fly the steps first to last - 1; returns the next one, or minus the first agent (from 1) that found no room.
+
+    half, held : as `passes.driver.flight` says
+    past       : states that are not heard yet, by slot, component and agent
+    sampled    : by stage: values that it samples, and which of the sums counts its instants
+    watched    : metrics that look for collisions, if all of them promise a distance beyond which there are none
+    collided   : place of the value that ends a flight, where a scenario says so
+    slots      : whether agents lie in slots
+    """
+    late = real(whole.delay) * numbers.c.dt
+    if held[4] < HALF:
+        status = ask(stages["begin"])
+        if status < 0:
+            return status  # type: ignore[no-any-return]
+        if slots:
+            for i in range(m):
+                flock.number[i] = i
+        if order["send"]:
+            for slot in range(whole.ring):
+                ask(stages["snapshot"], slot=slot, ring=past)
+        held[4] = ONE
+    travelled = held[0]
+    gap = held[1]
+    calm = held[2] > HALF
+    fastest = ZERO
+    following = last
+    for step in range(first, last):
+        time = real(step) * numbers.c.dt
+        if plan.sequential or (step != first) | (half & 1 == 0):
+            for name in order["send"]:
+                if (step + whole.delay) % whole.decide_every == 0:
+                    ask(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
+            for name in order["world"]:
+                ask(stages[name], time=time, elapsed=numbers.c.dt)
+            if not plan.sequential and step % whole.decide_every == 0:
+                k = step // whole.decide_every
+                for name in order["decide"]:
+                    if name != "rearrange" or k % EVERY == 0:
+                        ask(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
+        # where agents take turns, who senses and who moves alternate: there is no place to cut a step
+        if not plan.sequential and half & 2 != 0:
+            break
+        for name in order["watch"]:
+            if step % whole.collide_every == 0:
+                if watched and travelled < gap:  # nobody can have come near enough since pairs were last looked at
+                    sums[sampled[name][1]] += 1
+                    if not calm:
+                        forget(watched, memory, n)
+                        calm = True
+                elif watched:
+                    near = ask(stages[name], time=time)
+                    add_up(sums, values, *sampled[name])
+                    gap = near - width(tuple(one.metric for one in watched), numbers.q) - SLACK
+                    travelled = ZERO
+                    calm = False
+                else:
+                    ask(stages[name], time=time)
+                    add_up(sums, values, *sampled[name])
+        if plan.stop and values[collided] > HALF:
+            held[3] = ONE
+            following = step
+            break
+        if (order["sample"] or plan.record) and step % whole.sample_every == 0:
+            for name in order["sample"]:
+                ask(stages[name], time=time)
+                add_up(sums, values, *sampled[name])
+            if plan.record:
+                frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
+                record(flock, frames, frame, n, plan=plan)
+        if step < whole.steps:
+            fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
+            travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt
+    held[0] = travelled
+    held[1] = gap
+    held[2] = ONE if calm else ZERO
+    return following
+
+
+def measure_frames(
+    first: int, flock: Flock, whole: Any, n: int, values: Any, sums: Any, frames: Any, series: Any, frame_period: float,
+    *, plan: Plan, stages: Stages, order: Order, sampled: Mapping[str, tuple[Sampled, int]],
+) -> int:  # fmt: skip
+    """Measure a recording, whose first frame has the number `first`: the values of each frame to `series`.
+
+    frame_period : s
+    """
+    for step in range(first, first + frames.shape[0]):
+        time = real(step) * frame_period
+        for i in range(n):
+            for a in range(plan.dimensions):
+                flock.position[a][i] = frames[step - first, a, i]
+            for a in range(plan.dimensions):
+                flock.velocity[a][i] = frames[step - first, plan.dimensions + a, i]
+        for name in order["world"]:
+            ask(stages[name], time=time, elapsed=frame_period)
+        for name in order["watch"]:
+            if step % whole.collide_every == 0:
+                ask(stages[name], time=time)
+                add_up(sums, values, *sampled[name])
+        for name in order["sample"]:
+            if step % whole.sample_every == 0:
+                ask(stages[name], time=time)
+                add_up(sums, values, *sampled[name])
+        for c in range(len(values)):
+            series[step, c] = values[c]
+    return 0

@@ -1,0 +1,244 @@
+"""Measure: the rules of order parameters at one instant, for pairs, for agents, for clusters and for the flock."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from airflock.core.contract import Metric
+from airflock.core.maths import norm
+from airflock.core.vocabulary import Mean
+from airflock.engine.plan import Plan
+from airflock.engine.stages.scene import contacts
+from airflock.engine.stages.state import Axes, Flock
+from airflock.engine.stages.words import (
+    FAR,
+    ONE,
+    SIDES,
+    START,
+    TINY,
+    ZERO,
+    X,
+    Y,
+    Z,
+    ask,
+    choose,
+    fields,
+    integer,
+    least,
+    real,
+    reduced,
+    totals,
+    vector,
+    wants,
+)  # fmt: skip
+from airflock.world.edges import nearest_image
+
+
+class Measured(NamedTuple):
+    """An order parameter that is measured, and where its numbers lie.
+
+    value : the first of its values among those of all
+    row   : the first row of what it remembers in the table of what all remember
+    total : the first of what it sums up over pairs, among those of all with the same clock
+    """
+
+    metric: Metric
+    value: int
+    row: int
+    total: int
+
+
+def means(total: Any, n: int, *, plan: Plan) -> Any:
+    """Mean of a vector over n agents, from its sum."""
+    return [total[a] / real(n) if a < plan.dimensions else ZERO for a in (X, Y, Z)]
+
+
+def headings(flock: Flock, n: int, *, plan: Plan) -> Any:
+    """Speed and heading of each agent; returns the means of the flock."""
+    axes, x, v, h = range(plan.dimensions), flock.position, flock.velocity, flock.heading
+    for i in range(n):
+        flock.speed[i] = norm(v[X][i], v[Y][i], v[Z][i])
+        f = ONE / flock.speed[i]
+        for a in axes:
+            h[a][i] = f * v[a][i]
+    s, sv, sh = vector(), vector(), vector()
+    for total in (s, sv, sh):
+        for a in axes:
+            total[a] = ZERO
+    for i in range(n):
+        for total, row in ((s, x), (sv, v), (sh, h)):
+            for a in axes:
+                total[a] = total[a] + row[a][i]
+    return Mean(*means(s, n, plan=plan), *means(sv, n, plan=plan), *means(sh, n, plan=plan), real(n))  # type: ignore[call-arg]
+
+
+def names_of(record: Any) -> tuple[str, ...]:
+    """Names of the fields of a record."""
+    return tuple(record._fields)
+
+
+def ways(record: Any, metric: Metric) -> list[str]:
+    """How each field of a record of a metric adds up: sum, min or max."""
+    return [metric.reduce.get(name, "sum") for name in names_of(record)]
+
+
+def clear(total: Any, record: Any, metric: Metric) -> None:
+    """Totals of a record before its first term."""
+    for c, way in enumerate(ways(record, metric)):
+        total[c] = START[way]
+
+
+def add(total: Any, t: Any, record: Any, metric: Metric) -> None:
+    """Add what a rule returns to the totals of a record."""
+    for c, way in enumerate(ways(record, metric)):
+        total[c] = reduced(way, total[c], t[c])
+
+
+def filled(record: Any, total: Any) -> Any:
+    """A record of totals."""
+    return record(*[total[c] for c in fields(record)])
+
+
+def found(record: Any, columns: Callable[[str, str], Any], i: int, metric: Metric) -> Any:
+    """A record of agent i from columns that a rule of a metric has filled."""
+    return record(*[columns(metric.name, name)[i] for name in names_of(record)])
+
+
+def offset(d: Any, own: Any, x: Axes, j: int, w: Any, *, plan: Plan) -> Any:
+    """Put the offset from a place to agent j into the vector d, m; returns its square."""
+    for a in range(plan.dimensions):
+        d[a] = x[a][j] - own[a]
+    if plan.periodic:
+        for a in range(plan.dimensions):
+            d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+    return sum(d[a] * d[a] for a in range(plan.dimensions)) + TINY
+
+
+def pairs(  # noqa: C901 - tests of the plan leave one way through
+    flock: Flock, numbers: Any, n: int, m: int, *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool
+) -> Any:
+    """Sum the pair rules of all metrics over the others of each agent; returns the least squared distance, m².
+
+    nearest : whether the least distance is asked for. Only then: two minima of the same squares in one loop are not
+              vectorised (7 times slower)
+    """
+    axes, x = range(plan.dimensions), flock.position
+    paired = [one for one in metrics if one.metric.pair is not None]
+    least2 = FAR
+    nn = integer(n)
+    if paired:
+        for i in range(n):
+            ii = integer(i)
+            own, sums = vector(), totals()
+            for a in axes:
+                own[a] = x[a][i]
+            for metric, _, _, first in paired:
+                for c, way in enumerate(ways(metric.Pair, metric)):
+                    sums[first + c] = START[way]
+            near2 = FAR
+            for j in range(m):
+                d = vector()
+                r2 = offset(d, own, x, j, numbers.w, plan=plan)
+                r = math.sqrt(r2)
+                ok = (integer(j) != ii) & (integer(j) < nn)
+                for metric, _, _, first in paired:
+                    t = ask(
+                        metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
+                        lower=(ONE if integer(j) < ii else ZERO),
+                    )  # fmt: skip
+                    for c, way in enumerate(ways(metric.Pair, metric)):
+                        sums[first + c] = reduced(way, sums[first + c], choose(ok, t[c], START[way]))
+                if nearest:
+                    near2 = least(near2, choose(ok, r2, FAR))
+            for metric, _, _, first in paired:
+                for c, name in enumerate(names_of(metric.Pair)):
+                    flock.pair(metric.name, name)[i] = sums[first + c]
+            if nearest:
+                least2 = least(least2, near2)
+    return least2
+
+
+def remembered(record: Any, memory: Any, row: int, i: int) -> Any:
+    """A record of agent i from the rows of a table, from one on."""
+    return record(*[memory[row + c, i] for c in fields(record)])
+
+
+def moving(i: int, flock: Flock) -> Any:
+    """Of agent i what every rule may ask for: position, velocity, heading and speed."""
+    return {
+        "x": flock.position[X][i], "y": flock.position[Y][i], "z": flock.position[Z][i], "speed": flock.speed[i],
+        "vx": flock.velocity[X][i], "vy": flock.velocity[Y][i], "vz": flock.velocity[Z][i],
+        "hx": flock.heading[X][i], "hy": flock.heading[Y][i], "hz": flock.heading[Z][i],
+    }  # fmt: skip
+
+
+def judged(
+    i: int, pair: Any, shared: Any, kept: Any, mean: Any, flock: Flock, numbers: Any, *, metric: Metric
+) -> Any:  # fmt: skip
+    """What the agent rule of a metric says of agent i; and, where it remembers, what it is to remember."""
+    return ask(
+        metric.agent, **moving(i, flock), excursion=flock.excursion[i], touches=flock.touches[i], rays=flock.rays[i],
+        pair=pair, shared=shared, memory=kept, mean=mean, wing=numbers.wing, q=numbers.q,
+    )  # fmt: skip
+
+
+def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n: int, memory: Any) -> Any:
+    """Sum the agent rule of a metric over all agents.
+
+    mean        : over the flock
+    memory, row : table of what metrics remember, by row and agent, and the first row of this one
+    """
+    total = totals()
+    if metric.agent is not None:
+        clear(total, metric.Agent, metric)
+        for i in range(n):
+            pair = found(metric.Pair, flock.pair, i, metric) if wants(metric.agent, "pair") else None
+            shared = found(metric.Shared, flock.shared, i, metric) if wants(metric.agent, "shared") else None
+            if wants(metric.agent, "memory"):
+                before = remembered(metric.Memory, memory, row, i)
+                t, kept = judged(i, pair, shared, before, mean, flock, numbers, metric=metric)
+                for c in fields(metric.Memory):
+                    memory[row + c, i] = kept[c]
+            else:
+                t = judged(i, pair, shared, None, mean, flock, numbers, metric=metric)
+            add(total, t, metric.Agent, metric)
+    return filled(metric.Agent, total) if metric.agent is not None else None
+
+
+def measure(
+    flock: Flock, numbers: Any, whole: Any, time: float, n: int, m: int, edges: Any, spans: Any, scene: Any,
+    memory: Any, labels: Any, values: Any, excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
+    clustered: Mapping[str, Callable[..., Any]],
+    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
+) -> Any:  # fmt: skip
+    """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
+
+    memory, labels : what metrics remember, by row and agent; two rows of integers, scratch
+    excursion      : the stage of this name
+    survey         : runs the rule of the whole flock of a metric, by its name, where it has one
+    clustered      : finds its clusters
+    nearest        : whether the least distance is asked for
+    """
+    x = flock.position
+    mean = headings(flock, n, plan=plan)
+    least2 = pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest)
+    if any(wants(one.metric.agent, "excursion") for one in metrics):
+        for i in range(n):
+            flock.excursion[i] = excursion(
+                x[X][i], x[Y][i], x[Z][i], numbers.w, edges, spans, whole.corners, whole.obstacles, scene
+            )
+    if any(wants(one.metric.agent, "touches") for one in metrics):
+        contacts(flock, numbers, n, scene, plan=plan)
+    for one in metrics:
+        if one.metric.survey is not None:
+            survey[one.metric.name]()
+    for metric, value, row, _ in metrics:
+        agents = agents_of(metric, row, mean, flock, numbers, n, memory)
+        clusters = clustered[metric.name](metric, mean, flock, numbers, n, m, labels, plan=plan)
+        t = ask(
+            metric.sample, n=real(n), mean=mean, agents=agents, clusters=clusters, dimensions=real(plan.dimensions),
+            time=time, q=numbers.q,
+        )  # fmt: skip
+        for c in fields(metric.Sample):
+            values[value + c] = t[c]
+    return math.sqrt(least2)

@@ -1,0 +1,278 @@
+"""Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
+
+Processes wait behind a ready barrier: each says that it is there, and only when all have does the clock start. There
+is no time-out: a process that ends before is told in a line, and ends the fleet.
+"""
+
+import asyncio
+import hashlib
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
+from multiprocessing.connection import wait
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.core.agent import State
+from airflock.errors import LinkError, ScenarioError
+from airflock.fleet.faults import Fault
+from airflock.fleet.live import NEVER, WARM, Life, Plan, Ports, Watched, craft_life, ether_life, node_life
+from airflock.fleet.starting import READY_TIME, Station, lift_of
+from airflock.mavlink.orders import Do
+from airflock.onboard.card import Card
+from airflock.onboard.mission import Phase
+from airflock.scenarios.scenario import Scenario
+
+MODES = ("lockstep", "tasks", "processes")
+JOIN = ("127.0.0.1", 14540)  # where PX4's simulator calls its first client
+AGAIN = 2.0  # s between two orders to start
+STARTS = 60.0  # s in which all must have armed
+HOME = 600.0  # s in which all must have landed
+LONG = 1e6  # s; longer than anybody waits
+WATCH = 0.1  # s between two looks of whoever watches
+ENDED = "a process of the fleet ended with status {}"
+Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
+OURSELVES = 0  # place of the ether among the lives
+
+
+class Load(NamedTuple):
+    """What a fleet on the real clock cost, and how late it was.
+
+    cores : processor time of all per second; nodes, vehicles: of these (with the ether), where they are processes
+    ticks, late, worst : of all nodes: how many, how many late by more than half a period, by how much at most (s)
+    others : load of this computer (processes that want a processor, one minute) when the flight ended
+    """
+
+    cores: float
+    nodes: float | None
+    vehicles: float | None
+    ticks: int
+    late: int
+    worst: float
+    others: float
+
+
+class Flown:
+    """A fleet that has flown on the real clock; recorded like one in lock-step."""
+
+    def __init__(self, plan: Plan, lives: Sequence[Life], load: Load):
+        self.scenario, self.card, self.seed, self.faults, self.load = (
+            plan.scenario,
+            plan.card,
+            plan.seed,
+            plan.faults,
+            load,
+        )
+        count = len(plan.card.members)
+        self._nodes, self._crafts = lives[1 : 1 + count], lives[1 + count :]
+        self.log = sorted((t - plan.clock[0], who, note) for life in self._nodes for t, who, note in life.notes)
+
+    @property
+    def lift(self) -> float:
+        """Height (m) above the site at which the law counts zero."""
+        return lift_of(self.card)
+
+    def _frames(self) -> int:
+        return min(len(life.rows) for life in self._crafts)
+
+    def array(self) -> NDArray[np.float64]:
+        """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
+        frames = [
+            [(*craft.rows[k], *_at(node.rows, k, 0, (0.0,) * 9)) for craft, node in self._pairs()]
+            for k in range(self._frames())
+        ]
+        return np.array(frames, float)
+
+    def ages(self) -> NDArray[np.float64]:
+        """(time, receiver, sender): s since the state that a node has of another one held; nan: it has none."""
+        never = [NEVER] * len(self.card.members)
+        stamps = np.array([[_at(n.rows, k, 1, never) for _, n in self._pairs()] for k in range(self._frames())])
+        times = self.card.period * np.arange(len(stamps))
+        return np.where(stamps > 0.1 * NEVER, times[:, None, None] - stamps, np.nan)
+
+    def _pairs(self) -> Any:
+        return zip(self._crafts, self._nodes, strict=True)
+
+    def digest(self) -> str:
+        """SHA-256 of all that was flown."""
+        return hashlib.sha256(self.array().tobytes()).hexdigest()
+
+    def phases(self) -> list[Phase]:
+        """Phase in which every node ended."""
+        return [life.phase for life in self._nodes]
+
+
+def _at(rows: Sequence[Any], k: int, part: int, none: Any) -> Any:
+    """What a node said at period k; where it has died, what it said last."""
+    return rows[min(k, len(rows) - 1)][part] if rows else none
+
+
+def refused(scenario: Scenario, faults: Sequence[Fault]) -> list[str]:
+    """What flies in lock-step only, one line each."""
+    found = [
+        f"faults.kind = {kind.name!r}: faults of a scenario fly with --mode lockstep; give --faults FILE instead"
+        for kind in scenario.fault_kinds
+    ]
+    gone = [f for f in faults if f.kind == "node" and f.end < 1e9]
+    return found + ["fault node: on the real clock a node that died stays dead; leave out end"] * bool(gone)
+
+
+def fly(
+    scenario: Scenario, card: Card, seed: int, mode: str, *, start: Sequence[State] | None,
+    faults: Sequence[Fault] = (), operator: bytes = b"", join: tuple[str, int] = JOIN,
+    done: Callable[[], None] | None = None,
+) -> Flown:  # fmt: skip
+    """Fly one fleet for the scenario's duration on the real clock, in the mode "tasks" or "processes".
+
+    start : states in the air; None: from the ground by orders of the operator, and back
+    join  : where vehicle 1 calls for a client that joins; vehicle 2 calls at the next port
+    done  : called once for each second flown
+
+    Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
+    """
+    wrong = refused(scenario, faults)
+    if wrong:
+        raise ScenarioError(wrong)
+    ports = Ports.opened(len(card.members), join)
+    try:
+        now = time.monotonic()
+        first = [
+            now + LONG,
+            now + 2.0 * LONG,
+            *(0.0,) * len(card.members),
+        ]  # the watch sets the clock when all are there
+        clock: Any = first if mode == "tasks" else multiprocessing.RawArray("d", first)
+        epoch = time.time_ns() // 1000 - round(now * 1e6)
+        plan = Plan(scenario, card, seed, start, tuple(faults), ports, clock, epoch)
+        lives: list[Callable[[], Coroutine[Any, Any, Life]]] = [partial(ether_life, plan)]
+        lives += [partial(node_life, plan, i) for i in range(len(card.members))]
+        lives += [partial(craft_life, plan, i) for i in range(len(card.members))]
+        watching = partial(_watch, plan, operator, done)
+        began = time.monotonic()
+        ended, all_ = asyncio.run(_tasks(plan, lives, watching)) if mode == "tasks" else _forked(plan, lives, watching)
+        return Flown(plan, ended, _load(ended, len(card.members), time.monotonic() - began, all_, mode == "tasks"))
+    finally:
+        ports.close()
+
+
+async def _tasks(plan: Plan, lives: Sequence[Callable[[], Any]], watching: Watching) -> tuple[list[Life], float]:
+    """All lives in one event loop; what is left of each, and the processor time of all, s."""
+    began = time.process_time()
+    async with asyncio.TaskGroup() as group:
+        tasks = [group.create_task(life()) for life in lives]
+        await watching(lambda: None)
+    return [task.result() for task in tasks], time.process_time() - began
+
+
+def _forked(plan: Plan, lives: Sequence[Callable[[], Any]], watching: Watching) -> tuple[list[Life], float]:
+    """Each life in a process of its own; what is left of each, and the processor time of all, s."""
+    context, began = multiprocessing.get_context("fork"), time.process_time()
+    pipes = [context.Pipe() for _ in lives]
+    processes = [
+        context.Process(target=_child, args=(life, pipe[1]), daemon=True)
+        for life, pipe in zip(lives, pipes, strict=True)
+    ]
+    try:
+        for process, (_, theirs) in zip(processes, pipes, strict=True):
+            process.start()
+            theirs.close()
+        ours = [pipe[0] for pipe in pipes]
+        _all(ours, processes)  # the barrier
+        for pipe in ours:
+            pipe.send("go")
+        asyncio.run(watching(partial(_alive, processes)))
+        found = _all(ours, processes)
+        for process in processes:
+            process.join()
+        return found, time.process_time() - began + sum(life.processor for life in found)
+    finally:
+        for process in processes:
+            if process.is_alive():
+                process.terminate()
+
+
+def _all(pipes: Sequence[Any], processes: Sequence[Any]) -> list[Any]:
+    """One message of each process; LinkError if one ends without it."""
+    found: dict[int, Any] = {}
+    while len(found) < len(pipes):
+        waiting = {pipe: i for i, pipe in enumerate(pipes) if i not in found}
+        for pipe in wait(list(waiting)):
+            i = waiting[pipe]  # type: ignore[index]
+            try:
+                found[i] = pipes[i].recv()
+            except EOFError as fault:
+                processes[i].join()
+                raise LinkError(ENDED.format(processes[i].exitcode)) from fault
+    return [found[i] for i in range(len(pipes))]
+
+
+def _alive(processes: Sequence[Any]) -> None:
+    """Raise LinkError if a process has failed."""
+    for process in processes:
+        if process.exitcode:
+            raise LinkError(ENDED.format(process.exitcode))
+
+
+def _child(life: Callable[[], Any], pipe: Any) -> None:
+    """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it
+    pipe.send("ready")
+    pipe.recv()
+    pipe.send(asyncio.run(life()))
+
+
+async def _watch(plan: Plan, operator: bytes, done: Callable[[], None] | None, check: Callable[[], None]) -> None:
+    """Give the orders of a flight from the ground, end the flight, and tell how far it is; check raises what failed."""
+    seconds = plan.scenario.flight.duration
+    watched, told = Watched(plan), 0
+
+    async def until(holds: Callable[[], bool]) -> None:
+        nonlocal told
+        while not holds():
+            await asyncio.sleep(WATCH)
+            watched.look()
+            check()
+            while done is not None and told < min(plan.now, seconds + READY_TIME):
+                told += 1
+                done()
+
+    await until(lambda: plan.ready)
+    plan.clock[0] = time.monotonic() + plan.scenario.radio.delay + WARM
+    if plan.start is not None:
+        await until(lambda: plan.now > seconds + plan.card.period)
+    else:
+        await _from_the_ground(plan, Station(plan.card, operator), watched, until)
+    plan.clock[1] = time.monotonic()
+
+
+async def _from_the_ground(plan: Plan, station: Station, watched: Watched, until: Callable[..., Any]) -> None:
+    """Order a start, a return when the time is over, and wait until all stand on the ground again."""
+
+    def order(do: Do) -> None:
+        utc = plan.utc(time.monotonic())
+        plan.ports.watch.send(station.order(do, utc, at=utc), plan.ports.ether.here)
+
+    await until(lambda: plan.now > READY_TIME)
+    begun = plan.now
+    while not all(watched.armed) and plan.now < begun + STARTS:
+        order(Do.START)
+        next_ = plan.now + AGAIN
+        await until(lambda: plan.now > next_ or all(watched.armed))  # noqa: B023
+    begun = plan.now
+    await until(lambda: plan.now > begun + plan.scenario.flight.duration)
+    order(Do.RETURN)
+    begun = plan.now
+    await until(lambda: plan.now > begun + HOME or not any(watched.armed))
+
+
+def _load(lives: Sequence[Life], count: int, seconds: float, all_: float, together: bool) -> Load:
+    nodes, others = lives[1 : 1 + count], [lives[OURSELVES], *lives[1 + count :]]
+    by = [None if together else sum(life.processor for life in part) / seconds for part in (nodes, others)]
+    ticks = [life.ticks for life in nodes]
+    total, late = sum(t.total for t in ticks), sum(t.late for t in ticks)
+    return Load(all_ / seconds, by[0], by[1], total, late, max(t.worst for t in ticks), os.getloadavg()[0])

@@ -1,0 +1,63 @@
+"""How the drones of a fleet in software begin: keys, vehicles on the ground or in the air, orders of an operator."""
+
+import hashlib
+from functools import partial
+from typing import Any
+
+from airflock.core.agent import State
+from airflock.core.parameters import number_names
+from airflock.fleet.dice import OuterNoise
+from airflock.fleet.modes import OURS
+from airflock.fleet.vehicle import Vehicle
+from airflock.mavlink import orders
+from airflock.mavlink.coordinates import Geodetic
+from airflock.mavlink.orders import Do, Order
+from airflock.mavlink.signing import Signer
+from airflock.onboard.card import Card
+from airflock.scenarios.scenario import Scenario
+
+KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
+READY_TIME = 12.0  # s on the ground before a start is ordered
+
+
+def vehicle_of(scenario: Scenario, card: Card, place: int, body: Any, noise: OuterNoise, started: int) -> Vehicle:
+    """A vehicle on the ground; grounds are a square of places 4 m apart.
+
+    place : among the members; body: numbers of its own; started: Unix time of its time 0, µs
+    """
+    side = max(1, round(len(card.members) ** 0.5))
+    at = (4.0 * (place % side) - 2.0 * (side - 1), 4.0 * (place // side) - 2.0 * (side - 1), 0.0)
+    noisy = "noise" in number_names(body) and body.noise > 0.0
+    draw = partial(noise, drone=place) if noisy else lambda step: (0.0, 0.0, 0.0)
+    made = Vehicle(card.autopilot.name, card.members[place], card.site, at, scenario.vehicle, body, draw, started)
+    made.place = place
+    return made
+
+
+def lift_of(card: Card) -> float:
+    """Height (m) above the site at which the law counts zero."""
+    return -card.law_state(State(*(0.0,) * 6)).z
+
+
+def in_the_air(vehicle: Vehicle, card: Card, start: State) -> None:
+    """Put a vehicle in the air, where it obeys its node as if it had for long."""
+    vehicle.state = start._replace(z=start.z + (card.height if card.flat else lift_of(card)))
+    vehicle.armed, vehicle.mode, vehicle.target_at, vehicle.first_at = True, OURS, 0.0, -9.0
+
+
+class Station:
+    """An operator of a fleet in software: signs orders.
+
+    card : of the fleet; private: key of the operator
+    """
+
+    def __init__(self, card: Card, private: bytes):
+        self._card, self._private, self._sign, self._given = card, private, Signer(KEY, orders.OPERATOR), 0
+
+    def order(self, do: Do, utc: int, *, target: int = 0, at: int = 0, point: Geodetic | None = None) -> bytes:
+        """Datagram of an order given at utc for a time `at`, µs of Unix time; no two are given at one time."""
+        self._given = max(utc, self._given + 1)
+        p = point or Geodetic(0.0, 0.0, 0.0)
+        place = (round(p.latitude * 1e7), round(p.longitude * 1e7), round(p.altitude * 1e3))
+        given = Order(do, target, self._card.mission, self._given, at, place)
+        return self._sign(orders.message(given, self._private), self._given)

@@ -1,0 +1,43 @@
+"""Keys of a scenario file that no record of parameters declares: names, lists and tables that are read as a whole."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from airflock.body.registry import BODIES
+from airflock.faults.registry import KINDS
+from airflock.scenarios.laws import MODELS
+from airflock.sensors.registry import SENSORS
+
+OWN = "FILE.py"
+
+
+class Whole(NamedTuple):
+    """One such key: how it is written ("text", "choice", "list", "table"), its meaning, and what a choice may be."""
+
+    kind: str
+    meaning: str
+    options: tuple[str, ...] = ()
+
+
+# section → key → what it is; "" stands for the keys at the top of a file
+WHOLE_KEYS: Mapping[str, Mapping[str, Whole]] = {
+    "": {
+        "title": Whole("text", "what the scenario is, for pictures and lists"),
+        "extends": Whole("text", "a preset or a file to begin from; what is not given here is taken from there"),
+        "published": Whole("table", "order parameter → value, or [value, SD], that a paper reports; shown beside ours"),
+        "model.kind": Whole("choice", "the law that flies", (*MODELS, OWN)),
+        "body.kind": Whole("choice", "what turns commands into motion", (*BODIES, OWN)),
+        "sensors.kind": Whole("choice", "how an agent knows its own state", (*SENSORS, OWN)),
+    },
+    "faults": {
+        "kind": Whole("choice", "what befalls an agent", (*KINDS, OWN)),
+        "agents": Whole("list", "numbers of the agents that it may hit; by default all"),
+        "group": Whole("text", "name of the group that it may hit, instead of agents"),
+    },
+    "groups": {
+        "name": Whole("text", "of the group"),
+        "agents": Whole("list", "numbers of its agents, or how many; left out, all who are in no other group"),
+        "model": Whole("table", "numbers of the law that its agents have; { value, spread } for a tolerance"),
+        "body": Whole("table", "numbers of the body that its agents have; { value, spread } for a tolerance"),
+    },
+}
