@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from airflock.core.parameters import quantity
 from airflock.core.radio import Packets, forward
-from airflock.radios.links import FIG8, SETUP, received
+from airflock.radios.links import FIG8, SETUP
 
 OURS = "our choice: a house"
 
@@ -27,6 +27,13 @@ class Parameters(Packets):
     )
 
 
+def share(distance, near, far, received_near, received_far):
+    """Received share over a distance (m) in the open: the short link of Vásárhelyi et al. 2018 (`radios.links`)."""
+    middle = received_near + (received_far - received_near) / max(far - near, 1e-6) * (distance - near)
+    beyond = received_far * far * far / max(distance * distance, far * far)
+    return received_near if distance <= near else (middle if distance < far else beyond)
+
+
 def stretched(distance, clear, k):
     """Distance (m) in the open over which a signal is as weak as over this one with what stands in the way."""
     return distance if clear > 0.5 else distance * 10.0 ** (k.wall / (10.0 * k.exponent))
@@ -34,7 +41,7 @@ def stretched(distance, clear, k):
 
 def missed(distance, clear, k):
     """Probability that nothing arrives, 0-1."""
-    return 1.0 - received(stretched(distance, clear, k), 0.0, k)
+    return 1.0 - share(stretched(distance, clear, k), k.near, k.far, k.received_near, k.received_far)
 
 
 carry = forward
