@@ -106,7 +106,8 @@ def of_tuning(folder):
 
     told = read_toml(folder / "certificate.toml")
     names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")
-    return rows(folder / "study"), [(folder / name).read_text() for name in names], told["limit"], told["flights"]
+    texts = [(folder / name).read_text().replace(str(folder), "FOLDER") for name in names]
+    return rows(folder / "study"), texts, told["limit"], told["flights"]
 
 
 def tracks(folder):
@@ -244,9 +245,9 @@ def workers(folder, kills, seed):
             def killer(cluster=cluster, over=over):
                 nonlocal died
                 while not over.wait(chance.uniform(0.2, 0.6)):
-                    worker = chance.choice(list(cluster.workers.values()))
+                    worker = chance.choice([*cluster.workers.values(), None])
                     # one at a time: a worker that dies before it has started is given up by its nanny
-                    if worker.pid and len(cluster.scheduler_info["workers"]) == 2:
+                    if worker is not None and worker.pid and len(cluster.scheduler_info["workers"]) == 2:
                         os.kill(worker.pid, signal.SIGKILL)
                         died += 1
 

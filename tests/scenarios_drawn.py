@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.body.registry import BODIES as KNOWN_BODIES
+from airflock.core.contract import Model
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
@@ -30,6 +31,7 @@ SCALES = {
     "vasarhelyi_2018": (20.0, "r0_rep", 4.0), "viragh_2014": (20.0, "r0_rep", 4.0), "reynolds_1987": (0.5, "r_c", 0.2),
     "vicsek_1995": (1.0, "r", 0.3), "couzin_2002": (8.0, "dr_a", 3.0), "kidger": (20.0, "r_align", 10.0),
     "formation": (3.0, "r0_rep", 4.0), "dimock_2003": (5.0, "r_c", 10.0),
+    "chen_2014": (3.0, "r_hunt", 1.0),
 }  # fmt: skip
 BODIES = {
     "velocity": ("multirotor", "quadrotor", "fixed_wing", "direct", "jostled"),
@@ -109,13 +111,29 @@ def groups(keys: dict[str, Any], rng: Random, kind: str) -> None:
         found.append({"name": "rest"})
     law, body = find_model(kind), KNOWN_BODIES[keys["body.kind"]]
     for group in found:
-        for section, record in (("model", law.Parameters), ("body", body.Parameters)):
+        flown = other_law(rng, law) if rng.random() < 0.6 and "aero.k_d" not in keys else law
+        sections = {"model": flown.Parameters, "body": body.Parameters}
+        if keys["update"] == "synchronous":
+            sections["sensors"] = SENSORS[keys["sensors.kind"]].Parameters
+        for section, record in sections.items():
             own: dict[str, Any] = {}
-            sometimes(own, rng, record, section, 0.3, ("rays", "most"))
+            sometimes(own, rng, record, section, 0.3, ("rays", "most", "period"))
             numbers = {key.partition(".")[2]: value for key, value in own.items() if isinstance(value, float)}
             off = {name: {"value": value, "spread": 0.05 * abs(value)} for name, value in numbers.items()}
             group[section] = off if rng.random() < 0.5 else numbers
+            if section == "model" and flown.flock is None and "aero.k_d" not in keys:
+                group[section] |= {key.partition(".")[2]: value for key, value in own.items() if isinstance(value, str)}
+        if flown is not law:
+            group["model"]["kind"] = flown.name
+        if flown.name == "kidger":
+            group["model"] |= {"rays": 8, "most": 1, "r_sep": 1.0}
     keys["groups"] = found
+
+
+def other_law(rng: Random, law: Model) -> Model:
+    """A law of the same kind of command, if there is one that flies beside it."""
+    known = [model for model in map(find_model, MODELS) if model.command == law.command and model.flock is None]
+    return rng.choice(known) if law.flock is None else law
 
 
 def faults(keys: dict[str, Any], rng: Random, length: float) -> None:
@@ -395,7 +413,7 @@ CHOICES = [f"faults.kind = {kind}" for kind in KINDS]
 CHOICES += [f"{owner}.{name} = {x}" for owner, names in OPTIONS.items() for name, xs in names.items() for x in xs]
 SWITCHES = (
     "three", "noisy", "late", "lossy", "links", "gusts", "periodic", "islands", "scene", "goals", "own", "sequential",
-    "stop", "descends", "given", "sees", "walls", "groups", "faults", "absent", "silent",
+    "stop", "descends", "given", "sees", "walls", "groups", "laws", "faults", "absent", "silent",
 )  # fmt: skip
 
 
@@ -410,7 +428,7 @@ def notions(draw: Draw) -> set[str]:
         "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
         "stop": found.metrics.stop == "collision", "descends": found.descends, "given": draw.start is not None,
         "sees": found.model.sight is not None, "walls": found.model.boundary is not None,
-        "groups": bool(found.varied), "faults": bool(found.fault_kinds),
+        "groups": bool(found.groups), "laws": len(found.laws) > 1, "faults": bool(found.fault_kinds),
         "absent": any(kind.leaves for kind in found.fault_kinds), "silent": found.silence.rule == "stop",
     }  # fmt: skip
     assert tuple(switches) == SWITCHES
@@ -431,7 +449,7 @@ def notions(draw: Draw) -> set[str]:
 
 
 IMPOSSIBLE = (
-    {"absent on", "faults off"},
+    {"absent on", "faults off"}, {"laws on", "groups off"}, {"laws on", "descends on"},
     {"goals on", "own on"},  # goals of the flock, or one for each agent
     {"periodic on", "islands on"},
     {"sequential on", "noisy on"}, {"sequential on", "late on"}, {"sequential on", "lossy on"},

@@ -25,7 +25,7 @@ PAPERS = {
 PICTURES = {
     "vasarhelyi_2018": "10_trajectories", "viragh_2014": "17_two_laws", "reynolds_1987": "50_boids",
     "vicsek_1995": "20_vicsek", "couzin_2002": "21_couzin_mill", "kidger": "30_city", "formation": "40_display",
-    "dimock_2003": "51_formation_flight",
+    "dimock_2003": "51_formation_flight", "chen_2014": "25_predator_and_prey",
 }  # fmt: skip
 
 LOW_AND_HIGH = "25_low_and_high"  # draws all order parameters but these, which tell of whole flights or scenes

@@ -22,13 +22,23 @@ FRESH = 60.0  # s in which a temporary file may not be locked yet
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path with the same ending to write to; it takes the final name only if the block succeeds.
 
-    A link is followed: the file that it names is replaced, not the link. Raises OSError where the path is that of
-    something else than a file, such as a named pipe.
+    A link is followed: the file that it names is replaced, not the link. Raises OSError, which names the path, where it
+    is that of something else than a file, such as a named pipe, and for whatever goes wrong while it is written.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not stat.S_ISREG(target.stat().st_mode):
         raise OSError(0, "is there and is not a regular file", str(path))
     swept(target.parent)
+    try:
+        with _beside(target) as temporary:
+            yield temporary
+    except OSError as fault:
+        raise OSError(fault.errno, fault.strerror or str(fault), str(path)) from fault
+
+
+@contextmanager
+def _beside(target: Path) -> Iterator[Path]:
+    """A temporary file beside a target, which it replaces at the end; nothing of it is left otherwise."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:100]}{MARK}", suffix=target.suffix)
     temporary = Path(name)
     try:
@@ -46,11 +56,8 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 def write(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
     """Write text (UTF-8) or bytes; an OSError, which names the path, leaves the old file, or none, in place."""
-    try:
-        with atomic(path) as temporary:
-            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as fault:
-        raise OSError(fault.errno, fault.strerror, str(path)) from fault
+    with atomic(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @cache

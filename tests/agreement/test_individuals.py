@@ -441,6 +441,21 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
     assert not np.array_equal(cpu.fly(plan, numbers, device="python").frames, plain.frames)
 
 
+def test_a_group_measures_by_numbers_of_its_own():
+    """Whose receiver is exact believes its true place, though that of others errs; the others' bits stay theirs."""
+    exact = [{"name": "exact", "agents": [0, 5], "sensors": {"noise": 0.0}}, {"name": "rest"}]
+    apart = {**SMALL, "radio.range": 0.0}
+    flights = [airflock.open(load(PAPER, {**apart, "groups": g}), 3, device="python") for g in ([], exact)]
+    for flight in flights:
+        flight.advance(3.0).sense()
+    off = [np.abs(flight.measured - flight.state).max(axis=0) for flight in flights]
+    others = [k for k in range(8) if k not in (0, 5)]
+    assert (off[1][[0, 5]] == 0.0).all() and (off[0] > 0.0).all()
+    assert np.array_equal(off[0][others], off[1][others])
+    alone = load(PAPER, {**apart, "sensors.noise": 0.0, "groups": [{"agents": [2], "sensors": {"noise": 0.3}}]})
+    assert alone.errs and not alone.unerring.errs
+
+
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
@@ -451,8 +466,10 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
         ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
         ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
         ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
-        ([{"model": {"kind": "couzin_2002"}}], "only numbers differ from group to group"),
+        ([{"body": {"kind": "direct"}}], "one body carries all; only numbers differ from group to group"),
         ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
+        ([{"sensors": {"period": 1.0}}], "all measure and decide at the same times"),
+        ([{"sensors": {"kind": "gnss"}}], "all measure by one sensor; only numbers differ from group to group"),
         ({"a": 1}, "groups is not a list of tables"),
     ],
 )

@@ -51,6 +51,7 @@ FLIGHTS = {
     }),
     "swarm": ("couzin_2002/torus", {"agents": 10, "body.noise": None, "duration": 3.0}),
 }  # fmt: skip
+PLAIN = Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters())
 
 
 def place_of(scenario):
@@ -200,7 +201,7 @@ def test_only_the_newest_sound_packet_counts():
 
 
 def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock():
-    one = pilot(hearing=Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters()))
+    one = pilot(hearing=PLAIN)
     own, east = State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0), State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     assert one.hear(1, east, 7.0, 5.0), "its clock is 2 s ahead"
     assert one.hear(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
@@ -249,7 +250,7 @@ def test_a_neighbour_counts_as_heard_or_as_lost_but_never_as_both(age, distance)
 def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
     """With the rule of silence the law hears it until it is lost; without, it is gone at the next decision."""
     hearing, own = (
-        Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters()),
+        PLAIN,
         State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0),
     )
     for rule, known in ((Silence(rule="stop", patience=1.5), True), (None, False)):
@@ -258,6 +259,13 @@ def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
         assert one.heard(1.0)
         one.decide(own, 1.0)
         assert bool(one.heard(1.4)) is known and not one.heard(1.6)
+
+
+def test_who_is_lost_when_its_packet_comes_is_not_heard():
+    """A patience shorter than the delay: the simulator hears nobody then, and so does its pilot."""
+    one = pilot(silence=Silence(rule="stop", patience=0.3), hearing=PLAIN)
+    one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.35)
+    assert not one.heard(0.35) and one.heard(0.25)
 
 
 def test_a_pilot_stops_for_whom_it_has_lost_and_flies_on_when_heard_again():

@@ -108,6 +108,7 @@ def test_a_page_that_is_closed_can_be_opened_again(live, browser, tab):
     then = player.flight.time
     until(lambda: player.flight.time > then, "the flight stopped with a page")
     tab.reload(timeout=PATIENCE * 1000)
+    until(lambda: view.clients == 1, "a page that was loaded again does not count")
     until(lambda: places(coloured(shot(tab), right=640)) >= 10, "no agents after a reload")
     assert player.flight.time > then and view.clients == 1 and not tab.faults
 

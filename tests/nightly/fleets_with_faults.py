@@ -39,10 +39,7 @@ CONDITIONS = {
 }
 FIRST = ("none", "blackout of 15 s")
 FREE = "blackout of 15 s, no rule of silence"  # flown to show what the rule is for
-OPEN = {  # condition → mechanism, and the rule that is missing
-    "60 % of all packets lost": "who stands near others goes at full speed in each decision in which it hears all of "
-    "them, and stands again 1 to 2 m farther on; missing: a rule for going on after a stop",
-}
+OPEN: dict[str, str] = {}  # condition → mechanism, and the rule that is missing; at most two may stand here
 MEDIAN, NEAR, MORE = 5.0, 3.0, 1  # m, m, flights
 GROUND = 0.5  # m; who is lower has landed or fallen
 SPARE = 60.0  # s before the limit at which no further flight is begun

@@ -25,7 +25,7 @@ from airflock.engine.place import Course, Place, reach_of_walls
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from reference.begin import ZERO, Vector, begin, given, normals
-from reference.individuals import Suffering, ahead, begins, misled, own_parameters, radio_of
+from reference.individuals import Suffering, ahead, begins, groups_of, law_of, misled, own_parameters, radio_of
 from reference.scores import Scores
 
 MOVING = ("vx", "vy", "vz", "cx", "cy", "cz")
@@ -45,7 +45,7 @@ class Agent:
     """One agent in the air.
 
     state      : true position (m) and velocity (m/s)
-    pilot      : what decides; b: the numbers of its body, kept: the body's Memory; sensed: the sensor's
+    pilot      : what decides; b, s: the numbers of its body and sensor; kept, sensed: what these remember
     command    : what it flies by: its pilot's last command, if no fault has overruled it
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
@@ -56,6 +56,7 @@ class Agent:
     state: State
     pilot: Pilot
     b: Any = None
+    s: Any = None
     kept: Any = None
     sensed: Any = None
     command: Vector = ZERO
@@ -137,18 +138,20 @@ def fly_plainly(  # noqa: C901 - one loop that a reader can follow
 
 def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -> Agent:
     """Agent i with its pilot, which carries the map, its own numbers, and its seed."""
-    p = own_parameters(scenario, "model", scenario.parameters, i, seed)
+    law = law_of(scenario, i)
+    p = own_parameters(scenario, "model", law[1], i, seed)
     b = own_parameters(scenario, "body", scenario.body, i, seed)
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
-        scenario.model, p, place.seen(reach_of_walls(scenario.model, p)), index=i, period=period,
+        law[0], p, place.seen(reach_of_walls(law[0], p)), index=i, period=period, groups=groups_of(scenario),
         hearing=Hearing.simulated(scenario.transceiver, scenario.radio), silence=scenario.silent_by(),
         body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
         told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
     )  # fmt: skip
     kept, sensed = (each() if each else None for each in (scenario.vehicle.Memory, scenario.sensor.Memory))
-    return Agent(state, pilot, b, kept, sensed)
+    s = own_parameters(scenario, "sensors", scenario.sensors, i, seed)
+    return Agent(state, pilot, b, s, kept, sensed)
 
 
 def befall(scenario: Scenario, step: int, flock: list[Agent], due: dict[int, Any]) -> bool:
@@ -204,7 +207,7 @@ def decisions(
     time: float, turn: Sequence[int] | None = None, shared: Sequence[Any] | None = None,
 ) -> None:  # fmt: skip
     """Decision `number` of all agents, or of those in turn, from true states now and the `past` ones heard now."""
-    if not scenario.sensor.is_exact(scenario.sensors):
+    if scenario.errs:
         for i, agent in enumerate(flock):
             drift(scenario, seed, number, i, agent, time)
     times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
@@ -243,7 +246,7 @@ def drift(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, time
     if scenario.sensor.measure is not None:
         agent.own, agent.sensed = sensed(scenario, seed, number, i, agent, time)
         return
-    s, period = scenario.sensors, clock(scenario)["decide_every"] * scenario.flight.dt
+    s, period = agent.s, clock(scenario)["decide_every"] * scenario.flight.dt
     own_x, own_y, sent_x, sent_y = normals(seed, random.SENSOR, number, i)
     own_z, sent_z = normals(seed, random.SENSOR, number, i, draw=1)[:2] if scenario.dimensions == 3 else (0.0, 0.0)
     rule = scenario.sensor.error
@@ -258,7 +261,7 @@ def sensed(scenario: Scenario, seed: int, number: int, i: int, agent: Agent, tim
     chances = [random.uniform(word) for word in random.words(seed, random.SENSOR, 0, number, i, draw=11)]
     given = agent.state._asdict() | {f"g{c}": g for c, g in enumerate(drawn)}
     given |= {f"u{c}": u for c, u in enumerate(chances)}
-    given |= {"memory": agent.sensed, "time": time, "period": period, "s": scenario.sensors}
+    given |= {"memory": agent.sensed, "time": time, "period": period, "s": agent.s}
     found = answer(sensor.measure, "measure", given, sensor.name)
     off = [a - b for a, b in zip(found[:6], agent.state, strict=True)]
     if scenario.dimensions == 2:

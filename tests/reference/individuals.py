@@ -82,16 +82,27 @@ def hit(entry: Any, number: int, occurrence: int, seed: int) -> list[int]:
     return sorted(agent for _, agent in sorted(lots)[: entry.number])
 
 
+def groups_of(scenario: Scenario) -> list[int]:
+    """Of each agent which group it is in; -1 for none."""
+    return [next((k for k, g in enumerate(scenario.groups) if i in g.agents), -1) for i in range(scenario.agents)]
+
+
+def law_of(scenario: Scenario, agent: int) -> tuple[Any, Any]:
+    """Model of an agent and its parameters without numbers of its group."""
+    group = next((group for group in scenario.groups if agent in group.agents), None)
+    return group.law if group and group.law else (scenario.model, scenario.parameters)
+
+
 def own_parameters(scenario: Scenario, section: str, record: Any, agent: int, seed: int) -> Any:
     """Numbers of model or body of one agent: its group's, off them by its tolerance."""
-    letter, changed = {"model": "p", "body": "b"}[section], {}
+    letter, changed = {"model": "p", "body": "b", "sensors": "s"}[section], {}
     for place, (name, declared, _) in enumerate(declarations(record)):
         for group in scenario.groups:
             if agent in group.agents and isinstance(declared, Quantity):
                 value = group.numbers.get((letter, name), getattr(record, name))
                 spread = group.spread.get((letter, name), 0.0)
                 if spread > 0.0:
-                    words = random.words(seed, random.SPREAD, 0, place, agent, "pb".index(letter))
+                    words = random.words(seed, random.SPREAD, 0, place, agent, "pbs".index(letter))
                     value += spread * random.normal_pair(*words[:2])[0]
                 if value is not None:
                     changed[name] = min(max(value, declared.low), declared.high)

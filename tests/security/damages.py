@@ -84,80 +84,166 @@ def _damage(rng, home, mark, tell):
 
 @cache
 def results():
-    """A recording, a figure, a table and a document to write."""
+    """What is written: a recording, figures, tables, documents, a page, a flight of a preset."""
     import pandas as pd
 
     from airflock.plots.trajectories import trajectories
     from airflock.recordings.files import load_recording
+    from airflock.replays.build import replay
 
     recording = load_recording(GOLDEN / "recording.nc")
     table = pd.DataFrame({"a": range(5000), "b": [0.1] * 5000})
-    return recording, trajectories(recording), table.to_csv(), {"model": {f"k{i}": i / 7 for i in range(400)}}
+    document = {"model": {f"k{i}": i / 7 for i in range(400)}}
+    return recording, trajectories(recording), table.to_csv(), document, replay(recording)
 
 
 def full_disk(seed, number, folder, tell=False):
     """A disk that is full at some byte: one fault, and the file that was there before is as it was."""
     rng = random.Random(f"disk {seed} {number}")
-    what = rng.choice(["recording", "figure", "table", "document", "store"])
+    what = rng.choice([*WRITERS])
     place = folder / f"disk{number}"
     place.mkdir()
-    target = place / {"recording": "a.nc", "figure": "a.png", "table": "a.csv", "document": "a.toml"}.get(what, "a")
-    before = b"what was there before" if rng.random() < 0.5 and what != "store" else None
+    target = place / f"a{WRITERS[what][0]}"
+    folders = what in ("store", "cache", "mission", "evaluations")  # which make several files
+    before = b"what was there before" if rng.random() < 0.5 and not folders else None
     if before is not None:
         target.write_bytes(before)
-    limit = int(10 ** rng.uniform(0.0, 5.5))
+    limit = int(10 ** rng.uniform(0.0, WRITERS[what][1]))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     results()
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     fault = None
     try:
-        _write(what, target)
+        WRITERS[what][2](target)
     except AirflockError as refused:
         fault = str(refused)
         assert "\n" not in fault and "a" in fault
     except OSError as refused:  # the command line makes a line of it
-        assert what in ("table", "document") and refused.filename == str(target), f"a bare {refused!r} from {what}"
+        assert refused.filename == str(target) or what == "cache", f"a bare {refused!r} from {what}"
+        assert refused.filename, f"no name in {refused!r}"
         fault = str(refused)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     if tell:
         sys.stdout.write(f"{what} of {limit} bytes: {fault}\n")
-    if what == "store":
-        return fault is None
     left = sorted(path.name for path in place.iterdir())
-    if fault is not None:
-        assert left == ([target.name] if before is not None else []), f"left over: {left}"
-        assert before is None or target.read_bytes() == before, "half-written"
-    else:
-        assert left == [target.name] and target.stat().st_size <= limit
+    if what == "mission":
+        assert left == ([] if fault else ["a.json", "a.key", "a.operator"]), f"left over: {left}"
+    elif what == "evaluations":
+        assert not any(name.startswith(".") for name in left), f"left over: {left}"
+    elif what == "cache":
+        assert fault is None or not any(MARK in path.name for path in place.rglob("*")), f"left over: {left}"
+    elif what != "store":
+        if fault is not None:
+            assert left == ([target.name] if before is not None else []), f"left over: {left}"
+            assert before is None or target.read_bytes() == before, "half-written"
+        else:
+            assert left == [target.name] and target.stat().st_size <= limit
     shutil.rmtree(place)
     return fault is None
 
 
-def _write(what, target):
-    from airflock.evolve.folder import write
-    from airflock.evolve.store import Batch, Store
-    from airflock.executors import Flight, Landed
-    from airflock.plots.save import save_figure
+def _recording(target):
     from airflock.recordings.files import save
 
-    recording, figure, table, document = results()
-    if what == "recording":
-        save(recording, target)
-    elif what == "figure":
-        save_figure(figure, target)
-    elif what == "table":
-        atomic.write(target, table)
-    elif what == "document":
-        write(target, document)
-    else:
-        target.mkdir()
-        with Store(target) as store:
-            store.begin({})
-            batch = Batch("search", 0, 0)
-            for i in range(200):
-                store.ask(batch, [[0.5]] * (i + 1), [{"model.p_rep": 0.1}] * (i + 1))
-                store.land(batch, Landed(Flight(i, 0, {}, 7), {"fitness": 0.25, "long": [0.1] * 50}))
+    save(results()[0], target)
+
+
+def _figure(target):
+    from airflock.plots.save import save_figure
+
+    save_figure(results()[1], target)
+
+
+def _video(target):
+    from airflock.plots.video import video
+
+    video(results()[0], target, fps=5, speed=4.0)
+
+
+def _export(target):
+    from airflock.recordings.exports.export import export
+
+    export(results()[0], target)
+
+
+def _document(target):
+    from airflock.evolve.folder import write
+
+    write(target, results()[3])
+
+
+def _certificate(target):
+    from other_files import certificate
+
+    certificate().save(target)
+
+
+def _store(target):
+    from airflock.evolve.store import Batch, Store
+    from airflock.executors import Flight, Landed
+
+    target.mkdir()
+    with Store(target) as store:
+        store.begin({})
+        batch = Batch("search", 0, 0)
+        for i in range(200):
+            store.ask(batch, [[0.5]] * (i + 1), [{"model.p_rep": 0.1}] * (i + 1))
+            store.land(batch, Landed(Flight(i, 0, {}, 7), {"fitness": 0.25, "long": [0.1] * 50}))
+
+
+@cache
+def stored():
+    """A folder with a study's store."""
+    import tempfile
+    from pathlib import Path
+
+    folder = Path(tempfile.mkdtemp()) / "study"
+    _store(folder)
+    return folder
+
+
+def _evaluations(target):
+    """Tables of all flights of a study."""
+    from airflock.evolve.store import Store
+    from airflock.evolve.tables import export
+
+    with Store(stored(), write=False) as store:
+        export(store, target.parent)
+
+
+def _card(target):
+    """Card and keys of a mission, by the command."""
+    from airflock.cli.main import app
+
+    words = ["fly", "prepare", "vasarhelyi_2018/real_4ms", "--site", "47.5,19.0,120", "--members", "1-10", "--json"]
+    app([*words, "--out", str(target)], standalone_mode=False)
+
+
+def _cache(target):
+    """A driver is compiled and flown in any case, unless nothing at all can be written."""
+    assert fly(target) == 2.5
+
+
+MARK = atomic.MARK
+WRITERS = {  # ending, decimal logarithm of the most bytes, and what writes
+    "recording": (".nc", 5.5, _recording),
+    "figure": (".png", 5.5, _figure),
+    "figure as pdf": (".pdf", 5.0, _figure),
+    "figure as svg": (".svg", 5.5, _figure),
+    "video": (".mp4", 5.0, _video),
+    "replay": (".html", 6.3, lambda target: results()[4].save(target)),
+    "table": (".csv", 5.5, lambda target: atomic.write(target, results()[2])),
+    "export as csv": (".csv", 5.0, _export),
+    "export as parquet": (".parquet", 5.0, _export),
+    "export as movement": (".nc", 5.0, _export),
+    "document": (".toml", 4.5, _document),
+    "certificate": (".toml", 4.5, _certificate),
+    "mission": (".json", 4.5, _card),
+    "evaluations": ("", 5.0, _evaluations),
+    "store": ("", 5.5, _store),
+    "cache": ("", 4.0, _cache),
+}
 
 
 CASES = {"caches": damaged_cache, "disks": full_disk}

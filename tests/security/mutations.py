@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import documents
+import forked
 
 from airflock import doors
 from airflock.errors import AirflockError, ScenarioError
@@ -400,6 +401,7 @@ def no_flights():
 def warm(what):
     """Import and read beforehand what every child needs."""
     if what == "recordings":
+        forked.readers_are_forked()
         undamaged()
     elif what == "studies":
         studies()
@@ -411,11 +413,15 @@ def warm(what):
     elif what == "files":
         import other_files
 
+        forked.readers_are_forked()
         other_files.sound()
     elif what == "disks":
         import damages
+        import other_files
 
         damages.results()
+        damages.stored()
+        other_files.certificate()
     else:
         scenarios()
 

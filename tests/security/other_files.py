@@ -28,7 +28,7 @@ FOREIGN = ("table", "array", "arrays", "parquet", "ulog", "dataflash", "tracking
 def sound():
     """Bytes of a sound file of each kind, by kind, with the ending of its name."""
     found = {
-        "card": (".json", _card()),
+        "card": (".json", sound_card()),
         "certificate": (".toml", _certificate()),
         "faults": (".toml", b'[[fault]]\nkind = "outage"\nwho = [1]\nbegin = 1.0\nend = 2.0\n'),
         "geojson": (".geojson", json.dumps(_field()).encode()),
@@ -42,7 +42,8 @@ def sound():
     return found | _tracks()
 
 
-def _card():
+def sound_card():
+    """Bytes of a flight card."""
     from airflock.fleet.prepare import card_document
     from airflock.onboard.card import hash_of
     from airflock.scenarios.files import load
@@ -53,7 +54,8 @@ def _card():
 
 
 @cache
-def _certificate():
+def certificate():
+    """A certificate of a few flights."""
     import tempfile
 
     from airflock.certify.run import certify
@@ -62,8 +64,14 @@ def _certificate():
     with tempfile.TemporaryDirectory() as folder:
         tiny = load("vasarhelyi_2018/real_4ms", TINY)
         limits, where = ["r_min<9 at 99%", "phi_wall>0"], Path(folder)
-        made = certify(tiny, limits, flights=4, device="python", folder=where / "flights")
-        return made.save(where / "certificate.toml").read_bytes()
+        return certify(tiny, limits, flights=4, device="python", folder=where / "flights")
+
+
+def _certificate():
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        return certificate().save(Path(folder) / "certificate.toml").read_bytes()
 
 
 def _field():
@@ -109,7 +117,7 @@ def _log():
 def _made_card():
     from airflock.onboard.card import card_of
 
-    return card_of(json.loads(_card()))
+    return card_of(json.loads(sound_card()))
 
 
 def _steps():

@@ -4,12 +4,24 @@ import fuzz
 import mutations
 import pytest
 
+from airflock.recordings import opened
+
 
 @pytest.mark.parametrize(
     ("what", "count"),
-    [("scenarios", 1500), ("studies", 300), ("recordings", 12), ("commands", 100), ("caches", 12), ("disks", 40)],
+    [
+        ("scenarios", 2000),
+        ("studies", 500),
+        ("recordings", 300),
+        ("files", 200),
+        ("commands", 300),
+        ("caches", 12),
+        ("disks", 40),
+    ],
 )
-def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed, tmp_path):
+def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed, tmp_path, monkeypatch):
+    for name in ("subprocess", "LEAST_TIME"):
+        monkeypatch.setattr(opened, name, getattr(opened, name))  # given back at the end
     mutations.warm(what)
     failures, _ = fuzz.attack(fuzz.CASES[what], count, seed, folder=tmp_path, hang=fuzz.PATIENCE.get(what, fuzz.HANG))
     assert failures == [], f"repeat with: python tests/security/fuzz.py {what} --seed {seed} --only NUMBER"

@@ -5,15 +5,21 @@ Every way in is a row of WAYS; whoever adds a door adds its rows.
 
 import json
 import os
+import pickle
 import traceback
+from importlib import import_module
 from pathlib import Path
 
 import mutations
+import numpy as np
+import other_files
 import pytest
+from damages import Planted
 
 import airflock
 from airflock.errors import AirflockError, ScenarioError
 from airflock.evolve.study import load_study
+from airflock.onboard.card import hash_of, read_card
 
 LAW = "from pathlib import Path\nPath(__file__).with_name('mark').touch()\n"
 SCENARIO = 'duration = 1.0\nagents = 3\n[model]\nkind = "evil.py"\n'
@@ -42,11 +48,27 @@ def packed(tmp_path):
         (tmp_path / f"{section}.toml").write_text(text)
     text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
     (tmp_path / "faults.toml").write_text(text)
+    text = 'extends = "vasarhelyi_2018/4ms"\n[[groups]]\nagents = 2\nmodel = { kind = "evil.py" }\n'
+    (tmp_path / "groups.toml").write_text(text)
     (tmp_path / "extended.toml").write_text('extends = "evil.toml"\nagents = 4\n')
     version = f'[flown]\nairflock = "{airflock.__version__}"\nprecision = 32\ndevice = "cpu"\nrules = "0"\n'
     text = 'seal = ""\nformat = 1\nconfidence = 0.95\nlimit = []\n[flights]\ncount = 1\nlooks = ""\nuncertain = false\n'
     law = '[scenario]\nname = "a"\nduration = 1.0\nagents = 3\n[scenario.model]\nkind = "evil.py"\n'
     (tmp_path / "certificate.toml").write_text(text + version + law)
+    text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + '[topology]\nkind = "evil.py"\n'
+    (tmp_path / "topology.toml").write_text(text)
+    rows = "".join(f"{0.1 * k},{who},{k + who},{who},1,0,1,0\n" for k in range(50) for who in (1, 2))
+    (tmp_path / "log.csv").write_text("t,id,x,y,vx,vy,cx,cy\n" + rows)
+    for name in ("pickled.npy", "pickled.pkl"):
+        (tmp_path / name).write_bytes(pickle.dumps(Planted(tmp_path / "mark")))
+    np.save(tmp_path / "objects.npy", np.array([Planted(tmp_path / "mark")], dtype=object))
+    np.savez(tmp_path / "objects.npz", trajectories=np.array([Planted(tmp_path / "mark")], dtype=object))
+    card = json.loads(other_files.sound_card())
+    card = {**{key: value for key, value in card.items() if key != "hash"}, "law": {"kind": "evil"}}
+    (tmp_path / "card.json").write_text(json.dumps({**card, "hash": hash_of(card)}))
+    (tmp_path / "tuning" / "study").mkdir(parents=True)
+    (tmp_path / "tuning" / "hardening.json").write_text('{"why": "", "steps": []}')
+    (tmp_path / "tuning" / "tuned.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "best.toml").write_text(SCENARIO.replace("evil.py", str(tmp_path / "evil.py")))
     return tmp_path
@@ -105,9 +127,13 @@ def command(*words):
 
 def python(text):
     """A line of Python of somebody who has unpacked the folder."""
-    return lambda: eval(text, {"airflock": airflock, "load_study": load_study, "Path": Path})
+    return lambda: eval(text, NAMES)
 
 
+NAMES = {
+    "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
+    "hardened": import_module("airflock.tune.run")._hardened,
+}  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {
     "load": (python('airflock.load("evil.toml")'), CONSENT),
@@ -118,6 +144,7 @@ WAYS = {
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
     "sensor of a scenario": (python('airflock.load("sensors.toml")'), CONSENT),
     "radio of a scenario": (python('airflock.load("radio.toml")'), CONSENT),
+    "law of a group": (python('airflock.load("groups.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),
     "fault of an event": (
@@ -137,6 +164,20 @@ WAYS = {
         CONSENT,
     ),
     "watch": (command("watch", "evil.toml", "--port", "0"), ""),
+    "watch against": (command("watch", "vasarhelyi_2018/4ms", "--against", "evil.toml", "--port", "0"), ""),
+    "tune": (command("tune", "evil.toml", "--out", "tuned"), ""),
+    "tune logs": (command("tune", "log.csv", "--like", "evil.toml", "--out", "tuned"), ""),
+    "folder of a tuning": (python('hardened(Path("tuning"), None, None, None, False)'), CONSENT),
+    "identify": (command("identify", "log.csv", "--like", "evil.toml"), ""),
+    "infer": (command("infer", "log.csv", "--models", "evil.toml"), ""),
+    "card of a scenario": (command("fly", "prepare", "evil.toml", "--site", "47,19,0", "--members", "1-3"), ""),
+    "flight card": (python('read_card(Path("card.json"))'), "is not a law of this version"),
+    "topology of a scenario": (python('airflock.load("topology.toml")'), "is none of"),
+    "scenario with faults of its own": (command("run", "faults.toml"), ""),
+    "tracks of a pickle": (python('airflock.load_tracks("pickled.pkl")'), "could run code"),
+    "array of a pickle": (python('airflock.load_tracks("pickled.npy", fps=1.0, unit="m")'), "could run code"),
+    "array of objects": (python('airflock.load_tracks("objects.npy", fps=1.0, unit="m")'), "could run code"),
+    "arrays of objects": (python('airflock.load_tracks("objects.npz", fps=1.0, unit="m")'), "could run code"),
     "replay": (command("replay", "evil.toml", "--html", "a.html"), ""),
     "fleet": (command("fleet", "evil.toml"), ""),
     "simulate": (python('airflock.simulate("evil.toml")'), CONSENT),

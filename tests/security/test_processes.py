@@ -156,6 +156,18 @@ def test_what_nobody_foresaw_is_one_line_and_a_traceback_for_who_asks():
         assert done.returncode == 2 and done.stderr.endswith(said) and (done.stderr == said) == (not debug)
 
 
+def test_a_home_that_cannot_be_written_costs_a_compilation_and_doctor_says_why(tmp_path):
+    nowhere = {key: value for key, value in os.environ.items() if key not in ("AIRFLOCK_CACHE", "XDG_CACHE_HOME")}
+    nowhere |= {"HOME": "/dev/null"}  # no folder can be made in it, whoever one is
+    words = ["run", "vasarhelyi_2018/4ms", "--agents", "3", "--duration", "1", "--device", "python", "--save", "a.nc"]
+    for command, said in ((["doctor"], "/dev/null/.cache/airflock cannot be written"), (words, "saved a.nc")):
+        done = subprocess.run(
+            [*COMMAND, *command], cwd=tmp_path, env=nowhere, capture_output=True, text=True, timeout=300
+        )
+        told = " ".join((done.stdout + done.stderr).split())
+        assert done.returncode == 0 and said in told and "Traceback" not in told, told
+
+
 OFFLINE = """
 import sys
 def refuse(event, _):

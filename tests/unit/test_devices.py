@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from airflock.engine import devices
+from airflock.engine import needs
 from airflock.engine.cuda import device as gpu
 from airflock.engine.cuda.shape import MOST_THREADS, shape_of
 from airflock.engine.simulate import picked, plan_of, score_flights
@@ -51,9 +51,9 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present):
 
 
 def test_work_grows_with_flights_agents_and_time():
-    base = devices.work(scenario(agents=100, duration=100.0))
-    assert devices.work(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
-    assert devices.work(scenario(agents=200, duration=100.0)) > 2.5 * base
+    base = needs.seconds_of(scenario(agents=100, duration=100.0))
+    assert needs.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
+    assert needs.seconds_of(scenario(agents=200, duration=100.0)) > 2.5 * base
 
 
 def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):

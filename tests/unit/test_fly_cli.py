@@ -86,3 +86,24 @@ def test_a_fleet_is_flown_and_told(airflock):
         "fleet", REAL, "--vehicle", "naza", "--against", "nature", "--save", "x.txt", "--set", "worl.side=1"
     )
     assert code == 2 and len(lines) >= 4
+
+
+def test_how_a_fleet_flies_is_checked_at_once(airflock):
+    code, _, lines = airflock("fleet", REAL, "--mode", "procs", "--body", "quad", "--vehicle", "px5", "--agents", 2)
+    assert code == 2 and len(lines) == 3
+    for line, part in zip(
+        lines, ("px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes"), strict=True
+    ):
+        assert part in line
+    faulty = ["--set", 'faults=[{kind="motor", at=1.0}]']
+    code, _, lines = airflock("fleet", REAL, "--agents", 2, "--mode", "tasks", *faulty)
+    assert code == 2 and lines == [
+        "airflock: faults.kind = 'motor': faults of a scenario fly with --mode lockstep; give --faults FILE instead"
+    ]
+
+
+def test_a_fleet_on_the_real_clock_tells_what_it_cost(airflock):
+    short = ["--agents", 2, "--duration", 1, "--set", "radio.delay=0.1", "--set", "world.side=120"]
+    code, out, _ = airflock("fleet", REAL, *short, "--mode", "tasks", "--body", "quadrotor", "--json")
+    (run,) = json.loads(out)["runs"]
+    assert code == 0 and run["load"]["ticks"] > 0 and run["load"]["cores"] > 0.0 and len(run["phases"]) == 2

@@ -11,7 +11,7 @@ from airflock.engine.cpu import driver_of
 from airflock.engine.simulate import plan_of
 from airflock.engine.state import State
 from airflock.engine.tables import tables
-from airflock.errors import FlightError
+from airflock.errors import FlightError, ParameterError, ScenarioError
 
 
 @pytest.mark.parametrize("agents", [50, 400])
@@ -58,3 +58,47 @@ def test_a_recording_that_is_too_long_is_told_how_long_one_fits(monkeypatch):
 def test_a_machine_tells_what_is_free():
     free = needs.free_memory()
     assert free is None or np.isfinite(free) and free > 10**7
+
+
+def test_a_flight_that_nobody_can_wait_for_is_refused_with_what_fits():
+    settings = {"agents": 200_000, "duration": 1e6, "start.side": 9e5, "world.side": 1e6}
+    scenario = airflock.load("vasarhelyi_2018/real_4ms", settings)
+    with pytest.raises(FlightError, match=r"takes about \S+ days of a processor, more than 30") as told:
+        airflock.score(scenario, seeds=1)
+    agents = int(re.search(r"about (\d+) agents fit", str(told.value))[1])
+    duration = float(re.search(r"a duration of about (\S+) s", str(told.value))[1])
+    for change in ({"agents": agents}, {"duration": 0.99 * duration}):
+        assert needs.seconds_of(airflock.load("vasarhelyi_2018/real_4ms", settings | change)) <= needs.LONGEST
+    more = airflock.load("vasarhelyi_2018/real_4ms", settings | {"agents": agents + 1})
+    assert needs.seconds_of(more) > needs.LONGEST
+
+
+def test_the_time_of_flights_is_told_once_it_is_worth_telling():
+    scenario = airflock.load("vasarhelyi_2018/4ms")
+    count = round(2 * 3 * 3600.0 / needs.seconds_of(scenario))
+    assert needs.time_note([scenario] * 3, 1) == ""
+    assert needs.time_note([scenario] * count, 2) == f"{count} flights will take about 3 h"
+
+
+def test_what_loads_has_all_the_numbers_that_follow_from_it():
+    with pytest.raises(
+        ScenarioError, match=r"metrics.collision_period = 1e-05 s lies outside .* follows from the other"
+    ):
+        airflock.load("vasarhelyi_2018/4ms", {"dt": 1e-5, "duration": 1.0})
+    assert (
+        airflock.load("vasarhelyi_2018/4ms", {"dt": 1e-5, "duration": 1.0, "metrics.collision_period": 1e-3})
+        .measured_by()
+        .collision_period
+        == 1e-3
+    )
+
+
+@pytest.mark.parametrize("trees", [300_000, 1_000_000])
+def test_a_forest_that_takes_minutes_to_build_is_refused_at_once(trees):
+    with pytest.raises(ScenarioError, match="at most 200000 fit, for instance scene.trees = 200000"):
+        airflock.load("kidger/forest", {"scene.trees": trees, "scene.density": 1.0, "scene.side": 1e5})
+
+
+def test_so_many_flights_are_refused_before_their_seeds_are_listed():
+    with pytest.raises(ParameterError, match="seeds = 1000000000: more than 10000000 flights at a time"):
+        airflock.score("vasarhelyi_2018/4ms", seeds=10**9)

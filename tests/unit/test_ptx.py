@@ -55,7 +55,8 @@ def test_ptx_of_every_model(name):
 def test_every_shipped_model_has_a_kernel_here():
     from airflock.engine.devices import no_cuda
 
-    shipped = {found.model.name: found for found in map(load, presets())}
+    flown = [found for found in map(load, presets()) if len(found.laws) == 1]  # groups with laws fly on a CPU
+    shipped = {found.model.name: found for found in flown}
     assert set(shipped) == {load(name).model.name for name in KERNELS}
     assert not any(no_cuda(plan_of(found), found.agents) for found in shipped.values())
 

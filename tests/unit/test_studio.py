@@ -236,9 +236,17 @@ def test_a_law_that_stops_flying_stops_the_flight_and_the_moment_before_is_there
     (tmp_path / "wild.toml").write_text(text)
     player = Player(str(tmp_path / "wild.toml"), trust=True)
     player.fly(500)
+    flock = Flock(player.side, np.zeros(3))
+    shown = flock.position.copy()
     player.change("model.push", 3e38)
     player.fly(500)
     assert "agent" in player.failure and "finite" in player.failure
+    assert not np.isfinite(player.motion[0]).all()
+    flock.look()
+    np.testing.assert_array_equal(flock.position, shown)  # a page goes on showing what it can
+    noted = measures.Measures(10.0, 10.0)
+    noted.note(player.flight, flock.velocity, flock.pairs)
+    assert np.isfinite(np.array(noted.instants)[:, 1:]).all()
     player.back(player.flight.time)
     assert not player.failure and np.isfinite(player.flight.state).all()
 

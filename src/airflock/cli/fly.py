@@ -115,9 +115,15 @@ def prepare(
     ]
     if full:
         raise CardError(full)
-    made = write_card(out, document)
-    write_key(out.with_suffix(".key"), secrets.token_bytes(32))
-    write_key(out.with_suffix(".operator"), private)
+    files = (out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    try:
+        made = write_card(files[0], document)
+        write_key(files[1], secrets.token_bytes(32))
+        write_key(files[2], private)
+    except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
+        for path in files:
+            path.unlink(missing_ok=True)
+        raise
     if as_json:
         radio = {name: share for name, _, share in loads}
         tables.emit_json({"card": str(out), "hash": made.hash, "members": list(made.members), "airtime": radio})

@@ -1,6 +1,6 @@
 """Options that several verbs share, and what they turn into."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -99,6 +99,17 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
         elif path.is_dir() or not os.access(folder, os.W_OK):
             faults.append(f"{path}: cannot be written")
     refuse(faults)
+
+
+def tell_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
+    """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
+    from airflock.cli.tables import say
+    from airflock.engine.needs import time_note
+    from airflock.threads import cores
+
+    note = time_note(scenarios, threads or cores()) if device == "cpu" else ""
+    if note:
+        say(f"note: {note} on {min(threads or cores(), cores())} cores")
 
 
 def compile_aloud(scenario: Any, precision: int, device: str) -> None:

@@ -49,6 +49,7 @@ def run(
     numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     if scheduler is None:
         device = picked(flights, device, precision=precision, say=tables.say)
+        options.tell_time(flights, threads, device)
         options.compile_aloud(found, precision, device)
     chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:

@@ -66,6 +66,7 @@ def sweep(
         tables.say(f"note: {note}")
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
     if scheduler is None:
+        options.tell_time([found for found in scenarios for _ in numbers], threads, device)
         options.compile_aloud(scenarios[0], precision, device)
     with options.progress(f"{scenario}: flights", len(points) * seeds, quiet=as_json) as done:
         chosen: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device}

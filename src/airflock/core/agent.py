@@ -30,13 +30,15 @@ class State(NamedTuple):
 class Heard(NamedTuple):
     """A neighbour as heard: who it is (its index in the flock), its state, and the age of these data, s.
 
-    fade : normal number by which its signal is weaker than its distance says; 0 where nothing is drawn
+    fade  : normal number by which its signal is weaker than its distance says; 0 where nothing is drawn
+    group : number of its group; -1 where it is in none
     """
 
     who: int
     state: State
     age: float
     fade: float = 0.0
+    group: float = -1.0
 
 
 class Decision(NamedTuple):
@@ -57,6 +59,7 @@ def decide(
     time: float,
     period: float,
     index: int = 0,
+    group: float = -1.0,
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
     percept: Percept | None = None,
     shared: Any = None,
@@ -71,7 +74,7 @@ def decide(
     surfaces   : distance (m, negative on the far side) and unit normal of every wall and obstacle
     memory     : Memory from the last decision; None before the first
     time       : since the start of the flight, s; period : between two decisions, s
-    index      : own index in the flock; centre : of the arena, m
+    index      : own index in the flock; group : number of its group, -1 in none; centre : of the arena, m
     shared     : what the model's `flock` found for this agent; wing, aero : parameters of the wing and of drag descent
     percept    : where rays or noise are wanted, one whose methods are bound to a range finder and to random numbers
 
@@ -81,7 +84,7 @@ def decide(
     f = 1.0 / norm(vx, vy, vz)
     given: dict[str, Any] = {
         "own": Own(vx, vy, vz, f * vx, f * vy, f * vz),
-        "sums": meet_neighbours(model, p, own, neighbours, index),
+        "sums": meet_neighbours(model, p, own, neighbours, index, group),
         "walls": meet_surfaces(model, p, own, surfaces),
         "memory": first_memory(model) if memory is None else memory,
         "percept": percept or Percept(time, centre[0] - own.x, centre[1] - own.y, centre[2] - own.z),
@@ -93,6 +96,9 @@ def decide(
     }
     result = answer(model.decide, "decide", given, model.name)
     x, y, z = result[:3]
+    if model.added is not None:
+        more = answer(model.added.decide, "decide", given, model.added.name)
+        x, y, z = x + more[0], y + more[1], z + more[2]
     return Decision((x, y, z), result[3] if len(result) > 3 else memory)
 
 
@@ -101,7 +107,9 @@ def first_memory(model: Model) -> Any:
     return model.Memory() if model.Memory is not None else None
 
 
-def meet_neighbours(model: Model, p: Any, own: State, neighbours: Iterable[Heard], index: int) -> Any:
+def meet_neighbours(
+    model: Model, p: Any, own: State, neighbours: Iterable[Heard], index: int, group: float = -1.0
+) -> Any:
     """The model's Sums over all neighbours within its reach; None without Sums."""
     if model.Sums is None:
         return None
@@ -110,7 +118,7 @@ def meet_neighbours(model: Model, p: Any, own: State, neighbours: Iterable[Heard
     near = answer(model.reach, "reach", {"p": p}, model.name) if model.reach is not None else FAR
     terms = []
     for heard in neighbours:
-        given = pair_percept(own, heard, index)
+        given = pair_percept(own, heard, index, group)
         if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
             terms.append(answer(model.neighbour, "neighbour", given | {"p": p}, model.name))
     return reduced(model.Sums, model.reduce, terms)
@@ -129,8 +137,8 @@ def meet_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[flo
     return reduced(model.Walls, {}, terms)
 
 
-def pair_percept(own: State, heard: Heard, index: int) -> dict[str, float]:
-    """Everything that a neighbour rule may ask for, SI; differences are neighbour minus own."""
+def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> dict[str, float]:
+    """Everything that a neighbour rule may ask for, SI; differences are neighbour minus own; group : the own one."""
     other = heard.state
     dx, dy, dz = other.x - own.x, other.y - own.y, other.z - own.z
     dvx, dvy, dvz = other.vx - own.vx, other.vy - own.vy, other.vz - own.vz
@@ -142,6 +150,7 @@ def pair_percept(own: State, heard: Heard, index: int) -> dict[str, float]:
         "vx": own.vx, "vy": own.vy, "vz": own.vz, "hx": f * own.vx, "hy": f * own.vy, "hz": f * own.vz,
         "nhx": g * other.vx, "nhy": g * other.vy, "nhz": g * other.vz,
         "age": heard.age, "lower": 1.0 if heard.who < index else 0.0,
+        "kin": 1.0 if heard.group == group else 0.0, "group": heard.group,
     }  # fmt: skip
 
 

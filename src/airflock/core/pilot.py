@@ -3,7 +3,7 @@
 Checked once, when it is made: a law that asks for what a drone does not have is refused then, never in flight.
 """
 
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Protocol, Self
@@ -154,6 +154,7 @@ class Pilot:
     wing, aero : parameters of the wing and of drag descent, for laws that ask for them
     told     : the law decides for the whole flock; somebody who knows all states tells `decide` what it found
     topology, t : whom of those whom it hears it meets, and the numbers of that; None: all
+    groups   : of each agent the number of its group, -1 in none; empty where nobody is in one
 
     Raises RuleError where the law asks for what a drone does not have, or gives what is no velocity.
     """
@@ -162,13 +163,14 @@ class Pilot:
         self, model: Model, p: Any, place: World, *, index: int, period: float, hearing: Hearing | None = None,
         body: Body | None = None, b: Any = None, silence: Silence | None = None, flat: bool = False, seed: int = 0,
         wing: Any = None, aero: Any = None, told: bool = False, topology: Topology | None = None, t: Any = None,
+        groups: Sequence[int] = (),
     ):  # fmt: skip
         self.model, self.p, self.place, self.index, self.period = model, p, place, index, period
         self.hearing, self.flat, self.seed = hearing or Hearing(), flat, seed
         speed = float(model.preferred_speed(p)) if model.preferred_speed is not None else 0.0
         self.silence = complete(silence, speed) if silence is not None and silence.rule == "stop" else None
         self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
-        self.topology, self.t = topology, t
+        self.topology, self.t, self.groups = topology, t, groups
         self.memory = first_memory(model)
         self.stopped: Vector | None = None
         self.stands_until = 0.0
@@ -179,9 +181,8 @@ class Pilot:
 
     def _check(self) -> None:
         """Refuse the law now rather than in flight: one decision with a neighbour and a wall, which must be finite."""
-        if not self.told and (
-            self.model.flock is not None or "shared" in asks(self.model.decide, "decide", self.model.name)
-        ):
+        asked = [name for rule in self.model.deciding for name in asks(rule, "decide", self.model.name)]
+        if not self.told and (self.model.flock is not None or "shared" in asked):
             raise RuleError(f"{self.model.name} decides for the whole flock at once; no single drone can fly it")
         if self.model.command != "velocity" and (self.body is None or self.body.accepts != self.model.command):
             raise RuleError(
@@ -209,6 +210,10 @@ class Pilot:
         self.packets[who] = Packet(state, sent_at, self.decisions)
         return True
 
+    def group_of(self, who: int) -> float:
+        """Number of an agent's group; -1 where it is in none."""
+        return float(self.groups[who]) if 0 <= who < len(self.groups) else -1.0
+
     def forget(self, who: int) -> None:
         """Drop what is known of a neighbour: it has told that it is on the ground, or has left the flock."""
         self.packets.pop(who, None)
@@ -218,11 +223,12 @@ class Pilot:
         found, rule = [], self.hearing
         for who, packet in sorted(self.packets.items()):
             age = now - packet.sent_at
-            told = age <= rule.forget and not (rule.once and packet.came < self.decisions)
+            over = rule.once and (self.silence is not None or packet.came < self.decisions)  # by silence: `counts`
+            told = age <= rule.forget and not over
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
                 state = state if rule.radio is None else carried(rule.radio, rule.k, state, age)
-                found.append(Heard(who, level(state) if self.flat else state, age))
+                found.append(Heard(who, level(state) if self.flat else state, age, group=self.group_of(who)))
         return found
 
     def lost_near(self, own: State, now: float) -> bool:
@@ -269,7 +275,7 @@ class Pilot:
         time = now if time is None else time
         self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
         near = [
-            Heard(heard.who, self.place.beside(own, heard.state), heard.age, (fades or {}).get(heard.who, 0.0))
+            heard._replace(state=self.place.beside(own, heard.state), fade=(fades or {}).get(heard.who, 0.0))
             for heard in self.heard(now)
             if only is None or heard.who in only
         ]
@@ -287,7 +293,7 @@ class Pilot:
     ) -> Decision:  # fmt: skip
         return decide(
             self.model, self.p, own, near, walls, self.memory, time=time, period=self.period, index=self.index,
-            percept=percept, shared=shared, wing=self.wing, aero=self.aero,
+            group=self.group_of(self.index), percept=percept, shared=shared, wing=self.wing, aero=self.aero,
         )  # fmt: skip
 
     def steer(self, own: State, now: float, goal: Vector | None = None) -> Vector:

@@ -1,10 +1,13 @@
 """Sensing: one agent's sensor, measurement after measurement, in plain Python with the random numbers of a flight."""
 
+from collections.abc import Callable
 from typing import Any
 
 from airflock.core import random
 from airflock.core.agent import State, answer
 from airflock.core.sensor import FIRST, Sensor
+
+Words = Callable[[int, int], tuple[int, int, int, int]]
 
 
 class Sensing:
@@ -13,10 +16,12 @@ class Sensing:
     sensor, s   : kind of sensor and its numbers
     seed, agent : by which its random numbers are drawn, those of the same agent in a flight of this seed
     flat        : whether the agent flies in a plane, where nothing is wrong along the third axis
+    words       : four random words by the numbers of a measurement and a draw, where somebody has them already
     """
 
-    def __init__(self, sensor: Sensor, s: Any, seed: int, agent: int, *, flat: bool):
+    def __init__(self, sensor: Sensor, s: Any, seed: int, agent: int, *, flat: bool, words: Words | None = None):
         self.sensor, self.s, self.seed, self.agent, self.flat = sensor, s, seed, agent, flat
+        self._words: Words = words or (lambda number, draw: random.words(seed, random.SENSOR, 0, number, agent, draw))
         self.off = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._memory = sensor.Memory() if sensor.Memory is not None else None
 
@@ -32,7 +37,7 @@ class Sensing:
     def _added(self, number: int, period: float) -> tuple[list[float], list[float]]:
         """Errors that are added along each axis."""
         assert self.sensor.error is not None
-        low, high = (random.words(self.seed, random.SENSOR, 0, number, self.agent, draw) for draw in (0, 1))
+        low, high = (self._words(number, draw) for draw in (0, 1))
         normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
         steps = [
             answer(self.sensor.error, "error", {"dx": dx, "dv": dv, "g": g, "period": period, "s": self.s})

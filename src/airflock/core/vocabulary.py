@@ -32,6 +32,8 @@ PAIR = {
     "nhz": "the same, up",
     "age": "age of the neighbour's data, s",
     "lower": "1.0 if the neighbour has the lower index, else 0.0",
+    "kin": "1.0 if the neighbour is of the own group, else 0.0",
+    "group": "number of the neighbour's group in [[groups]], the first being 0.0; -1.0 if it is in none",
 }
 SURFACE = {
     "distance": "distance to the surface, m; negative on its far side",

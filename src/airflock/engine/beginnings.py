@@ -15,6 +15,15 @@ def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
     return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
 
 
+def first_memories(plan: Plan, laws: NDArray[Any], real: Any) -> NDArray[Any]:
+    """What laws remember at the start, (field, lane): of each lane what its law does; laws : number of each lane's."""
+    found = [beginning(record, 1, real)[:, 0] for record in plan.memories]
+    table = np.zeros((max(map(len, found)), len(found)), real)
+    for law, values in enumerate(found):
+        table[: len(values), law] = values
+    return table[:, laws]
+
+
 def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
     """The defaults of a Memory for each of m lanes: (field, lane)."""
     starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import first_memories
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
@@ -26,8 +27,6 @@ def carry(old: State, new: State, step: int) -> None:
     if old.plan.packets and new.plan.packets:
         kept = None if old.plan.radio == new.plan.radio else 2 * new.plan.dimensions + 1  # another radio begins anew
         new.arrays["store"][:kept] = old.arrays["store"][:kept, lanes[: old.agents]][..., lanes]
-    if old.plan.model.Memory is not None and old.plan.model.Memory is new.plan.model.Memory:
-        new.arrays["mem"][...] = old.arrays["mem"][:, lanes]
     _remembered(old, new, lanes)
     if np.array_equal(old.tables.shapes, new.tables.shapes) and old.arrays["later"].shape == new.arrays["later"].shape:
         for name in ("counts", "later", "shapes"):
@@ -40,6 +39,7 @@ def carry(old: State, new: State, step: int) -> None:
     new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]
     new.set_whole("agents", old.here)
     new.fill_own()
+    _memories(old, new, lanes)
 
 
 def _lanes(old: State, new: State) -> NDArray[np.int64]:
@@ -67,6 +67,16 @@ def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
             work[place] = before[had[source]][lanes]
     if new.has_slots and "order" not in had:
         new.order[:] = np.arange(new.agents)
+
+
+def _memories(old: State, new: State, lanes: NDArray[np.int64]) -> None:
+    """What laws remember of each agent; by a law with another Memory an agent begins anew."""
+    laws, real = new.laws, new.arrays["mem"].dtype
+    new.arrays["mem"][:] = first_memories(new.plan, laws, real)
+    before, now = old.plan.memories, new.plan.memories
+    keeps = np.array([[one is other and one is not None for one in before] for other in now])
+    kept, count = keeps[laws, old.laws[lanes]], min(len(old.arrays["mem"]), len(new.arrays["mem"]))
+    new.arrays["mem"][:count, kept] = old.arrays["mem"][:count, lanes[kept]]
 
 
 def _goes_on(row: str, old: Plan, new: Plan) -> bool:

@@ -8,16 +8,14 @@ import numpy as np
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
+from airflock.engine.needs import total_seconds
 from airflock.engine.plan import Plan
 from airflock.engine.tables import tables
 from airflock.errors import DeviceError, ScenarioError
 from airflock.scenarios.scenario import Scenario
-from airflock.scenarios.timing import clock
 from airflock.threads import cores
 
 DEVICES = ("auto", "cpu", "cuda", "python")
-PAIR = 1.5e-9  # s that one core takes for one pair of agents (2 cores of 2023, single precision)
-STEP = 4e-9  # s for one motion step of one agent
 MOST_TOGETHER = 20_000  # agents whose pairs one block of a GPU can look at in reasonable time
 WORTH = 5.0  # s of work on all cores from which a GPU is worth its start
 
@@ -61,7 +59,7 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
     missing = trouble() or next(filter(None, faults), None)
     if missing is not None:
         return Choice("cpu", missing)
-    seconds = sum(work(scenario) for scenario in scenarios) / cores()
+    seconds = total_seconds(scenarios) / cores()
     if seconds < WORTH:
         return Choice("cpu", f"about {seconds:.2g} s of work on {cores()} cores")
     missing = next(filter(None, map(no_room, largest.values(), largest)), None)
@@ -97,6 +95,10 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
         return f"radio.kind = {plan.radio.name!r} flies on device = cpu or python"
     if plan.topology is not None:
         return f"topology.kind = {plan.topology.name!r} flies on device = cpu or python"
+    if plan.laws:
+        return "groups with laws of their own fly on device = cpu or python"
+    if plan.grouped:
+        return "rules that ask for groups fly on device = cpu or python"
     if plan.varied:
         return "numbers that differ among agents fly on device = cpu or python"
     if agents <= MOST_TOGETHER:
@@ -105,14 +107,6 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
 
     fault = refused(plan, agents)
     return None if fault is None else f"{agents} agents are more than one block flies ({MOST_TOGETHER}), and {fault}"
-
-
-def work(scenario: Scenario) -> float:
-    """Rough time (s) of one flight on one core."""
-    times, n = clock(scenario), float(scenario.agents)
-    looks = times["steps"] / times["decide_every"] + times["steps"] / times["sample_every"]
-    pairs = min(n, 60.0) if n >= 1000 and scenario.model.reach is not None else n
-    return looks * n * pairs * PAIR + times["steps"] * n * STEP
 
 
 def fly_one(

@@ -12,6 +12,7 @@ import inspect
 import math
 import types
 from collections.abc import Callable, Mapping
+from copy import copy
 from typing import Any
 
 from airflock.core import random as random_streams
@@ -40,10 +41,18 @@ class Source:
     def __init__(self, decorator: str, constants: Mapping[str, Mapping[str, str | float]]):
         self.decorator = decorator
         self.constants = constants
+        self.law = 0
         self.blocks: list[str] = []
         self.rows: dict[str, tuple[str, ...]] = {}
         self._names: dict[Any, str] = {}
+        self._originals: dict[str, Any] = {}
         self._apart = False
+
+    def of(self, law: int, constants: Mapping[str, Mapping[str, str | float]]) -> "Source":
+        """The same text, for rules of another law of the flock: what they read of its records is its own."""
+        other = copy(self)
+        other.constants, other.law = constants, law
+        return other
 
     def name(self, item: Any, chosen: Mapping[str, str] = NOTHING) -> str:
         """Name in the driver of a plain function or a NamedTuple class; adds its text on first use.
@@ -51,6 +60,8 @@ class Source:
         chosen : arguments of the function that are choices, by name; they become constants of its text
         """
         key = (item, *chosen.items()) if chosen else item
+        if self.law and inspect.isfunction(item) and {"p", "percept"} & set(item.__code__.co_varnames):
+            key = (self.law, key)
         if key in self._names:
             return self._names[key]
         drawn = inspect.isfunction(item) and item.__module__ == random_streams.__name__
@@ -63,6 +74,8 @@ class Source:
             count += 1
             name = f"{base}{count}"
         self._names[key] = name
+        if not chosen:
+            self._originals[name] = item
         if isinstance(item, type):
             self.blocks.append(f"{name} = namedtuple({name!r}, {list(getattr(item, '_fields', ()))!r})")
         else:
@@ -75,7 +88,7 @@ class Source:
 
     def originals(self) -> dict[str, Any]:
         """What was copied, by its name in the driver: plain functions and NamedTuple classes of their authors."""
-        return {name: item for item, name in self._names.items() if not isinstance(item, (str, tuple))}
+        return dict(self._originals)
 
     def solver(self, rule: Callable[..., Any]) -> str:
         """Name of an array-valued rule: its loops are its own, so neither it nor what it calls is inlined as text."""
@@ -112,6 +125,11 @@ class Source:
         if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
             decorator = ALONE
         return f"{decorator}\n{ast.unparse(rewritten)}"
+
+
+def law_mark(law: int | None) -> str:
+    """What names of a driver end in that are of one law of several."""
+    return f"_{law}" if law else ""
 
 
 def _depth(node: ast.AST) -> int:
@@ -179,7 +197,7 @@ class _Rewrite(ast.NodeTransformer):
         self.generic_visit(node)
         method = node.func
         if isinstance(method, ast.Attribute) and isinstance(method.value, ast.Name) and method.value.id == "percept":
-            node.func = ast.Name(f"percept_{method.attr}", ast.Load())  # bound by the driver
+            node.func = ast.Name(f"percept_{method.attr}{law_mark(self.source.law)}", ast.Load())  # bound by the driver
             node.args.insert(0, method.value)
         if isinstance(node.func, ast.Name) and node.func.id == "float":
             node.func.id = "real"

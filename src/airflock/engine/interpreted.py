@@ -178,15 +178,17 @@ def _bound(build: Builder) -> dict[str, Any]:
     """What the stages call by name: rules and records as their authors wrote them, rows of numbers with choices."""
     found: dict[str, Any] = dict(build.source.originals())
     for name, fields in build.source.rows.items():
-        letter = name[: len(name) // 2].lower()
-        choices = {key: value for key, value in build.plan.constants.get(letter, {}).items() if key not in fields}
+        record, _, law = name.partition("_")
+        constants = build.plan.of(int(law or 0)).constants.get(record[: len(record) // 2].lower(), {})
+        choices = {key: value for key, value in constants.items() if key not in fields}
         found[name] = type(name, (namedtuple(name, fields),), choices)  # type: ignore[misc]
     return found
 
 
 def _let_perceive(build: Builder, space: dict[str, Any]) -> None:
     """Give the record `percept` the methods that rules call."""
-    record = space.get("PERCEPT")
-    for method in BOUND if record is not None else ():
-        if f"percept_{method}" in space:
-            setattr(record, method, space[f"percept_{method}"])
+    for own in build.laws:
+        record = space.get(f"PERCEPT{own.mark}")
+        for method in BOUND if record is not None else ():
+            if f"percept_{method}{own.mark}" in space:
+                setattr(record, method, space[f"percept_{method}{own.mark}"])

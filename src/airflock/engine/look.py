@@ -9,6 +9,7 @@ from airflock.core import agent as one
 from airflock.core import radio, random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
+from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.pilot import carried
 from airflock.core.topology import met_of
@@ -51,7 +52,7 @@ class View:
 
 def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, world: int) -> View:
     """What `agent` perceived at the last decision up to `step`. Exact where the driver has just decided there."""
-    plan, model = state.plan, scenario.model
+    plan, model = state.plan, scenario.law_of(agent).model
     every = state.whole("decide_every")
     number = step // every
     measured, said = [motion(state, prefix) for prefix in ("m", "h")]
@@ -65,7 +66,8 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     for other, meets in zip(heard, met, strict=True):
         if model.neighbour is None:
             break
-        given = one.pair_percept(own, Heard(other.who, _beside(scenario, own, other.state), other.age), agent)
+        beside = other._replace(state=_beside(scenario, own, other.state))
+        given = one.pair_percept(own, beside, agent, scenario.group_numbers[agent])
         far = not meets or given["r"] > near
         same = given | {"dvx": 0.0, "dvy": 0.0, "dvz": 0.0, "dv": norm(0.0, 0.0, 0.0)}
         same |= {f"n{name}": given[name] for name in ("hx", "hy", "hz")}
@@ -73,12 +75,20 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
         none = type(found[0])(*(0.0 for _ in found[0]))
         terms.append(none if far else found[0])
         alike.append(none if far else found[1])
-    memory = model.Memory(*(float(x) for x in state.arrays["mem"][:, _slot(state, agent)])) if model.Memory else None
+    memory = _memory(state, model, agent)
     command = tuple(float(state.rows([f"c{axis}"])[0, agent]) for axis in plan.axes)
     return View(
         agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms), tuple(alike),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
     )  # fmt: skip
+
+
+def _memory(state: State, model: Model, agent: int) -> Any:
+    """What a law remembers of an agent."""
+    if model.Memory is None:
+        return None
+    fields = len(model.Memory._fields)  # type: ignore[attr-defined]
+    return model.Memory(*(float(x) for x in state.arrays["mem"][:fields, _slot(state, agent)]))
 
 
 def _met(scenario: Scenario, state: State, own: Motion, heard: tuple[Heard, ...]) -> tuple[bool, ...]:
@@ -95,8 +105,9 @@ def _met(scenario: Scenario, state: State, own: Motion, heard: tuple[Heard, ...]
 
 def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
     """Numbers of the law, with the agent's own where they differ among agents."""
-    own = zip(state.plan.varied, state.tables.own[:, agent].tolist(), strict=True)
-    return replace(scenario.parameters, **{name: value for (letter, name), value in own if letter == "p"})
+    law, own = scenario.law_of(agent), zip(state.plan.columns, state.tables.own[:, agent].tolist(), strict=True)
+    numbers = {name: value for (letter, name), value in own if letter == "p" and (letter, name) in law.varied}
+    return replace(law.parameters, **numbers)
 
 
 def motion(state: State, prefix: str) -> list[Motion]:
@@ -122,7 +133,7 @@ def _heard(
     """Everybody in range whose packet agent i has and still believes: as the driver drew it, from the same counters."""
     k, plan, n = scenario.radio, state.plan, state.agents
     fades = plan.topology is not None and plan.topology.asks("fade")
-    clocks, reach = _clocks(state), _reach(state, i)
+    clocks, reach, groups = _clocks(state), _reach(state, i), scenario.group_numbers
     late = clock(scenario)["delay"] * scenario.flight.dt
     now = number * state.whole("decide_every") * scenario.flight.dt
     for j in range(n):
@@ -141,13 +152,13 @@ def _heard(
             if stamp <= NEVER / 10.0 or not (plan.radio.keeps or silence.counts(age, scenario.silent_by())):
                 continue
             sent = Motion(*packet[:axes], *flat, *packet[axes : 2 * axes], *flat)
-            yield Heard(j, carried(plan.radio, k, sent, age), age, fade)
+            yield Heard(j, carried(plan.radio, k, sent, age), age, fade, groups[j])
         elif distance * distance > reach[j]:
             continue
         elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(
             distance, k
         ):
-            yield Heard(j, said[j], late + clocks[i] - clocks[j], fade)
+            yield Heard(j, said[j], late + clocks[i] - clocks[j], fade, groups[j])
 
 
 def _reach(state: State, i: int) -> list[float]:

@@ -131,8 +131,9 @@ def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
 
 
 def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
-    """Numbers that differ among agents, (number, agent): of their groups, with the tolerances of manufacture."""
-    made = np.zeros((len(plan.varied), scenario.agents))
-    for c, (letter, name) in enumerate(plan.varied):
-        made[c] = scenario.own_numbers(letter, name, seed)
+    """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
+    made = np.zeros((len(plan.columns), scenario.agents))
+    known = {"law": scenario.law_numbers, "group": scenario.group_numbers}
+    for c, (letter, name) in enumerate(plan.columns):
+        made[c] = scenario.own_numbers(letter, name, seed) if letter else known[name]
     return made

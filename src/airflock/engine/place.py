@@ -21,9 +21,10 @@ class Place(Map):
     def __init__(self, scenario: Scenario):
         stands, self.edge, self.dims = scenario.stands(), EDGES[scenario.world.edges], scenario.dimensions
         shapes, later = unbuilt(stands)
+        casts = any(law.model.sight is not None for law in scenario.laws)
         super().__init__(
             scenario.world, Shapes(shapes.tolist(), stands.nodes.tolist(), stands.links.tolist()),
-            look=reach_of_walls(scenario.model, scenario.parameters), casts=scenario.model.sight is not None,
+            look=reach_of_walls(scenario.model, scenario.parameters), casts=casts,
         )  # fmt: skip
         self.later, self.clearance = later.tolist(), scenario.start.clearance
         self.meshed = scenario.scene.kind == "mesh"

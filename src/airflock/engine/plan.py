@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
@@ -25,6 +25,18 @@ WHOLE = (
 
 NEVER = -1e9  # s; time stamp of a packet that has not come
 GONE = -1.0  # s; when what is not under way is due
+
+
+class OwnLaw(NamedTuple):
+    """A law that groups of a flock fly by, beside that of the others.
+
+    choices : its compile-time constants, by name
+    varied  : its numbers that differ among those who fly by it, as (letter, name)
+    """
+
+    model: Model
+    choices: tuple[tuple[str, str | float], ...]
+    varied: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,6 +89,9 @@ class Plan:
     faults    : kinds of fault that may occur
     varied    : numbers that differ among agents, as (letter, name); each is a row
     topology  : which of those whom an agent hears it meets; None: all. fading: signals differ by chance
+    laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
+    law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
+    grouped   : a rule asks for the groups of agents
     """
 
     model: Model
@@ -119,6 +134,9 @@ class Plan:
     varied: tuple[tuple[str, str], ...] = ()
     topology: Topology | None = None
     fading: bool = False
+    laws: tuple[OwnLaw, ...] = ()
+    law: int | None = None
+    grouped: bool = False
     build: Build = Build()
 
     def __hash__(self) -> int:
@@ -157,6 +175,32 @@ class Plan:
     def absence(self) -> bool:
         """Whether agents may be absent."""
         return self.build.absence
+
+    def of(self, law: int) -> "Plan":
+        """The same flight as the stages of one law see it: its model, and its numbers under the letter p."""
+        if not self.laws or law == 0:
+            return replace(self, law=law) if self.laws else self
+        own, letters = self.laws[law - 1], {"p": "p0", f"p{law}": "p"}
+        numbers = tuple((letters.get(letter, letter), fields) for letter, fields in self.numbers)
+        varied = own.varied + tuple(each for each in self.varied if each[0] != "p")
+        return replace(self, law=law, model=own.model, model_choices=own.choices, numbers=numbers, varied=varied)
+
+    @property
+    def every(self) -> tuple["Plan", ...]:
+        """The plan as the stages of each law see it."""
+        return tuple(self.of(law) for law in range(len(self.laws) + 1))
+
+    @property
+    def memories(self) -> tuple[type | None, ...]:
+        """What each law remembers of an agent."""
+        return (self.model.Memory, *(own.model.Memory for own in self.laws))
+
+    @property
+    def columns(self) -> tuple[tuple[str, str], ...]:
+        """Rows of what differs among agents, as (letter, name): numbers, which laws share by name, law and group."""
+        found = [*self.varied, *(each for own in self.laws for each in own.varied)]
+        found += [("", "law")] if self.laws else []
+        return tuple(dict.fromkeys([*found, *([("", "group")] if self.grouped else [])]))
 
     def suffers(self, *rules: str) -> tuple[Fault, ...]:
         """Kinds of fault that have one of these rules."""
@@ -326,6 +370,18 @@ RAYS = {"square": rays.to_box, "polygon": rays.to_polygon, "circle": rays.to_cyl
 EDGES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
 
 
+def constants_of(
+    model: Model, parameters: Any, varied: tuple[tuple[str, str], ...]
+) -> tuple[tuple[str, str | float], ...]:
+    """Choices of a law, and its usual numbers where they are so and do not differ among agents."""
+    usual: dict[str, str | float] = {
+        name: number
+        for name, number in model.usual.items()
+        if getattr(parameters, name) == number and ("p", name) not in varied
+    }
+    return tuple(sorted((usual | choices(parameters)).items()))
+
+
 def make_plan(
     model: Model,
     parameters: Any,
@@ -336,14 +392,9 @@ def make_plan(
 ) -> Plan:
     """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
     surfaces, beyond = arena_surfaces(world)
-    usual: dict[str, str | float] = {
-        name: number
-        for name, number in model.usual.items()
-        if getattr(parameters, name) == number and ("p", name) not in options.get("varied", ())
-    }
     return Plan(
         model=model,
-        model_choices=tuple(sorted((usual | choices(parameters)).items())),
+        model_choices=constants_of(model, parameters, options.get("varied", ())),
         numbers=tuple(numbers.items()),
         metrics=metrics,
         surfaces=surfaces,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import beginning, memories, of_pairs
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.tables import AWAY
 
 if TYPE_CHECKING:
@@ -72,11 +72,11 @@ def _set(state: "State", here: int) -> None:
         store[:, lanes] = of_pairs(plan, count, store.shape[2], work.dtype)
         store[:, :, lanes] = of_pairs(plan, store.shape[1], count, work.dtype)
     count, real = state.agents - here, work.dtype
-    state.arrays["mem"][:, lanes] = beginning(plan.model.Memory, count, real)
     state.arrays["memory"][:, lanes] = memories(plan, count, real)
     for name in state.solved:  # what rules of the whole flock go on from is found anew
         state.arrays[name][...] = 0.0
     state.fill_own()
+    state.arrays["mem"][:, lanes] = first_memories(plan, state.laws[lanes], real)
 
 
 def _put(state: "State", places: list[int]) -> None:

@@ -19,8 +19,8 @@ from airflock.engine.passes.flock import shapes_of
 from airflock.errors import RuleError
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
-    3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 7.0, 0.0,
-    1.0, 0.0,
+    3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 0.0, 1.0,
+    7.0, 0.0, 1.0, 0.0,
 ), strict=True))  # fmt: skip
 
 
@@ -49,6 +49,9 @@ def probe(model: Model, parameters: Any) -> None:
     if model.flock is not None:
         law.check(model.flock)
         given["shared"] = _shared(model, given)
+    if model.added is not None:
+        law.check(model.added.decide)
+        _call(model.added.decide, "decide", given, model.added.name)
     law.check(model.decide)
     answer = _call(model.decide, "decide", given, model.name)
     expected = 4 if model.Memory is not None else 3

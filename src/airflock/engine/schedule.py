@@ -7,6 +7,7 @@ every so-manieth. `stages.flight` is the same as a function; kernels and cells t
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from airflock.engine.generate import law_mark
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
 
@@ -34,6 +35,7 @@ ORDER: Mapping[str, Event] = {
     "sample": Event(("measure_sample",), "sample_every"),
     "move": Event(("move",)),
 }
+BY_LAW = ("neighbours", "boundaries", "decide")  # which ask a law: one of each for every law of the flock
 AT_ONCE = ("perceive", "tune", "rearrange", "flock")  # for all agents: not where one after another decides and moves
 NEEDED: Mapping[str, Callable[[Plan], bool]] = {
     "snapshot": lambda plan: plan.late,
@@ -54,11 +56,15 @@ NEEDED: Mapping[str, Callable[[Plan], bool]] = {
 
 def order(plan: Plan) -> dict[str, tuple[str, ...]]:
     """Stages of each event that a plan has, in the order of a step."""
+    return {
+        name: tuple(each for stage in event.stages for each in _of_laws(stage, plan)) for name, event in ORDER.items()
+    }
 
-    def needed(stage: str) -> bool:
-        return stage not in NEEDED or NEEDED[stage](plan)
 
-    return {name: tuple(stage for stage in event.stages if needed(stage)) for name, event in ORDER.items()}
+def _of_laws(stage: str, plan: Plan) -> list[str]:
+    """Names of a stage in a plan that has it; of one that asks a law, for each law that has such a rule."""
+    plans = plan.every if stage in BY_LAW else (plan,)
+    return [f"{stage}{law_mark(own.law)}" for own in plans if stage not in NEEDED or NEEDED[stage](own)]
 
 
 def in_turn(plan: Plan) -> tuple[str, ...]:

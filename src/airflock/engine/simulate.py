@@ -13,7 +13,7 @@ from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Build, Plan, make_plan
+from airflock.engine.plan import Build, OwnLaw, Plan, constants_of, make_plan
 from airflock.engine.probe import probe, probe_fault, probe_radio, probe_sensor
 from airflock.engine.state import State
 from airflock.engine.tables import tables
@@ -44,7 +44,9 @@ def plan_of(
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
-    _probed(scenario.model, tuple(choices(scenario.parameters).items()))
+    laws = scenario.laws
+    for law in laws:
+        _probed(law.model, tuple(choices(law.parameters).items()))
     wind, kinds = scenario.wind, scenario.fault_kinds
     for kind in kinds:
         probe_fault(kind)
@@ -85,7 +87,9 @@ def plan_of(
         silent=scenario.silence.rule == "stop",
         faults=kinds,
         varied=scenario.varied,
-        topology=scenario.meets if scenario.model.neighbour is not None else None,
+        topology=scenario.meets if any(law.model.neighbour is not None for law in laws) else None,
+        laws=tuple(OwnLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
+        grouped=bool(scenario.groups) and any(law.asks_for_groups for law in laws),
         fading=scenario.topology.fading > 0.0,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
@@ -370,6 +374,8 @@ def _pays(scenario: Scenario) -> bool:
 
 def _by_cells(scenario: Scenario) -> bool:
     """Whether cells as wide as the law's reach hold all who decide whom an agent meets."""
+    if len(scenario.laws) > 1 or (scenario.groups and scenario.laws[0].asks_for_groups):
+        return False
     kind = scenario.meets
     walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
     return kind is None or (kind.near and not (walls and kind.asks("hidden")))

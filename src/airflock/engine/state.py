@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import beginning, memories, of_pairs
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.onsets import Onset, strike
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
@@ -55,6 +55,7 @@ class State:
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
         self.fill_own()
+        own["mem"][:] = first_memories(plan, self.laws, real)
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
@@ -175,12 +176,19 @@ class State:
     def fill_own(self) -> None:
         """Write the numbers that differ among agents, each to its agent."""
         slots = self.slots if self.begun else None
-        for (letter, name), values in zip(self.plan.varied, self.tables.own, strict=True):
+        for (letter, name), values in zip(self.plan.columns, self.tables.own, strict=True):
             row = self.driver.ROWS.get(own_row(letter, name))
             if row is not None:
                 lane = self.arrays["work"][row]
                 lane[: self.agents][slice(None) if slots is None else slots] = values
                 lane[self.agents :] = values[0]
+
+    @property
+    def laws(self) -> NDArray[np.int64]:
+        """Which of the plan's laws the agent in each lane flies by."""
+        row = self.driver.ROWS.get("law")
+        work = self.arrays["work"]
+        return np.zeros(work.shape[1], np.int64) if row is None else work[row].astype(np.int64)
 
     @property
     def finite(self) -> bool:
@@ -316,7 +324,8 @@ def _layout(
     pairs = (agents, m) if plan.packets else (1, 1)
     values, sums = sums_of(plan)
     beginnings = {
-        "mem": beginning(plan.model.Memory, m, real), "memory": memories(plan, m, real), "values": values, "sums": sums,
+        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
+        "values": values, "sums": sums,
         "store": of_pairs(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
     columns = sum(map(len, plan.records.values()))

@@ -105,7 +105,8 @@ def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
         "w": geometry(scenario), "c": Clock(scenario.flight.dt, period), "air": dryden.numbers_of(a),
         "a": wind.Steady(a.east, a.north, a.up, a.gust, a.gust_time), "silence": scenario.silent_by(),
     }  # fmt: skip
-    return {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
+    found = {each.letter: derived.get(each.letter, records[each.key]) for each in ORDER if each.letter}
+    return found | {f"p{k}": law.parameters for k, law in enumerate(scenario.laws) if k}
 
 
 def geometry(scenario: Scenario) -> Geometry:

@@ -47,6 +47,29 @@ class OuterNoise:
         return rows
 
 
+class SensorDice:
+    """Random words of the errors of every drone's navigation, to be asked in the order of time.
+
+    seed : of the flight; count: of drones
+    """
+
+    def __init__(self, seed: int, count: int):
+        self._seed, self._count = seed, count
+        self._first, self._tables = -PERIODS, {}  # type: ignore[var-annotated]
+
+    def __call__(self, number: int, draw: int, drone: int) -> tuple[int, int, int, int]:
+        """Four words of a measurement, a draw and a drone."""
+        if not self._first <= number < self._first + PERIODS:
+            self._first, self._tables = number - number % PERIODS, {}
+        if draw not in self._tables:
+            numbers = np.arange(self._first, self._first + PERIODS, dtype=np.uint64)[:, None]
+            drones = np.arange(self._count, dtype=np.uint64)[None, :]
+            drawn = random.words(self._seed, random.SENSOR, 0, numbers, drones, draw)
+            self._tables[draw] = np.stack(drawn, axis=-1).tolist()
+        a, b, c, d = self._tables[draw][number - self._first][drone]
+        return a, b, c, d
+
+
 class PacketDice:
     """Uniform random numbers by which packets are lost, of every pair in every period, to be asked in order of time.
 

@@ -68,7 +68,7 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
         return [], ["write [[fault]] and keys below it"]
     wrong = [f"{key} is not known; known: {', '.join(known)}" for key in table if key not in known]
     kind = table.get("kind")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         wrong.append(f"kind = {kind!r} is none of {', '.join(KINDS)}")
     who = table.get("who", [])
     if not isinstance(who, list) or not all(w in members for w in who):
@@ -77,7 +77,7 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             wrong.append(f"{key} = {value!r} is not a number")
-    if kind in AMOUNTS and not wrong:
+    if not wrong and kind in AMOUNTS:
         low, high = AMOUNTS[kind]
         if not low <= numbers.get("amount", low - 1.0) <= high:
             wrong.append(f"amount = {numbers.get('amount')} lies outside [{low:g}, {high:g}]")

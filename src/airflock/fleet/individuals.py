@@ -16,7 +16,6 @@ INSTEAD = {
     "clock": "a clock that jumps in flight sends a drone home; give a table of --faults with kind = 'clock'",
     "leaves": "a drone lands by its own mission; give a table of --faults with kind = 'battery' or 'motor'",
 }
-LETTERS = {"p": "parameters", "b": "body"}
 
 
 def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[Any, Any]]:
@@ -26,22 +25,31 @@ def records_of(scenario: Scenario, count: int, seed: int | None) -> list[tuple[A
 
     Raises ScenarioError where groups are of fewer agents.
     """
-    base = [(scenario.parameters, scenario.body)] * count
-    if not scenario.varied:
-        return base
+    if not scenario.varied and len(scenario.laws) == 1:
+        return [(scenario.parameters, scenario.body)] * count
     if count > scenario.agents:
         raise ScenarioError(
             [f"groups are of {scenario.agents} agents, and {count} drones are to fly; set agents = {count}"]
         )
     groups = tuple(replace(group, spread={}) for group in scenario.groups) if seed is None else scenario.groups
     told = replace(scenario, groups=groups)
-    columns = {(of, name): told.own_numbers(of, name, seed or 0) for of, name in told.varied}
+    varied = dict.fromkeys([*told.varied, *(each for law in told.laws for each in law.varied)])
+    columns = {(of, name): told.own_numbers(of, name, seed or 0) for of, name in varied}
 
-    def own(agent: int, letter: str) -> Any:
-        numbers = {name: column[agent] for (of, name), column in columns.items() if of == letter}
-        return replace(getattr(scenario, LETTERS[letter]), **numbers)
+    def own(agent: int) -> tuple[Any, Any]:
+        law = told.law_of(agent)
+        p = {name: columns["p", name][agent] for _, name in law.varied}
+        b = {name: column[agent] for (of, name), column in columns.items() if of == "b"}
+        return replace(law.parameters, **p), replace(scenario.body, **b)
 
-    return [(own(agent, "p"), own(agent, "b")) for agent in range(count)]
+    return [own(agent) for agent in range(count)]
+
+
+def sensors_of(scenario: Scenario, count: int, seed: int) -> list[Any]:
+    """Numbers of the sensor of each of the first `count` agents, with tolerances as a seed draws them."""
+    columns = {name: scenario.own_numbers("s", name, seed) for of, name in scenario.varied if of == "s"}
+    own = [{name: column[agent] for name, column in columns.items()} for agent in range(count)]
+    return [replace(scenario.sensors, **numbers) for numbers in own]
 
 
 def refused(scenario: Scenario) -> list[str]:

@@ -179,10 +179,11 @@ class Craft:
             made.state = State(*made.state[:3], 0.0, 0.0, 0.0)  # it hovers until the flight begins
         self._node.write(made.frame_origin())
 
-    def look(self, now: float) -> None:
+    def look(self) -> None:
         """Read what came, move up to now, and tell."""
-        vehicle, plan = self.vehicle, self.plan
-        vehicle.started, vehicle.booted = plan.utc(plan.clock[0]), self._booted - plan.clock[0]
+        vehicle, plan, zero = self.vehicle, self.plan, self.plan.clock[0]  # once: the clock may be set meanwhile
+        now = time.monotonic() - zero
+        vehicle.started, vehicle.booted = plan.utc(zero), self._booted - zero
         for data in self._node.read():
             self._node.write(vehicle.receive(data, now))
         for data, sender in self._clients.read_from():
@@ -222,7 +223,7 @@ async def craft_life(plan: Plan, i: int) -> Life:
     while not plan.over:
         behind = time.monotonic() - due
         count, late, worst = count + 1, late + (behind > 0.5 * LOOK), max(worst, behind)
-        craft.look(plan.now)
+        craft.look()
         due = max(due + LOOK, time.monotonic() - LOOK)
         await asyncio.sleep(max(0.0, due - time.monotonic()))
     return Life(craft.rows, [], Ticks(count, late, worst), Phase.DONE, time.process_time() - began)

@@ -5,6 +5,7 @@ At each motion step: telemetry and packets that are due arrive, nodes whose tick
 
 import hashlib
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 
 from airflock.core.agent import State
 from airflock.core.sensing import Sensing
-from airflock.fleet.dice import OuterNoise
+from airflock.fleet.dice import OuterNoise, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
-from airflock.fleet.individuals import Faults, records_of
+from airflock.fleet.individuals import Faults, records_of, sensors_of
 from airflock.fleet.starting import KEY, Station, in_the_air, lift_of, vehicle_of
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do
@@ -25,6 +26,7 @@ from airflock.onboard.node import Node
 from airflock.scenarios.scenario import Scenario
 
 STARTED = 1_800_000_000_000_000  # virtual Unix time of 0 s, µs
+UNREAD = ("attitude", "home", "battery")  # messages that no node reads; in lock-step nobody else is there
 NEVER = -1e8  # s; a peer whose last state held before this has not been heard
 
 
@@ -52,6 +54,7 @@ class Fleet:
         for vehicle in self.vehicles:
             vehicle.faults = befalls or None
             vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
+            vehicle.rates |= dict.fromkeys(UNREAD, 0.0)
         self.nodes = [
             Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
             for who in card.members
@@ -59,8 +62,11 @@ class Fleet:
         reach = befalls.reach if befalls else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
         self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
-        found = scenario.sensor, scenario.sensors
-        self._sensing = [Sensing(*found, seed, i, flat=card.flat) for i in range(len(card.members))]
+        words = SensorDice(seed, len(card.members))
+        self._sensing = [
+            Sensing(scenario.sensor, own, seed, i, flat=card.flat, words=partial(words, drone=i))
+            for i, own in enumerate(sensors_of(scenario, len(card.members), seed))
+        ]
         self._station = Station(card, operator)
         if start is not None:
             self._begin(start)

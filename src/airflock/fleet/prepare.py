@@ -46,10 +46,11 @@ def card_document(
     """
     if scenario.world.arena == "none":
         raise CardError([f"{scenario.name}: world.arena = 'none': a card needs walls, and a fence around them"])
-    if not scenario.model.decide.__module__.startswith("airflock.models."):
-        raise CardError(
-            [f"{scenario.name}: the law {scenario.model.name} is not in the package; a card names laws only"]
-        )
+    strange = [
+        law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.models.")
+    ]
+    if strange:
+        raise CardError([f"{scenario.name}: the law {strange[0]} is not in the package; a card names laws only"])
     limits = replace(limits_of(scenario), **(safety or {}))
     low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
     height = max(HEIGHT, limits.base - low) if height is None else height
@@ -70,6 +71,7 @@ def card_document(
         "law": {"kind": scenario.model.name, **plain(scenario.parameters)},
         "body": {"kind": scenario.vehicle.name, **plain(scenario.body)},
         "own": _own(scenario, records_of(scenario, len(members), seed)),
+        **_groups(scenario, len(members)),
         "world": plain(scenario.world),
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
@@ -94,14 +96,26 @@ def card_document(
 def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:
     """Of each member the numbers of law and body in which it differs from the flock; none where all are alike."""
     base = {"law": plain(scenario.parameters), "body": plain(scenario.body)}
+    if not scenario.varied and len(scenario.laws) == 1:
+        return []
     found = [
         {
-            part: {k: v for k, v in plain(record).items() if v != base[part][k]}
+            part: {k: v for k, v in plain(record).items() if v != base[part].get(k)}
             for part, record in zip(base, own, strict=True)
         }
         for own in records
     ]
-    return found if scenario.varied else []
+    for agent, ((p, _), row) in enumerate(zip(records, found, strict=True)):
+        law = scenario.law_of(agent).model
+        if law.name != scenario.model.name:
+            row["law"] = {"kind": law.name, **plain(p)}
+    return found
+
+
+def _groups(scenario: Scenario, count: int) -> dict[str, list[int]]:
+    """Of each member the number of its group, where a law asks for it."""
+    asked = scenario.groups and any(law.asks_for_groups for law in scenario.laws)
+    return {"groups": list(scenario.group_numbers[:count])} if asked else {}
 
 
 def limits_of(scenario: Scenario) -> Safety:

@@ -35,7 +35,7 @@ KEYS = (
     "airflock_card", "name", "mission", "expires", "site", "members", "operator", "autopilot", "law", "body", "own",
     "world", "shapes", "radio", "silence", "safety", "fence", "height", "period", "seed", "hash",
 )  # fmt: skip
-OPTIONAL = ("topology",)  # left out where a drone meets all whom it hears
+OPTIONAL = ("topology", "groups")  # left out where a drone meets all whom it hears, where no law asks for groups
 NUMBERS = {
     "mission": (1, 2**32 - 1), "expires": (1, 2**40), "height": (1.0, 1e4), "period": (0.01, 60.0), "seed": (0, 2**63),
 }  # fmt: skip
@@ -49,7 +49,8 @@ class Card:
     mission  : number of the mission; expires: Unix time, s
     site     : origin of local coordinates; members: system ids, in the order of their layers
     operator : public key of who may give orders, 32 bytes; empty: nobody may
-    own      : numbers of law and body of each member, where they differ from one to another
+    own      : law, its numbers and those of the body of each member, where they differ from one to another
+    groups   : number of each member's group, -1 in none, where a law asks for it
     fence    : corners; low, high: heights above the site, m
     height   : at which the flock flies, m above the site; in space, of the arena's centre
     hash     : SHA-256 of the document without its own entry
@@ -66,7 +67,8 @@ class Card:
     parameters: Any
     body: Any
     body_parameters: Any
-    own: tuple[tuple[Any, Any], ...]
+    own: tuple[tuple[Model, Any, Any], ...]
+    groups: tuple[int, ...]
     place: Place
     hearing: Hearing
     delay: float
@@ -90,9 +92,9 @@ class Card:
     def pilot(self, member: int) -> Pilot:
         """The pilot of one member."""
         index = self.members.index(member)
-        p, b = self.own[index] if self.own else (self.parameters, self.body_parameters)
+        law, p, b = self.own[index] if self.own else (self.model, self.parameters, self.body_parameters)
         return Pilot(
-            self.model, p, self.place.seen(look_of(self.model, p)), index=index, period=self.period,
+            law, p, self.place.seen(look_of(law, p)), index=index, period=self.period, groups=self.groups,
             hearing=self.hearing, body=self.body, b=b, silence=self.silence, flat=self.flat,
             seed=self.seed, topology=TOPOLOGIES[self.topology.kind], t=self.topology,
         )  # fmt: skip
@@ -187,6 +189,10 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     silence = record(Silence, d["silence"], "silence", faults)
     topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
     safety = record(Safety, d["safety"], "safety", faults)
+    groups = d.get("groups", [])
+    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= LARGEST_SYSTEM for g in groups)
+    if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
+        faults.append(f"groups = {groups!r}: give the number of each member's group, -1 in none")
     rows = d["shapes"]
     if not are_shapes(rows):
         faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
@@ -194,13 +200,13 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         return None
     place = Place(
         world, Shapes(rows.get("shapes", ()), rows.get("nodes", ()), rows.get("links", ())),
-        look=look_of(law, parameters), casts=law.sight is not None,
+        look=look_of(law, parameters), casts=any(each.sight is not None for each in (law, *(row[0] for row in own))),
     )  # fmt: skip
     return Card(
         name=str(d["name"]), mission=int(one["mission"]), expires=int(one["expires"]),
         site=Site(site["latitude"], site["longitude"], site["altitude"]), members=tuple(members), operator=operator,
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
-        own=own,
+        own=own, groups=tuple(groups),
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
         silence=silence, topology=topology, safety=safety,
         fence=Fence(corners),

@@ -10,6 +10,8 @@ from airflock.core.maths import FAR
 from airflock.errors import AirflockError, CardError
 from airflock.onboard.fields import record
 
+PARTS = ("law", "body")  # of which members may have numbers of their own
+
 
 def find_law(name: str) -> Model:
     """A law of the package by its name."""
@@ -21,14 +23,14 @@ def find_law(name: str) -> Model:
         raise CardError([f"law.kind = {name!r} is not a law of this version"]) from fault
 
 
-def law_of(table: Any, faults: list[str]) -> tuple[Model | None, Any]:
+def law_of(table: Any, faults: list[str], where: str = "law") -> tuple[Model | None, Any]:
     """Law and parameters of a card; what is wrong is added to the faults."""
     try:
         found = find_law(str(table["kind"]))
     except (AirflockError, KeyError, TypeError) as fault:
-        faults.append(str(fault) if isinstance(fault, AirflockError) else "law.kind is missing")
+        faults.append(str(fault) if isinstance(fault, AirflockError) else f"{where}.kind is missing")
         return None, None
-    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, "law", faults)
+    return found, record(found.Parameters, {k: v for k, v in table.items() if k != "kind"}, where, faults)
 
 
 def body_of(table: Any, faults: list[str]) -> tuple[Any, Any]:
@@ -42,26 +44,30 @@ def body_of(table: Any, faults: list[str]) -> tuple[Any, Any]:
     )  # fmt: skip
 
 
-def own_of(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Any, Any], ...]:
-    """Numbers of law and body of each member; none where all are alike."""
+def own_of(d: Mapping[str, Any], law: Model | None, body: Any, faults: list[str]) -> tuple[tuple[Model, Any, Any], ...]:
+    """Law, its numbers and those of the body of each member; none where all are alike."""
     rows = d["own"]
-    parts = {"law": getattr(law, "Parameters", None), "body": getattr(body, "Parameters", None)}
-    if rows == [] or None in parts.values():
+    if rows == [] or law is None or body is None:
         return ()
     if not isinstance(rows, list) or not isinstance(d["members"], list) or len(rows) != len(d["members"]):
         faults.append("own: give a table with law and body for each member, or an empty list")
         return ()
     found = []
     for number, row in enumerate(rows):
-        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in parts)
+        sound = isinstance(row, dict) and all(isinstance(row.get(part), dict) for part in PARTS)
         if not sound:
             faults.append(f"own[{number}] = {row!r}: give the tables law and body")
             continue
-        made = []
-        for part, kind in parts.items():
-            usual = {key: value for key, value in d[part].items() if key != "kind"}
-            made.append(record(kind, usual | row[part], f"own[{number}].{part}", faults))
-        found.append((made[0], made[1]))
+        where, usual = f"own[{number}]", {part: {k: v for k, v in d[part].items() if k != "kind"} for part in PARTS}
+        b = record(body.Parameters, usual["body"] | row["body"], f"{where}.body", faults)
+        if "kind" in row["law"]:
+            other, p = law_of(row["law"], faults, f"{where}.law")
+            if other is not None and other.command != law.command:
+                faults.append(f"{where}.law commands {other.command}, and law {law.command}; one body carries all")
+        else:
+            other, p = law, record(law.Parameters, usual["law"] | row["law"], f"{where}.law", faults)
+        if other is not None:
+            found.append((other, p, b))
     return tuple(found)
 
 

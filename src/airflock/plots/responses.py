@@ -32,7 +32,7 @@ def pair_sums(model: Model, p: Any, r: float, dv: float = 0.0) -> Any:
     given = {
         "dx": r, "dy": 0.0, "dz": 0.0, "r": r, "r2": r * r, "dvx": 0.0, "dvy": dv, "dvz": 0.0, "dv": dv,
         "vx": 0.0, "vy": 0.0, "vz": 0.0, "hx": 0.0, "hy": 0.0, "hz": 0.0,
-        "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "p": p,
+        "nhx": 0.0, "nhy": side, "nhz": 0.0, "age": 0.0, "lower": 0.0, "kin": 1.0, "group": -1.0, "p": p,
     }  # fmt: skip
     if model.neighbour is None:
         raise RuleError(f"model {model.name} has no rule neighbour")

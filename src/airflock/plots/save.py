@@ -1,5 +1,6 @@
 """Figures on disk: complete or not there at all, in the format that the file's ending names."""
 
+import io
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,11 +27,12 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
     resolution : dots per inch of .png, and of what is drawn as pixels within the others
     """
     with complete_or_absent(path, PICTURES) as temporary:
-        ending = temporary.suffix.lower()
-        figure.savefig(
-            temporary, format=ending[1:], dpi=resolution, metadata=DATES.get(ending, {}),
+        ending, content = temporary.suffix.lower(), io.BytesIO()
+        figure.savefig(  # in memory: the writer of .pdf breaks in its own ways where a disk is full
+            content, format=ending[1:], dpi=resolution, metadata=DATES.get(ending, {}),
             facecolor=figure.get_facecolor(), bbox_inches="tight", pad_inches=0.08,
         )  # fmt: skip
+        temporary.write_bytes(content.getbuffer())
     return Path(path)
 
 

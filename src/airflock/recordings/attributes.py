@@ -101,13 +101,21 @@ def _instant(value: Any) -> bool:
 
 
 def flown_with_own_law(recording: xr.Dataset) -> bool:
-    """Whether the law, or a kind of fault, was the user's own, which is not in the recording."""
+    """Whether the law, that of a group, or a kind of fault was the user's own, which is not in the recording."""
     document = scenario_document(recording)
     if document is None:
         return False
     kind, faults = document.get("model", {}).get("kind"), document.get("faults", [])
     own = [entry for entry in faults if isinstance(entry, Mapping) and entry.get("kind") not in KINDS]
-    return LAW in recording.attrs or kind not in MODELS or bool(own)
+    return LAW in recording.attrs or kind not in MODELS or bool(own or own_laws_of_groups(document))
+
+
+def own_laws_of_groups(document: Mapping[str, Any]) -> list[str]:
+    """Names of laws of groups that were the user's own."""
+    groups = document.get("groups", ())
+    tables = [group.get("model", {}) for group in groups if isinstance(group, Mapping)]
+    kinds = [table.get("kind") for table in tables if isinstance(table, Mapping)]
+    return [str(kind) for kind in kinds if kind is not None and kind not in MODELS]
 
 
 def checksum(recording: xr.Dataset) -> str:

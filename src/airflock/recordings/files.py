@@ -136,6 +136,8 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
             f"recording: was flown with a law of its own, {name!r}, which is not in the file; give it with "
             "--law FILE.py (in Python: law=...)"
         )
+    for name in attributes.own_laws_of_groups(document):
+        raise RecordingError(f"recording: a group was flown with a law of its own, {name!r}, which is not in the file")
     for section, known in (("body", BODIES), ("sensors", SENSORS), ("radio", RADIOS), ("metrics", SETS)):
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:

@@ -165,7 +165,8 @@ def flown_document(scenario: Scenario) -> dict[str, Any]:
         kind = table.get("kind") if isinstance(table, dict) else None
         if isinstance(kind, str) and kind.endswith(".py"):
             table["kind"] = PurePath(kind).stem
-    for entry in document.get("faults", ()):
+    tables = [entry["model"] for entry in document.get("groups", ()) if isinstance(entry.get("model"), dict)]
+    for entry in (*document.get("faults", ()), *tables):
         if str(entry.get("kind", "")).endswith(".py"):
             entry["kind"] = PurePath(entry["kind"]).stem
     return document

@@ -2,36 +2,36 @@
 // What the colours of agents stand for: their motion, or a layer of bytes; and the key that says so.
 
 /** A colour between two of a table, written into `out` from `place` on as light, each part from 0 to 1. */
-function between(table, x, out, place, pale) {
+function between(table, x, out, place) {
   const i = Math.min(Math.floor(x), table.length - 1), part = x - i, next = table[(i + 1) % table.length];
   for (let c = 0; c < 3; c++) {
     const tone = (table[i][c] * (1 - part) + next[c] * part) / 255;
-    out[place + c] = linear(tone + (0.92 - tone) * pale);
+    out[place + c] = linear(tone);
   }
 }
 
 /** Colour of a share from 0 to 1 of a scale, or of a full turn. */
-const ramp = (share, out, place, pale = 0) =>
-  between(about.ramp, Math.min(Math.max(share, 0), 1) * (about.ramp.length - 1), out, place, pale);
-const wheel = (share, out, place, pale = 0) =>
-  between(about.wheel, (share - Math.floor(share)) * about.wheel.length, out, place, pale);
+const ramp = (share, out, place) =>
+  between(about.ramp, Math.min(Math.max(share, 0), 1) * (about.ramp.length - 1), out, place);
+const wheel = (share, out, place) =>
+  between(about.wheel, (share - Math.floor(share)) * about.wheel.length, out, place);
 
 let way = about.way, layer = null, bytes = null;
 
 /** Colour of an agent at a frame, which flies (dx, dy, dz) until the next one. */
-function tone(whole, agent, frame, dx, dy, dz, out, place, pale = 0) {
+function tone(whole, agent, frame, dx, dy, dz, out, place) {
   if (layer) {
     const value = bytes[agent * frames + frame];
-    if (value === 255) between([about.blank], 0, out, place, pale);
-    else if (layer.kind === "scale") ramp(value / 254, out, place, pale);
-    else if (layer.kind === "names") between(layer.tones, value, out, place, pale);
-    else wheel(value / 255, out, place, pale);
-  } else if (way === "heading") wheel(Math.atan2(dy, dx) / (2 * Math.PI), out, place, pale);
-  else if (way === "agent") wheel(agent * 0.6180339887, out, place, pale);
+    if (value === 255) between([about.blank], 0, out, place);
+    else if (layer.kind === "scale") ramp(value / 254, out, place);
+    else if (layer.kind === "names") between(layer.tones, value, out, place);
+    else wheel(value / 255, out, place);
+  } else if (way === "heading") wheel(Math.atan2(dy, dx) / (2 * Math.PI), out, place);
+  else if (way === "agent") wheel(agent * 0.6180339887, out, place);
   else if (way === "height") {
     const [low, high] = about.height;
-    ramp((at(whole, 2, agent, frame) - low) / Math.max(high - low, 1e-9), out, place, pale);
-  } else ramp(Math.hypot(dx, dy, dz) / period / about.top, out, place, pale);
+    ramp((at(whole, 2, agent, frame) - low) / Math.max(high - low, 1e-9), out, place);
+  } else ramp(Math.hypot(dx, dy, dz) / period / about.top, out, place);
 }
 
 /** Say what the colours stand for. */

@@ -90,43 +90,67 @@ scene.add(darts);
 // ------------------------------------------------------------------------------------------------------- trails
 
 const MOST = 400000;  // pieces of all trails
-const step = [0, 0, 0];
-let trail, trailSpan = 15, trailPieces = 0;
+const step = [0, 0, 0], newest = { value: 0 };
+let trail, trailSpan = 15, trailPieces = 0, trailFrame = -1;
 
+/** Lines whose colours pale with age: each piece lies in a slot of its own, which the next one of that slot takes. */
 function layTrails() {
-  if (trail) { scene.remove(trail); trail.geometry.dispose(); }
+  if (trail) { scene.remove(trail); trail.geometry.dispose(); trail.material.dispose(); }
   trailPieces = Math.min(Math.round(trailSpan / period), Math.floor(MOST / agents), 300);
-  const shape = new THREE.BufferGeometry();
+  const shape = new THREE.BufferGeometry(), slots = new Float32Array(2 * agents * trailPieces);
   for (const name of ["position", "color"]) {
     const kept = new THREE.BufferAttribute(new Float32Array(6 * agents * trailPieces), 3);
     shape.setAttribute(name, kept.setUsage(THREE.DynamicDrawUsage));
   }
-  trail = new THREE.LineSegments(shape, new THREE.LineBasicMaterial({ vertexColors: true }));
+  for (let k = 0; k < slots.length; k++) slots[k] = Math.floor(k / (2 * agents));
+  shape.setAttribute("slot", new THREE.BufferAttribute(slots, 1));
+  const material = new THREE.LineBasicMaterial({ vertexColors: true });
+  material.onBeforeCompile = shader => {
+    shader.uniforms.newest = newest;
+    shader.uniforms.slots = { value: Math.max(trailPieces, 1) };
+    shader.vertexShader = "attribute float slot; uniform float newest; uniform float slots;\n"
+      + shader.vertexShader.replace("#include <color_vertex>", `#include <color_vertex>
+        float pale = 0.35 + 0.6 * mod(newest - slot + slots, slots) / slots;
+        vColor.rgb = pow(mix(pow(vColor.rgb, vec3(1.0 / 2.2)), vec3(0.92), pale), vec3(2.2));`);
+  };
+  trail = new THREE.LineSegments(shape, material);
   trail.frustumCulled = false;
   scene.add(trail);
+  trailFrame = -1;
 }
 
-/** Trails up to a frame; a piece through a periodic face, before the start, or of who is absent, has no length. */
-function drawTrails(whole, frame) {
-  if (!trailPieces) return;
-  const points = trail.geometry.attributes.position, colours = trail.geometry.attributes.color;
-  let k = 0;
-  for (let a = 0; a < agents; a++)
-    for (let p = 0; p < trailPieces; p++, k += 6) {
-      const end = frame - p, last = Math.max(end, 0);
-      const none = end < 1 || leaps(whole, a, end - 1) || !there(a, end) || !there(a, end - 1);
-      const from = none ? last : end - 1;
-      for (let c = 0; c < 3; c++) {
-        const x = at(whole, c, a, from), y = at(whole, c, a, last);
-        points.array[k + c] = x;
-        points.array[k + 3 + c] = y;
-        step[c] = y - x;
-      }
-      const pale = 0.35 + 0.6 * p / trailPieces;
-      tone(whole, a, last, step[0], step[1], step[2], colours.array, k, pale);
-      for (let c = 0; c < 3; c++) colours.array[k + 3 + c] = colours.array[k + c];
+/** The piece of every trail that ends at a frame; through a periodic face, before the start or absent it is a point. */
+function drawPiece(whole, end, points, colours) {
+  const slot = ((end % trailPieces) + trailPieces) % trailPieces, last = Math.max(end, 0);
+  let k = 6 * agents * slot;
+  for (let a = 0; a < agents; a++, k += 6) {
+    const none = end < 1 || leaps(whole, a, end - 1) || !there(a, end) || !there(a, end - 1);
+    const from = none ? last : end - 1;
+    for (let c = 0; c < 3; c++) {
+      const x = at(whole, c, a, from), y = at(whole, c, a, last);
+      points.array[k + c] = x;
+      points.array[k + 3 + c] = y;
+      step[c] = y - x;
     }
-  points.needsUpdate = colours.needsUpdate = true;
+    tone(whole, a, last, step[0], step[1], step[2], colours.array, k);
+    for (let c = 0; c < 3; c++) colours.array[k + 3 + c] = colours.array[k + c];
+  }
+  return 6 * agents * slot;
+}
+
+/** Trails up to a frame: only the pieces that are new since the last call, or all of them after a leap in time. */
+function drawTrails(whole, frame, anew) {
+  if (!trailPieces) return;
+  const { position, color } = trail.geometry.attributes, size = 6 * agents;
+  const some = !anew && trailFrame >= 0 && frame >= trailFrame && frame - trailFrame < trailPieces;
+  for (let end = some ? trailFrame + 1 : frame - trailPieces + 1; end <= frame; end++) {
+    const begin = drawPiece(whole, end, position, color);
+    if (some) for (const kept of [position, color]) kept.addUpdateRange(begin, size);
+  }
+  if (!some) for (const kept of [position, color]) kept.clearUpdateRanges();
+  position.needsUpdate = color.needsUpdate = true;
+  newest.value = ((frame % trailPieces) + trailPieces) % trailPieces;
+  trailFrame = frame;
 }
 
 // ----------------------------------------------------------------------------------------------------- one frame
@@ -160,7 +184,7 @@ function draw(whole, time) {
   }
   darts.instanceMatrix.needsUpdate = darts.instanceColor.needsUpdate = true;
   const frame = Math.floor(exact + 1e-6);
-  if (frame !== drawnFrame) { drawTrails(whole, frame); drawnFrame = frame; }
+  if (frame !== drawnFrame) { drawTrails(whole, frame, drawnFrame < 0); drawnFrame = frame; }
 }
 
 // ------------------------------------------------------------------------------------------------------- charts

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from airflock.body.registry import BODIES
+from airflock.core.contract import Model
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import SETS
 from airflock.radios.registry import RADIOS
@@ -44,7 +45,15 @@ def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
     if "faults" not in settings and "faults" in document:
         document["faults"] = named(scenario)
-    return make(document, scenario.name, settings, law=None if shipped else scenario.model, kinds=kinds, **own)
+    law = None if shipped else scenario.model
+    return make(document, scenario.name, settings, law=law, kinds=kinds, laws=own_laws(scenario), **own)
+
+
+def own_laws(scenario: Scenario) -> dict[str, Model]:
+    """Laws of groups that are none of ours, by the names that the document has for them."""
+    given = zip(scenario.document.get("groups", ()), scenario.groups, strict=True)
+    kinds = {table.get("model", {}).get("kind"): group.law for table, group in given}
+    return {kind: law[0] for kind, law in kinds.items() if law is not None and kind is not None and kind not in MODELS}
 
 
 def named(scenario: Scenario) -> list[dict[str, Any]]:

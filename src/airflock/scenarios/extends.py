@@ -71,13 +71,21 @@ def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None
         if isinstance(name, str) and name and not Path(name).is_absolute() and is_file(folder / name):
             result[section] = {**table, key: str((folder / name).absolute())}  # type: ignore[dict-item]
-    faults = result.get("faults")
+    faults, groups = result.get("faults"), result.get("groups")
     if isinstance(faults, list):
-        result["faults"] = [_fault_with_path(entry, folder) for entry in faults]
+        result["faults"] = [_kind_with_path(entry, folder) for entry in faults]
+    if isinstance(groups, list):
+        result["groups"] = [_group_with_path(entry, folder) for entry in groups]
     return result
 
 
-def _fault_with_path(entry: Any, folder: Path) -> Any:
+def _group_with_path(entry: Any, folder: Path) -> Any:
+    if not isinstance(entry, Mapping) or "model" not in entry:
+        return entry
+    return {**entry, "model": _kind_with_path(entry["model"], folder)}
+
+
+def _kind_with_path(entry: Any, folder: Path) -> Any:
     name = entry.get("kind") if isinstance(entry, Mapping) else None
     if not isinstance(name, str) or not name.endswith(".py") or Path(name).is_absolute() or not is_file(folder / name):
         return entry

@@ -54,6 +54,7 @@ def load(
     sensor: Any = None,
     radio: Any = None,
     faults: Any = None,
+    laws: Any = None,
     trust: bool = False,
 ) -> Scenario:
     """Scenario from a preset's name or a file.
@@ -81,9 +82,12 @@ def load(
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
+    laws : optional
+        Laws of your own, which groups may name as their model.kind: a namespace such as a module, what
+        `airflock.model` gives, or a list of these.
     trust : bool
-        Whether code that the file names, or a file that it extends, may run: a law, a body, a sensor, a radio,
-        order parameters.
+        Whether code that the file names, or a file that it extends, may run: a law, also of a group, a body, a sensor,
+        a radio, order parameters.
 
     Returns
     -------
@@ -112,6 +116,7 @@ def load(
         document, base = extended(document, where, folder, _read)
         document, own = _given(document, metrics, body, sensor, radio)
         own["kinds"] = _kinds(faults)
+        own["laws"] = {law.name: law for law in map(given_law, _several(laws))}
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
         document, settings, told = with_ground(document, settings or {}, folder)
         own["notes"] += told
@@ -184,11 +189,13 @@ def _given(
 
 def _kinds(given: Any) -> dict[str, Fault]:
     """Kinds of fault that the caller gives, by name."""
-    if given is None:
-        return {}
-    several = given if isinstance(given, (list, tuple)) else [given]
-    found = [kind if isinstance(kind, Fault) else fault(kind) for kind in several]
+    found = [kind if isinstance(kind, Fault) else fault(kind) for kind in _several(given)]
     return {kind.name: kind for kind in found}
+
+
+def _several(given: Any) -> list[Any]:
+    """What a caller gives as one thing, as a list, or not at all."""
+    return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
 
 
 def loaded(what: Any) -> Scenario:

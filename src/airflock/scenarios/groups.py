@@ -1,8 +1,8 @@
-"""The groups of a scenario file: agents that share numbers of model and body, and how far each agent is off them."""
+"""The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any
 
@@ -10,9 +10,15 @@ from airflock.core import random
 from airflock.core.contract import Model
 from airflock.core.parameters import Choice, Quantity, declarations
 from airflock.scenarios import schema, units
+from airflock.scenarios.group_laws import Laws
 
-LETTERS = {"model": "p", "body": "b"}  # sections of which numbers may differ, and what drivers call them
+LETTERS = {
+    "model": "p",
+    "body": "b",
+    "sensors": "s",
+}  # sections of which numbers may differ, and what drivers call them
 KEYS = ("name", "agents", *LETTERS)
+ONE = {"body": "one body carries all", "sensors": "all measure by one sensor"}
 
 
 @dataclass(frozen=True)
@@ -22,12 +28,19 @@ class Group:
     agents  : their numbers, in order
     numbers : (letter, name) → value that they have instead of the flock's
     spread  : (letter, name) → standard deviation by which each agent differs from it
+    law     : model and parameters that they fly by, where these are not the flock's but for numbers
     """
 
     name: str
     agents: tuple[int, ...]
     numbers: Mapping[tuple[str, str], float] = field(default_factory=dict)
     spread: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    law: tuple[Model, Any] | None = None
+
+    def without(self, letter: str) -> "Group":
+        """The same group without numbers of its own in one record."""
+        rest = [{key: v for key, v in part.items() if key[0] != letter} for part in (self.numbers, self.spread)]
+        return replace(self, numbers=rest[0], spread=rest[1])
 
 
 def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None, list[str]]:
@@ -41,10 +54,13 @@ def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None
     return tuple(sorted(set(given))), []
 
 
-def groups_of(given: Any, agents: int, records: Mapping[str, type]) -> tuple[tuple[Group, ...], list[str], list[str]]:
+def groups_of(
+    given: Any, agents: int, records: Mapping[str, type], laws: Laws | None = None
+) -> tuple[tuple[Group, ...], list[str], list[str]]:
     """Groups, notes of converted units, and everything that is wrong with them, one line each.
 
-    records : "model" and "body" → record of their parameters
+    records : "model", "body" and "sensors" → record of their parameters
+    laws    : finds the law that a group's section model names
     """
     if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(g, Mapping) for g in given):
         return (), [], ["groups is not a list of tables; write [[groups]]"]
@@ -60,14 +76,17 @@ def groups_of(given: Any, agents: int, records: Mapping[str, type]) -> tuple[tup
             name = where
         numbers: dict[tuple[str, str], float] = {}
         spread: dict[tuple[str, str], float] = {}
+        law, own = (None, []) if laws is None else laws.named(f"{where}.model", table.get("model", {}))
+        faults += own
         for section, letter in LETTERS.items():
-            if section in records:
-                values, spreads, told, wrong = _section(f"{where}.{section}", table.get(section, {}), records[section])
+            if section in records and not (section == "model" and own):
+                record = type(law[1]) if law and section == "model" else records[section]
+                values, spreads, told, wrong = _section(f"{where}.{section}", table.get(section, {}), record)
                 numbers |= {(letter, key): value for key, value in values.items()}
                 spread |= {(letter, key): value for key, value in spreads.items()}
                 notes += told
                 faults += wrong
-        found.append(Group(name, who[number], numbers, spread))
+        found.append(Group(name, who[number], numbers, spread, law))
     return tuple(found), notes, faults
 
 
@@ -117,8 +136,12 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
     spreads: dict[str, Any] = {}
     faults: list[str] = []
     for key, value in table.items():
+        if where.endswith("model") and (key == "kind" or isinstance(known.get(key), Choice)):
+            continue
         if key == "kind" or isinstance(known.get(key), Choice):
-            faults.append(f"{where}.{key}: only numbers differ from group to group; laws, bodies and choices do not")
+            faults.append(f"{where}.{key}: {ONE[where.rpartition('.')[2]]}; only numbers differ from group to group")
+        elif key == "period" and where.endswith("sensors"):
+            faults.append(f"{where}.{key}: all measure and decide at the same times; set sensors.period")
         elif isinstance(value, Mapping) and "spread" in value:
             unit = {"unit": value["unit"]} if "unit" in value else {}
             spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]
@@ -150,7 +173,10 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
 
 
 def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock."""
+    """Numbers that differ among agents, as (letter, name), in declared order; base : letter → record of the flock.
+
+    Those of laws: `group_laws.Law.varied`.
+    """
     found = []
     for letter, record in base.items() if groups else ():
         for name, declared, _ in declarations(record):
@@ -163,18 +189,25 @@ def varied(groups: Sequence[Group], base: Mapping[str, Any]) -> tuple[tuple[str,
 
 
 def own_numbers(groups: Sequence[Group], agents: int, letter: str, name: str, record: Any, seed: int) -> list[float]:
-    """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range."""
-    known = {key: declared for key, declared, _ in declarations(record)}
-    place, declared = list(known).index(name), known[name]
-    assert isinstance(declared, Quantity)
-    values = [float(getattr(record, name) or 0.0)] * agents
+    """One number of every agent: its group's, and off it by a normal number of its own, within the allowed range.
+
+    It is 0 of agents whose law has no such number.
+    """
+    values = [float(getattr(record, name, None) or 0.0)] * agents
     for group in groups:
-        own, spread = group.numbers.get((letter, name)), group.spread.get((letter, name), 0.0)
+        own_record = group.law[1] if group.law and letter == "p" else record
+        known = {key: declared for key, declared, _ in declarations(own_record)}
+        declared = known.get(name)
+        if not isinstance(declared, Quantity):
+            values = [0.0 if agent in group.agents else value for agent, value in enumerate(values)]
+            continue
+        usual = float(getattr(own_record, name) or 0.0)
+        own, spread = group.numbers.get((letter, name), usual), group.spread.get((letter, name), 0.0)
         for agent in group.agents:
-            value = values[agent] if own is None else own
+            value = own
             if spread > 0.0:
                 draw = list(LETTERS.values()).index(letter)
-                w0, w1, _, _ = random.words(seed, random.SPREAD, 0, place, agent, draw)
+                w0, w1, _, _ = random.words(seed, random.SPREAD, 0, list(known).index(name), agent, draw)
                 value += spread * random.normal_pair(w0, w1)[0]
             values[agent] = min(max(value, declared.low), declared.high)
     return values
@@ -187,6 +220,6 @@ def group_faults(groups: Sequence[Group], found: Model | None) -> list[str]:
     if "p" not in {*signature(found.flock).parameters, *signature(found.workspace).parameters}:
         return []
     number = next((k for k, group in enumerate(groups) for of, _ in (*group.numbers, *group.spread) if of == "p"), None)
-    if number is None:
+    if number is None or groups[number].law is not None:
         return []
     return [f"groups[{number}].model: model {found.name} solves for the whole flock, with one set of numbers"]

@@ -12,7 +12,7 @@ from airflock.core.parameters import declarations, number_names
 from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.doors import is_file
-from airflock.errors import AirflockError, ScenarioError
+from airflock.errors import AirflockError, ParameterError, ScenarioError
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.scenarios import (
@@ -20,6 +20,7 @@ from airflock.scenarios import (
     faulty,
     formats,
     geometry,
+    group_laws,
     groups,
     places,
     schema,
@@ -53,6 +54,7 @@ def make(
     sensor: Sensor | None = None,
     transceiver: Radio | None = None,
     kinds: Mapping[str, Fault] | None = None,
+    laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
@@ -60,7 +62,7 @@ def make(
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle, sensor, transceiver : a model, a metric set, a body, a sensor, a radio given directly
-    kinds : kinds of fault given directly, by name
+    kinds : kinds of fault given directly, by name; laws : laws that groups may name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
@@ -106,7 +108,7 @@ def make(
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, sensor, transceiver, measures)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
-    single, told_of, more = _individuals(merged, parts, found, vehicle, folder, kinds, trust)
+    single, told_of, more = _individuals(merged, parts, found, (vehicle, sensor), folder, kinds, laws, trust)
     faults += more
     if faults or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
@@ -116,7 +118,7 @@ def make(
         name=where, model=found, vehicle=vehicle, sensor=sensor, transceiver=transceiver, measures=measures,
         published=published, document=merged, **parts, **single,
     )  # fmt: skip
-    faults = places.place_faults(scenario)
+    faults = _derived_faults(scenario) or places.place_faults(scenario)
     if faults:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     notes = (*notes, *left_out, *told, *converted, *told_of, *_notes(scenario), *advice(scenario))
@@ -124,17 +126,37 @@ def make(
     return replace(scenario, notes=notes)
 
 
+def _derived_faults(scenario: Scenario) -> list[str]:
+    """Numbers that follow from the scenario and lie outside their ranges: what loads can fly."""
+    try:
+        scenario.measured_by()
+    except ParameterError as fault:
+        told = [f"metrics.{line.partition('.')[2]}" for line in str(fault).splitlines()]
+        return [f"{line}; it follows from the other keys unless it is given" for line in told]
+    return []
+
+
 def _individuals(
-    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, vehicle: Body, folder: Path | None,
-    kinds: Mapping[str, Fault] | None, trust: bool,
+    merged: Mapping[str, Any], parts: Mapping[str, Any], found: Model | None, carried: tuple[Body, Sensor],
+    folder: Path | None, kinds: Mapping[str, Fault] | None, laws: Mapping[str, Model] | None, trust: bool,
 ) -> tuple[dict[str, Any], list[str], list[str]]:  # fmt: skip
     """Groups and faults of a scenario, notes, and what is wrong with them."""
     if not {"groups", "faults"} & set(merged) or parts["flight"] is None:
         return {}, [], []
     count, flight = int(parts["flight"].agents), parts["flight"]
-    records = {"body": vehicle.Parameters} | ({"model": found.Parameters} if found else {})
-    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records)
+    vehicle, sensor = carried
+    records = {"body": vehicle.Parameters, "sensors": sensor.Parameters} | (
+        {"model": found.Parameters} if found else {}
+    )
+    named = None
+    if found is not None and parts.get("parameters") is not None:
+        kind, world = merged.get("model", {}).get("kind"), parts["world"]
+        walls = world is not None and (world.arena == "polygon" or bool(world.obstacles))
+        named = group_laws.Laws(found, kind, parts["parameters"], laws or {}, folder, trust, walls)
+    flocks, notes, faults = groups.groups_of(merged.get("groups", ()), count, records, named)
     faults += groups.group_faults(flocks, found)
+    if found is not None and not faults:
+        faults += group_laws.misfits(flocks, parts, found, vehicle, sensor)
     sequential = flight.update == "sequential"
     made, told, more = faulty.entries(
         merged.get("faults", ()), count, flocks, sequential, folder, own=kinds, trust=trust

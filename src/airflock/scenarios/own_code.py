@@ -53,7 +53,7 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
 def law_hash(law: Model) -> str:
     """Hash of the text of a law's rules and of the functions of its own that they call."""
     texts: dict[str, str] = {}
-    left = [value for value in vars(law).values() if isinstance(value, FunctionType)]
+    left = [value for value in (*vars(law).values(), *law.deciding) if isinstance(value, FunctionType)]
     while left:
         rule = left.pop()
         if rule.__qualname__ in texts:

@@ -20,6 +20,7 @@ from airflock.core.topology import Topology
 from airflock.metrics import parameters as metric_parameters
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.geometry import largest_extension
+from airflock.scenarios.group_laws import Law, laws_of
 from airflock.scenarios.groups import Group, own_numbers, varied
 from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
@@ -38,7 +39,7 @@ class Scenario:
     body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
     vehicle, sensor, transceiver, measures : what `body`, `sensors`, `radio` and `metrics` hold the numbers of
-    groups    : agents that share numbers; faults: what befalls single agents
+    groups    : agents that share numbers or a law; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
     notes     : what was adjusted, for a person to read
@@ -97,13 +98,15 @@ class Scenario:
     @property
     def errs(self) -> bool:
         """Whether agents measure themselves with errors."""
-        return not self.sensor.is_exact(self.sensors)
+        own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
+        spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
+        return spread or not all(self.sensor.is_exact(replace(self.sensors, **numbers)) for numbers in ({}, *own))
 
     @property
     def unerring(self) -> "Scenario":
         """The same scenario with agents that know their own states as they are."""
-        exact = SENSORS["perfect"]
-        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period))
+        exact, groups = SENSORS["perfect"], tuple(group.without("s") for group in self.groups)
+        return replace(self, sensor=exact, sensors=exact.Parameters(period=self.sensors.period), groups=groups)
 
     @property
     def descends(self) -> bool:
@@ -119,11 +122,12 @@ class Scenario:
     def numbers(self) -> dict[str, tuple[str, ...]]:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
-        return {
+        found: dict[str, tuple[str, ...]] = {
             each.letter: each.derived._fields if each.derived else number_names(records[each.key])  # type: ignore[attr-defined]
             for each in ORDER
             if each.letter
         }
+        return found | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
     @property
     def order_parameters(self) -> tuple[Metric, ...]:
@@ -143,12 +147,39 @@ class Scenario:
 
     @property
     def varied(self) -> tuple[tuple[str, str], ...]:
-        """Numbers that differ among agents, as (letter, name)."""
-        return varied(self.groups, {"p": self.parameters, "b": self.body})
+        """Numbers that differ among agents, as (letter, name); of laws that groups fly by their own: `laws`."""
+        return self.laws[0].varied + varied(self.groups, {"b": self.body, "s": self.sensors})
+
+    @cached_property
+    def laws(self) -> tuple[Law, ...]:
+        """Laws that fly: that of the flock, and behind it those of groups; one for each text."""
+        return laws_of(self.model, self.parameters, self.groups, self.agents)
+
+    @cached_property
+    def law_numbers(self) -> tuple[int, ...]:
+        """Of each agent which of `laws` it flies by."""
+        found = [0] * self.agents
+        for number, law in enumerate(self.laws[1:], 1):
+            for agent in law.agents:
+                found[agent] = number
+        return tuple(found)
+
+    def law_of(self, agent: int) -> Law:
+        """The law that an agent flies by."""
+        return self.laws[self.law_numbers[agent]]
+
+    @cached_property
+    def group_numbers(self) -> tuple[int, ...]:
+        """Of each agent the number of its group in [[groups]]; -1 where it is in none."""
+        found = [-1] * self.agents
+        for number, group in enumerate(self.groups):
+            for agent in group.agents:
+                found[agent] = number
+        return tuple(found)
 
     def own_numbers(self, letter: str, name: str, seed: int) -> list[float]:
         """One number of every agent, with its tolerance as a seed draws it."""
-        record = self.parameters if letter == "p" else self.body
+        record = {"p": self.parameters, "b": self.body, "s": self.sensors}[letter]
         return own_numbers(self.groups, self.agents, letter, name, record, seed)
 
     def alike(self) -> "Scenario":
@@ -168,7 +199,7 @@ class Scenario:
         polygons = self.world.obstacles
         if self.world.arena == "polygon":
             polygons = (self.world.corners, *polygons)
-        if self.model.sight is None:
+        if all(law.model.sight is None for law in self.laws):
             return scene_of(self.scene, self.dimensions)
         return scene_of(self.scene, self.dimensions, polygons, self.world.heights)
 

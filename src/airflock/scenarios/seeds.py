@@ -7,6 +7,7 @@ from typing import Any
 from airflock.errors import ParameterError
 
 LARGEST = 2**64 - 1
+MOST = 10_000_000  # flights at a time
 
 
 def sound_seed(seed: Any) -> int:
@@ -26,7 +27,10 @@ def sound_seeds(seeds: int | Iterable[int]) -> list[int]:
         found = [sound_seed(seed) for seed in seeds]
     else:
         try:
-            found = list(range(operator.index(seeds)))
+            count = operator.index(seeds)
+            if count > MOST:
+                raise ParameterError(f"seeds = {count}: more than {MOST} flights at a time")
+            found = list(range(count))
         except TypeError:
             raise ParameterError(f"seeds = {seeds!r} is neither a whole number nor a list of seeds") from None
     if not found:

@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.errors import SceneError
 from airflock.scenes.tree import cylinders
 from airflock.world import scenery
 
 # Our choice: a stand of grown broad-leaved trees; the thesis's scene is not available
+MOST = 200_000  # trees, of two shapes each: their tree of boxes takes some 10 s to build
 HEIGHT = (8.0, 20.0)  # m, tree
 TRUNK = (0.15, 0.40)  # m, radius
 CROWN = (1.0, 2.5)  # m, radius
@@ -17,6 +19,11 @@ def trees(p: scenery.Parameters) -> NDArray[np.float64]:
     """Rows of cylinders: trunks, then crowns."""
     rng = np.random.default_rng(int(p.seed))
     n = round(p.trees * p.density)
+    if n > MOST:
+        raise SceneError(
+            f"scene.trees = {p.trees:g} at scene.density = {p.density:g} are {n} trees; at most {MOST} fit, "
+            f"for instance scene.trees = {int(MOST / p.density)}"
+        )
     x, y = rng.uniform(-0.5 * p.side, 0.5 * p.side, (2, n))
     height, trunk, crown, clear = (rng.uniform(*span, n) for span in (HEIGHT, TRUNK, CROWN, CLEAR))
     ground = np.zeros(n)

@@ -124,7 +124,8 @@ def of_faults(faults: Sequence[Mapping[str, Any]], time: float, count: int, kind
 def own_numbers(scenario: Scenario) -> dict[str, str]:
     """Numbers of law and body that differ among agents, such as model.v_flock, with their units."""
     found = {}
-    for section, record in (("model", scenario.parameters), ("body", scenario.body)):
+    records = {"model": scenario.parameters, "body": scenario.body, "sensors": scenario.sensors}
+    for section, record in records.items():
         for name, declared, _ in declarations(record):
             if (LETTERS[section], name) in scenario.varied and isinstance(declared, Quantity):
                 found[f"{section}.{name}"] = "" if declared.unit == "1" else declared.unit

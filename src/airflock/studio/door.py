@@ -1,8 +1,8 @@
 """Door: who may open a page. A token in the address, then a cookie; everything else is turned away.
 
 The web server of viser has no such check. It serves through `websockets`, whose one call is wrapped while the server
-starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders and
-buttons have names for screen readers; folders open by the keyboard; commands can be copied).
+starts; the same place gives the page a few lines of its own (keys on a slider do not turn the camera; sliders, fields
+and buttons have names for screen readers; folders open by the keyboard; commands can be copied).
 """
 
 import hmac
@@ -25,11 +25,13 @@ addEventListener("DOMContentLoaded", () => {
   for (const kind of ["keydown", "keyup"])
     document.body.addEventListener(kind, e => { if (e.target.closest?.(field)) e.stopPropagation(); });
   const name = () => {
-    for (const slider of document.querySelectorAll("[role=slider]:not([aria-label]), [role=slider][aria-label='']")) {
-      let at = slider;
+    const bare = "[role=slider]:not([aria-label]), [role=slider][aria-label=''], input:not([aria-label]):not([type])";
+    for (const input of document.querySelectorAll(bare + ", input[type=text]:not([aria-label])")) {
+      if (input.labels?.length) continue;
+      let at = input;
       while ((at = at.parentElement) && at !== document.body) {
         const label = at.querySelector("label");
-        if (label) { slider.setAttribute("aria-label", label.textContent); break; }
+        if (label) { input.setAttribute("aria-label", label.textContent); break; }
       }
     }
     for (const icon of document.querySelectorAll("button:not([aria-label]) svg[class*='tabler-icon-']")) {

@@ -55,8 +55,11 @@ class Flock:
         self.pairs = measures.Pairs(self.position, self.period)
 
     def look(self) -> None:
-        """Take the present moment."""
-        self.position, self.velocity = self.side.motion
+        """Take the present moment; of a flight that stopped flying the last one that can be drawn stays."""
+        position, velocity = self.side.motion
+        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+            return
+        self.position, self.velocity = position, velocity
         self.pairs = measures.Pairs(self.position, self.period)
 
     def links(self, kind: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
@@ -172,8 +175,6 @@ class Drawing:
             flock.look()
         position = np.vstack([flock.position + flock.offset for flock in flocks]).astype(np.float32)
         velocity = np.vstack([flock.velocity for flock in flocks])
-        if not np.isfinite(position).all():
-            return
         usual = float(np.quantile(np.sqrt((velocity**2).sum(1)), 0.95))
         self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
         tone = self.shading.of(flocks, velocity, self.top, self.stages[0].height).tones

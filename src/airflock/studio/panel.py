@@ -35,11 +35,9 @@ class Panel:
         """HTML that can be rewritten: `.content`."""
         return self.server.gui.add_html(content)
 
-    def button(self, label: str, told: Callable[[], None], hint: str = "", icon: str = "") -> Any:
+    def button(self, label: str, told: Callable[[], None], hint: str = "") -> Any:
         """A button; `.label` can be rewritten."""
-        made = self.server.gui.add_button(
-            label, hint=hint or None, icon=getattr(viser.Icon, icon, None) if icon else None
-        )
+        made = self.server.gui.add_button(label, hint=hint or None)
         made.on_click(lambda _: told())
         return made
 

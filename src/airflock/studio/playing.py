@@ -23,7 +23,7 @@ class Playing(Room):
     def __init__(self, page: "Page"):
         super().__init__(page)
         panel, player, drawing = self.panel, self.player, self.drawing
-        self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P", "PLAYER_PAUSE")
+        self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P")
         panel.row({"Step": self.ask(player.step), f"Back {SOON} s": self.ask(self.back), "Reset": self.ask(self.reset)})
         self.moment = panel.field("moment (s)", "any time that was flown; what came after it is given up")
         panel.row({"Go to this moment": self.ask(self._go)})

@@ -74,6 +74,8 @@ class Selecting(Room):
             for kind in KINDS:
                 self.view.extra(kind, np.zeros((0, 2, 3)))
             return
+        if self.player.failure:
+            return  # what it perceived last stays
         number, agent = self.drawing.whose(self.chosen)
         flock = self.drawing.flocks[number]
         if not flock.side.flight.present[agent]:

@@ -42,12 +42,11 @@ def save(found: "Tuned") -> None:
     figures, shows = _figures(found), replays(found)
     pictures = [_png(figure) for figure in figures.values()]
     atomic.write(found.folder / PAGE, page(found, pictures, list(figures), shows))
-    with (
-        atomic.atomic(found.folder / FIGURES) as temporary,
-        PdfPages(temporary, metadata={"CreationDate": None}) as pdf,
-    ):
+    content = io.BytesIO()
+    with PdfPages(content, metadata={"CreationDate": None}) as pdf:
         for figure in figures.values():
             pdf.savefig(figure, bbox_inches="tight")
+    atomic.write(found.folder / FIGURES, content.getbuffer())
 
 
 def _figures(found: "Tuned") -> dict[str, Figure]:

@@ -25,6 +25,7 @@ class Model:
     workspace    : `workspace` of any of n, p, wing, aero → NamedTuple of (rows, columns), the scratch of `flock`
     wall_reach   : `wall_reach(p)`, m: surfaces of the scene farther away say nothing; without it all are asked
     decide       : → command x, y, z and a Memory if the model declares one
+    added        : a law whose command is added to that of `decide` (`core.composition`)
     usual   : numbers that are compiled in where a scenario leaves them so; a rule that tests for them gets faster
     preferred_speed, interaction_range : plain functions of the parameters, used by the metrics
     violates : truths of `airflock.check_model` that do not hold for it, and why (VIOLATES)
@@ -55,6 +56,12 @@ class Model:
     violates: Mapping[str, str] = field(default_factory=dict)
     terms: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    added: "Model | None" = None
+
+    @property
+    def deciding(self) -> tuple[Callable[..., Any], ...]:
+        """Rules whose commands add up."""
+        return (self.decide,) if self.added is None else (self.decide, self.added.decide)
 
     def __hash__(self) -> int:
         return hash((self.name, self.decide, self.neighbour, self.boundary, self.flock))

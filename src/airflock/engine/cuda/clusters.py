@@ -119,23 +119,23 @@ def grown(
 ) -> Any:  # fmt: skip
     """What the cluster rule says of the agents that `mine` marks with 1; mean : over the flock."""
     axes, h = range(plan.dimensions), flock.heading
-    heads, cs, cv, ch = vector(), vector(), vector(), vector()
+    s, cx, cv, ch = vector(), vector(), vector(), vector()
     for a in axes:
-        heads[a] = ZERO
+        s[a] = ZERO
     hh = ZERO
     for i in range(n):
         for a in axes:
-            heads[a] = heads[a] + mine[i] * h[a][i]
+            s[a] = s[a] + mine[i] * h[a][i]
         hh += mine[i] * sum(h[a][i] * h[a][i] for a in axes)
     if metric.member is not None:
-        for total in (cs, cv, ch):
+        for total in (cx, cv, ch):
             for a in axes:
                 total[a] = ZERO
         for i in range(n):
-            for total, row in ((cs, flock.position), (cv, flock.velocity), (ch, h)):
+            for total, row in ((cx, flock.position), (cv, flock.velocity), (ch, h)):
                 for a in axes:
                     total[a] = total[a] + mine[i] * row[a][i]
-    own_mean = mean_over(size, cs, cv, ch, mean, plan=plan, metric=metric)
+    own_mean = mean_over(size, cx, cv, ch, mean, plan=plan, metric=metric)
     k = totals()
     if metric.member is not None:
         clear(k, metric.Member, metric)
@@ -145,6 +145,6 @@ def grown(
                 k[c] = reduced(way, k[c], t[c] if mine[i] > HALF else START[way])
     members = filled(metric.Member, k) if metric.member is not None else None
     return ask(
-        metric.cluster, n=real(size), hx=heads[X], hy=heads[Y], hz=heads[Z], hh=hh, members=members, mean=own_mean,
+        metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members, mean=own_mean,
         q=numbers.q,
     )  # fmt: skip

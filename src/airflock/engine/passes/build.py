@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from textwrap import indent
 from typing import Any
 
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
 from airflock.engine import vectors
-from airflock.engine.generate import Source
+from airflock.engine.generate import Source, law_mark
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
@@ -53,6 +54,27 @@ class Builder:
         return self.rows.setdefault(name, len(self.rows))
 
     @property
+    def laws(self) -> list["Builder"]:
+        """Of each law of the flock the builder of its stages; they write into the same driver."""
+        if not self.plan.laws:
+            return [self]
+        found = []
+        for law, plan in enumerate(self.plan.every):
+            made = copy(self)
+            made.plan, made.source = plan, self.source.of(law, plan.constants)
+            found.append(made)
+        return found
+
+    @property
+    def mark(self) -> str:
+        """What functions and records end in that are of one law of several."""
+        return law_mark(self.plan.law)
+
+    def kind(self, letter: str, fields: tuple[str, ...]) -> str:
+        """Name of the record of numbers behind a letter."""
+        return self.source.record(letter.upper() * 2 + (self.mark if letter == "p" else ""), fields)
+
+    @property
     def in_turn(self) -> bool:
         """Whether a loop over all agents is the body alone, for the agent in turn."""
         return self.plan.sequential
@@ -71,7 +93,7 @@ class Builder:
         lines, offset = [], 0
         for letter, fields in self.plan.records.items():
             if letter in letters.split():
-                kind = self.source.record(letter.upper() * 2, fields)
+                kind = self.kind(letter, fields)
                 values = ", ".join(f"row[{offset + i}]" for i in range(len(fields)))
                 lines.append(f"{letter} = {kind}({values})")
             offset += len(fields)
@@ -127,13 +149,23 @@ class Builder:
         given = ", ".join(dict.fromkeys([*turn, *asked, *(w for w in read if w.isidentifier() and w in used)]))
         self.function(f"{name}_of({given})", first, body, f"return {answer}")
         if self.plan.sequential:
-            self.turns[name] = lines, self.stages[f"{name}_of"]
+            called = self.stages[f"{name}_of"]
+            if self.mark:  # the stages of all turns share their names
+                *lines, given = _marked([*lines, given], read, self.mark)
+                called = Function(called.name, tuple(given.split(", ")))
+            self.turns[name] = lines, called
         else:
             self.function(f"{name}({arguments})", lines, f"return {name}_of({given})")
 
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that run once for the whole flock, and see all that came before."""
         return list(lines)
+
+
+def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:
+    """Lines in which some variables end in a mark."""
+    words = re.compile(rf"(?<![.\w])({'|'.join(names)})\b")
+    return [words.sub(rf"\1{mark}", line) for line in lines] if names else lines
 
 
 def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:

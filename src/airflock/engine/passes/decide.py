@@ -11,7 +11,7 @@ from airflock.engine.stages import decide as deciding
 from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
-from airflock.engine.stages.words import live, wants
+from airflock.engine.stages.words import live
 
 
 def neighbours(build: Builder) -> None:
@@ -31,7 +31,8 @@ def neighbours(build: Builder) -> None:
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
     arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
-    build.stage("neighbours", arguments, made.once, made.body, made.answer, apart=plan.topology is None)
+    name = f"neighbours{build.mark}"
+    build.stage(name, arguments, made.once, made.body, made.answer, apart=plan.topology is None)
 
 
 def _for_cells(
@@ -65,7 +66,7 @@ def boundaries(build: Builder) -> None:
     """Function boundaries: the boundary rule over all surfaces."""
     made = specialise(build, surfaces.boundaries)
     arguments = "n, row, whole, work, faces, edges, spans, scene"
-    build.stage("boundaries", arguments, made.once, made.body, made.answer)
+    build.stage(f"boundaries{build.mark}", arguments, made.once, made.body, made.answer)
 
 
 def decide(build: Builder) -> None:
@@ -73,15 +74,15 @@ def decide(build: Builder) -> None:
     plan, model = build.plan, build.plan.model
     summed = live(model.Sums, plan.dimensions) if model.neighbour is not None else []
     made = specialise(
-        build, deciding.decide, decision=argument("k_"), percept_of=argument("PERCEPT"),
-        summed=_asked(build, summed) if wants(model.decide, "sums") else [],
+        build, deciding.decide, decision=argument("k_"), percept_of=argument(f"PERCEPT{build.mark}"),
+        summed=_asked(build, summed) if deciding.asks(model, "sums") else [],
         walled=live(model.Walls, plan.dimensions) if model.boundary is not None else [],
     )  # fmt: skip
-    if wants(model.decide, "percept"):
+    if deciding.asks(model, "percept"):
         percept.record(build)
     percept.bind(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
-    build.stage("decide", arguments, made.once, made.body, made.answer)
+    build.stage(f"decide{build.mark}", arguments, made.once, made.body, made.answer)
 
 
 def stop(build: Builder) -> None:

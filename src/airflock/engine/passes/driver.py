@@ -10,7 +10,7 @@ from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.primitives import primitives
 from airflock.engine.replace import must_replace
-from airflock.engine.schedule import in_turn, order
+from airflock.engine.schedule import BY_LAW, in_turn, order
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.stages import flight as flight_
 
@@ -41,23 +41,27 @@ AWAY = real(1e9)
 """
 
 
-MADE: dict[str, Callable[[Builder], None]] = {  # by name, what makes the function of a stage
-    "aim_": scene.aim,
-    "glide_": scene.glide,
-    "appear_": scene.appear,
+MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of each stage; rows are numbered in this order
+    "snapshot": perceive.snapshot,
     "perceive": perceive.perceive,
     "tune": perceive.tune,
+    "receive": perceive.receive,
+    "meet": perceive.meet,
     "neighbours": decide.neighbours,
-    "rearrange": slots.rearrange,
     "boundaries": decide.boundaries,
     "flock": flock.flock,
     "decide": decide.decide,
     "stop": decide.stop,
     "overrule": decide.overrule,
-    "measure_collision": partial(measure.measure, clock="collision"),
-    "measure_sample": partial(measure.measure, clock="sample"),
     "move": move.move,
+    "measure_sample": partial(measure.measure, clock="sample"),
+    "measure_collision": partial(measure.measure, clock="collision"),
+    "aim_": scene.aim,
+    "glide_": scene.glide,
+    "appear_": scene.appear,
+    "rearrange": slots.rearrange,
 }
+CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them
 
 
 # Loops over agents take 32 at a time (four vectors of eight); the rest runs one by one, at three times the cost each. A
@@ -106,14 +110,12 @@ def stages(plan: Plan, lenient: bool = False) -> Builder:
 
 
 def make(build: Builder) -> None:
-    """Functions of all stages that a plan has, in the order of a step; before them what `neighbours` calls."""
-    perceive.snapshot(build)
-    perceive.receive(build)
-    perceive.meet(build)
-    for event in order(build.plan).values():
-        for name in event:
-            if name != "snapshot":
-                MADE[name](build)
+    """Functions of all stages that a plan has; of one that asks a law, one for every law."""
+    due = dict.fromkeys([*CALLED, *(stage for event in order(build.plan).values() for stage in event)])
+    found = [(stage, "0") if stage in MADE else stage.rpartition("_")[::2] for stage in due]
+    for name, one in MADE.items():
+        for law in [law for stage, law in found if stage == name]:
+            one(build.laws[int(law)] if name in BY_LAW else build)
 
 
 def _agents(build: Builder) -> list[str]:

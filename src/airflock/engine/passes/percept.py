@@ -21,13 +21,14 @@ METHODS: dict[str, tuple[Callable[..., Any], str]] = {
 def record(build: Builder) -> str:
     """Record that a driver hands to `decide`: the public fields, then what the bound methods need."""
     casts = CASTS if build.plan.model.sight is not None else CASTS[:3] if build.plan.scene else ()
-    return build.source.record("PERCEPT", (*Percept._fields, *FIELDS, "edges", "spans", *casts))
+    return build.source.record(f"PERCEPT{build.mark}", (*Percept._fields, *FIELDS, "edges", "spans", *casts))
 
 
 def bind(build: Builder) -> None:
     """Functions percept_ray, percept_cast, percept_normal and percept_uniform, those of them that a rule calls."""
-    called = [name for name in BOUND if any(f"percept_{name}(" in text for text in build.source.blocks)]
+    marked = {name: f"percept_{name}{build.mark}" for name in BOUND}
+    called = [name for name in BOUND if any(f"{marked[name]}(" in text for text in build.source.blocks)]
     for name in called:
         method, arguments = METHODS[name]
         made = specialise(build, method)
-        build.function(f"percept_{name}({arguments})", made.lines, f"return {made.answer}")
+        build.function(f"{marked[name]}({arguments})", made.lines, f"return {made.answer}")

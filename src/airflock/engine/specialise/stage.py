@@ -13,7 +13,7 @@ from airflock.engine.specialise.dead import read, without_dead
 from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
 from airflock.engine.specialise.values import LOAD, Bundle, Components, Loop, given, kind_of, text_of
 from airflock.engine.stages import words
-from airflock.engine.stages.state import SCENE, Flock
+from airflock.engine.stages.state import SCENE, Flock, own_row
 from airflock.engine.stages.words import Itself
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
@@ -112,8 +112,8 @@ class _Statements(Expressions):
                 rows[name] = given(name, next((kind for kind in TABLES if name.rstrip("0123456789") == kind), "row"))
             return rows[name]
 
-        record, letters = self.build.source.record, dict.fromkeys(letter for letter, _ in plan.varied)
-        kinds = {letter: record(letter.upper() * 2, plan.records[letter]) for letter in letters}
+        letters = dict.fromkeys(letter for letter, _ in plan.varied)
+        kinds = {letter: self.build.kind(letter, plan.records[letter]) for letter in letters}
         own = {"own": {letter: ast.Name(kind, LOAD) for letter, kind in kinds.items()}}
         number: object = given("order", "number") if self.build.slots else Itself()
         standing = {
@@ -123,7 +123,7 @@ class _Statements(Expressions):
             "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records} | own),
             "whole": SimpleNamespace(**{name: given(name, "whole") for name in WHOLE}),
             "scene": Bundle("scene", SCENE),
-            "agents": Loop("n", agents=True),
+            "agents": Loop("n", agents=True, law=plan.law),
             "lanes": Loop("m", agents=True),
             "others": Loop("m", agents=False),
         }
@@ -220,12 +220,22 @@ class _Statements(Expressions):
             return done
         if isinstance(over, Loop):
             self.split = 0 if over.agents and self.split is None else self.split
+            done = self.by_law(over, node, scope)
             if over.agents and self.build.in_turn:
-                return self.block(node.body, scope)
+                return done
             over = ast.Call(ast.Name("range", LOAD), [ast.Name(over.bound, LOAD)], [])
+            return [ast.For(self.target(node.target, scope), over, done, [], lineno=0)]
         if not residual(over):
             raise scope.fault(node, f"{ast.unparse(node.iter)} is not looped over")
         return [ast.For(self.target(node.target, scope), over, self.block(node.body, scope), [], lineno=0)]
+
+    def by_law(self, over: Loop, node: ast.For, scope: Scope) -> list[ast.stmt]:
+        """What a loop does for an agent; where laws differ, for an agent of this one."""
+        done = self.block(node.body, scope)
+        if over.law is None:
+            return done
+        who = ast.Subscript(given(own_row("", "law"), "row"), self.expr(node.target, scope), LOAD)
+        return [ast.If(ast.Compare(who, [ast.Eq()], [ast.Constant(over.law)]), done, [])]
 
     def assign(self, node: ast.Assign, scope: Scope) -> list[ast.stmt]:
         """An assignment; none where its name stands for what is known from then on."""

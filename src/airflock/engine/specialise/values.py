@@ -19,10 +19,14 @@ class StageError(Exception):
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop over all agents (`agents`, `lanes`: in turn the one agent that is due) or over the others of one."""
+    """A loop over all agents (`agents`, `lanes`: in turn the one agent that is due) or over the others of one.
+
+    law : the loop is only over those who fly by this law
+    """
 
     bound: str
     agents: bool
+    law: int | None = None
 
 
 @dataclass(frozen=True)

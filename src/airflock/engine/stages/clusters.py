@@ -88,17 +88,17 @@ def mean_over(size: int, s: Any, v: Any, h: Any, mean: Any, *, plan: Plan, metri
 
 def mean_of(size: int, mean: Any, state: Any, flock: Flock, n: int, *, plan: Plan, metric: Metric) -> Any:
     """Means of the cluster that has grown, which has so many members; those of the flock where no rule is for them."""
-    cs, cv, ch = vector(), vector(), vector()
+    cx, cv, ch = vector(), vector(), vector()
     if metric.member is not None:
-        for total in (cs, cv, ch):
+        for total in (cx, cv, ch):
             for a in range(plan.dimensions):
                 total[a] = ZERO
         for j in range(n):
             if state[j] == 1:
-                for total, row in ((cs, flock.position), (cv, flock.velocity), (ch, flock.heading)):
+                for total, row in ((cx, flock.position), (cv, flock.velocity), (ch, flock.heading)):
                     for a in range(plan.dimensions):
                         total[a] = total[a] + row[a][j]
-    return mean_over(size, cs, cv, ch, mean, plan=plan, metric=metric)
+    return mean_over(size, cx, cv, ch, mean, plan=plan, metric=metric)
 
 
 def members_of(mean: Any, state: Any, flock: Flock, numbers: Any, n: int, *, metric: Metric) -> Any:
@@ -135,14 +135,14 @@ def clusters_of(
             while state[first] != 0:
                 first += 1
             size = grown(first, done, state, expanded, flock, numbers, n, plan=plan, metric=metric)
-            heads = vector()
+            s = vector()
             for a in axes:
-                heads[a] = ZERO
+                s[a] = ZERO
             hh = ZERO
             for j in range(n):
                 inside = ONE if state[j] == 1 else ZERO
                 for a in axes:
-                    heads[a] = heads[a] + inside * h[a][j]
+                    s[a] = s[a] + inside * h[a][j]
                 hh += inside * sum(h[a][j] * h[a][j] for a in axes)
                 if metric.member is None:
                     state[j] = integer(2) if state[j] != 0 else integer(0)
@@ -153,7 +153,7 @@ def clusters_of(
                     state[j] = integer(2) if state[j] != 0 else integer(0)
             done += size
             t = ask(
-                metric.cluster, n=real(size), hx=heads[X], hy=heads[Y], hz=heads[Z], hh=hh, members=members,
+                metric.cluster, n=real(size), hx=s[X], hy=s[Y], hz=s[Z], hh=hh, members=members,
                 mean=own_mean, q=numbers.q,
             )  # fmt: skip
             add(u, t, metric.Cluster, metric)

@@ -16,6 +16,11 @@ from airflock.world import bvh
 NEAR = 64  # shapes gathered at most; where more are in sight, each cast goes through the tree
 
 
+def asks(model: Model, name: str) -> bool:
+    """Whether a rule that decides asks for something by this name."""
+    return any(wants(rule, name) for rule in model.deciding)
+
+
 def heard(i: int, flock: Flock, summed: Iterable[int], *, model: Model) -> Any:
     """Sums of the neighbours of agent i; fields that nobody sums are zero."""
     return model.Sums(*[flock.sums[c][i] if c in summed else ZERO for c in fields(model.Sums)])  # type: ignore[misc]
@@ -62,7 +67,7 @@ def decide(
     summed, walled : fields of Sums and Walls that neighbours and surfaces have summed
     """
     axes, m, w = range(plan.dimensions), flock.measured_position, numbers.w
-    perceives = wants(model.decide, "percept")
+    perceives = asks(model, "percept")
     for i in agents:
         own_p = numbers_of(i, "p", flock, numbers, plan=plan)
         v = vector()
@@ -70,10 +75,10 @@ def decide(
             v[a] = flock.measured_velocity[a][i]
         f = ONE / norm(v[X], v[Y], v[Z])
         own = Own(v[X], v[Y], v[Z], f * v[X], f * v[Y], f * v[Z])
-        sums = heard(i, flock, summed, model=model) if wants(model.decide, "sums") else None
-        walls = felt(i, flock, walled, model=model) if wants(model.decide, "walls") else None
-        shared = solved(i, flock, model=model) if wants(model.decide, "shared") else None
-        memory = remembered(i, mem, model=model) if wants(model.decide, "memory") else None
+        sums = heard(i, flock, summed, model=model) if asks(model, "sums") else None
+        walls = felt(i, flock, walled, model=model) if asks(model, "walls") else None
+        shared = solved(i, flock, model=model) if asks(model, "shared") else None
+        memory = remembered(i, mem, model=model) if asks(model, "memory") else None
         if perceives and model.sight is not None:
             # decided side by side, each agent gathers into memory of its own
             near = np.empty(NEAR, np.int64) if plan.grid else scene.near
@@ -99,7 +104,14 @@ def decide(
         )  # fmt: skip
         for a in axes:
             flock.command[a][i] = o[a]
-        if wants(model.decide, "memory"):
+        if model.added is not None:
+            more = ask(
+                model.added.decide, own=own, shared=shared, percept=percept if perceives else None,
+                period=numbers.c.period, wing=numbers.wing, aero=numbers.aero,
+            )  # fmt: skip
+            for a in axes:
+                flock.command[a][i] += more[a]
+        if asks(model, "memory"):
             for c in fields(model.Memory):
                 mem[c, i] = o[3][c]
         if perceives and model.sight is not None:

@@ -61,15 +61,15 @@ def headings(flock: Flock, n: int, *, plan: Plan) -> Any:
         f = ONE / flock.speed[i]
         for a in axes:
             h[a][i] = f * v[a][i]
-    s, sv, sh = vector(), vector(), vector()
-    for total in (s, sv, sh):
+    sx, sv, sh = vector(), vector(), vector()
+    for total in (sx, sv, sh):
         for a in axes:
             total[a] = ZERO
     for i in range(n):
-        for total, row in ((s, x), (sv, v), (sh, h)):
+        for total, row in ((sx, x), (sv, v), (sh, h)):
             for a in axes:
                 total[a] = total[a] + row[a][i]
-    return Mean(*means(s, n, plan=plan), *means(sv, n, plan=plan), *means(sh, n, plan=plan), real(n))  # type: ignore[call-arg]
+    return Mean(*means(sx, n, plan=plan), *means(sv, n, plan=plan), *means(sh, n, plan=plan), real(n))  # type: ignore[call-arg]
 
 
 def names_of(record: Any) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from airflock.engine.stages.receive import (
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     FAR,
+    GONE,
     HALF,
     LIMIT,
     ONE,
@@ -55,6 +56,16 @@ BOTH, HEAR, ADD = "both", "hear", "add"
 def heard_age(i: int, j: int, late: float, flock: Flock, *, plan: Plan) -> Any:
     """How old the data of agent j are on arrival, as the clocks of both tell, s."""
     return late + flock.clock[i] - flock.clock[j] if plan.suffers("clock") else late
+
+
+def group_of(j: int, flock: Flock, *, plan: Plan) -> Any:
+    """Number of the group of agent j; -1 where it is in none."""
+    return flock.own("", "group")[j] if plan.grouped else GONE
+
+
+def kin(i: int, j: int, flock: Flock, *, plan: Plan) -> Any:
+    """Whether two agents are of one group, 1 or 0; all are where nobody asks for groups."""
+    return (ONE if flock.own("", "group")[j] == flock.own("", "group")[i] else ZERO) if plan.grouped else ONE
 
 
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
@@ -93,7 +104,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             near = least(ask(model.reach, p=own_p), LIMIT)
             near2 = near * near + TINY if exact else near * near
         if selective and draw is not None:
-            if plan.sequential:
+            if plan.sequential or plan.laws:
                 draw(i)
             else:
                 if first_of_four(i, flock):
@@ -192,7 +203,8 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     t = ask(
                         model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z],
                         dv=speed, vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
-                        age=age, lower=ONE if integer(j) < ii else ZERO, p=own_p,
+                        age=age, lower=ONE if integer(j) < ii else ZERO, kin=kin(i, j, flock, plan=plan),
+                        group=group_of(j, flock, plan=plan), p=own_p,
                     )  # fmt: skip
                     for c, how in sums:
                         total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))

@@ -12,7 +12,7 @@ from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import normals, uniforms
-from airflock.engine.stages.state import Flock
+from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
 SENSOR = random.SENSOR
@@ -53,7 +53,8 @@ def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan
         t = ask(
             plan.sensor.measure, x=x[X][i], y=x[Y][i], z=x[Z][i], vx=v[X][i], vy=v[Y][i], vz=v[Z][i],
             memory=recalled(i, flock, plan=plan), **{"g" + str(c): g[c][i] for c in range(12)},
-            **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period, s=numbers.s,
+            **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period,
+            s=numbers_of(i, "s", flock, numbers, plan=plan),
         )  # fmt: skip
         for a in range(plan.dimensions):
             flock.measured_position[a][i] = t[a]
@@ -82,7 +83,7 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
                 for i in range(m):
                     error[a][i], drift[a][i] = ask(
                         plan.sensor.error, dx=error[a][i], dv=drift[a][i], g=flock.errors[g][i],
-                        period=numbers.c.period, s=numbers.s,
+                        period=numbers.c.period, s=numbers_of(i, "s", flock, numbers, plan=plan),
                     )  # fmt: skip
         for a in axes:
             for i in range(m):

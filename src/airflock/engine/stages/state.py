@@ -201,8 +201,8 @@ def fault_row(kind: str, what: str) -> str:
 
 
 def own_row(letter: str, name: str) -> str:
-    """Name of the row with a number that differs among agents."""
-    return f"number_{letter}_{name}"
+    """Name of the row with a number that differs among agents; without a letter it is of no record."""
+    return f"number_{letter}_{name}" if letter else name
 
 
 def numbers_of(i: int, letter: str, flock: Flock, numbers: Any, *, plan: Plan) -> Any:

@@ -1,0 +1,32 @@
+"""
+Predator and prey
+=================
+
+A group with a law of its own: one predator among a hundred prey (Chen and Kolokolnikov 2014). A weak one stops in the
+middle of a ring of prey, which draw it to all sides alike; the circles are the radii that theory gives. A stronger one
+chases through the swarm. Lines are the last two seconds of its way.
+"""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import airflock
+
+figure = Figure(figsize=(8, 4), layout="constrained")
+for axes, name in zip(figure.subplots(1, 2), ("ring", "hunt"), strict=True):
+    scenario = airflock.load(f"chen_2014/{name}", {"duration": 30.0})
+    x = airflock.simulate(scenario, seed=1).position.isel(keypoint=0).values
+    prey, hunter = x[-1, :, 1:], x[-21:, :, 0]
+    axes.plot(*prey, "o", color="tab:blue", ms=4, label="prey")
+    axes.plot(*hunter.T, "-", color="tab:red", lw=1)
+    axes.plot(*hunter[-1], "o", color="tab:red", ms=7, label="predator")
+    if name == "ring":
+        p, turn = scenario.parameters, np.linspace(0.0, 2.0 * np.pi, 200)
+        for square in (p.k_flee / p.k_att, (p.k_rep + p.k_flee) / p.k_att):
+            circle = hunter[-1][:, None] + np.sqrt(square) * np.array([np.cos(turn), np.sin(turn)])
+            axes.plot(*circle, color="grey", lw=0.8)
+    axes.set_aspect("equal")
+    axes.set_title(f"v_hunt = {scenario.laws[1].parameters.v_hunt:g} m/s")
+    axes.set_xlabel("east, m")
+figure.axes[0].set_ylabel("north, m")
+figure.axes[0].legend(frameon=False, loc="upper right")
