@@ -121,7 +121,7 @@ class Reference:
         self.parameters = parameters_of(scenario, bits)
         times = clock(scenario)
         self.times = {name: times[name] for name in TIMES if name in times} | {"agents": scenario.agents}
-        self.times["links"] = int(scenario.radio.kind == "links")
+        self.times["links"] = int(scenario.transceiver.name == "links")
         self.times["delay"] = times["delay"] // times["decide_every"]
 
     def _schedule(self, seed: int, skip: bool) -> Schedule:

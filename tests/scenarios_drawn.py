@@ -19,6 +19,7 @@ from airflock.core.contract import Model
 from airflock.core.parameters import Choice, Quantity, choices, declarations
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
+from airflock.radios.registry import RADIOS
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -309,11 +310,32 @@ def perception(keys: dict[str, Any], rng: Random, length: float, dt: float) -> N
     keys["sensors.period"] = dt * rng.choice((0, 1, 2, 3, 5))
     sensors(keys, rng, length, dt)
     keys["radio.delay"] = dt * rng.choice((0, 0, 1, 4, 7))
-    keys["radio.kind"] = rng.choice(("constant", "links"))
-    if keys["radio.kind"] == "links":
-        keys |= {"radio.near": 0.2 * length, "radio.far": length, "radio.slow_rate": rng.choice((0.7, 4.0))}
+    radio(keys, rng, length)
     if rng.random() < 0.4:
         keys |= {"radio.loss": rng.choice((0.3, 1.0)), "radio.loss_at": length}
+
+
+def radio(keys: dict[str, Any], rng: Random, length: float) -> None:
+    """The radio and its own numbers."""
+    kind = rng.choice(
+        ("constant", "constant", "links", "links", *(k for k in RADIOS if k not in ("constant", "links")))
+    )
+    keys["radio.kind"] = kind
+    if kind in ("links", "shadow"):
+        keys |= {"radio.near": 0.2 * length, "radio.far": length}
+    if kind == "links":
+        keys["radio.slow_rate"] = rng.choice((0.7, 4.0))
+    if kind == "table":
+        keys |= {"radio.spacing": 0.1 * length, "radio.received_0": 0.7, "radio.received_3": 0.2}
+    if kind == "congestion":
+        keys |= {"radio.airtime": rng.choice((0.0, 0.05)), "radio.rate": rng.choice((4.0, 30.0, 300.0))}
+    if kind == "shadow":
+        keys |= {"radio.wall": rng.choice((0.0, 6.0, 200.0)), "radio.exponent": rng.choice((2.0, 3.5))}
+    if kind == "bursts":
+        keys |= {"radio.outage_rate": rng.choice((0.0, 3.0)), "radio.outage_time": rng.choice((0.1, 1.0))}
+        keys["radio.received_bad"] = rng.choice((0.0, 0.5))
+    if kind == "jitter":
+        keys |= {"radio.jitter": rng.choice((0.0, 0.05, 0.3)), "radio.longest": rng.choice((0.0, 0.1, 2.0))}
 
 
 def sensors(keys: dict[str, Any], rng: Random, length: float, dt: float) -> None:
@@ -400,7 +422,7 @@ def notions(draw: Draw) -> set[str]:
     found, keys = draw.scenario, draw.keys
     switches: dict[str, bool] = {
         "three": found.dimensions == 3, "noisy": found.errs, "late": found.radio.delay > 0.0,
-        "lossy": found.radio.loss > 0.0, "links": found.radio.kind == "links", "gusts": found.wind.gust > 0.0,
+        "lossy": found.radio.loss > 0.0, "links": found.transceiver.name == "links", "gusts": found.wind.gust > 0.0,
         "periodic": found.world.edges == "periodic", "islands": bool(found.world.obstacles),
         "scene": found.scene.kind != "none", "goals": found.goals.kind not in ("none", "own"),
         "own": found.goals.kind == "own", "sequential": found.flight.update == "sequential",
@@ -422,6 +444,7 @@ def notions(draw: Draw) -> set[str]:
     for section, record in records.items():
         owner = kind if section == "model" else section
         names |= {f"{owner}.{name} = {value}" for name, value in choices(record).items()}
+    names |= {f"radio.kind = {found.transceiver.name}"}
     return names | {f"{section}.kind = {keys[f'{section}.kind']}" for section in ("model", "body", "sensors")}
 
 

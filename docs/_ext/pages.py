@@ -194,16 +194,18 @@ def robots() -> None:
     """Bodies, sensors, radio, silence and wind: what stands between a command and a motion."""
     import sys
 
-    from airflock.body import radio, wind
+    from airflock.body import wind
     from airflock.body.registry import BODIES
+    from airflock.core import radio as radios
     from airflock.core import silence
+    from airflock.radios.registry import RADIOS
     from airflock.scenarios.keys import keys as keys_of
     from airflock.sensors.registry import SENSORS
 
     pieces = [
         "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
         "Neighbours hear of it through the radio, and an agent knows itself through its sensors "
-        "([how to choose and write one](../sensors.md)).\n",
+        "([how to choose and write one](../sensors.md); [the same of radios](../radios.md)).\n",
         _abilities(BODIES),
     ]
     for name, body in BODIES.items():
@@ -217,7 +219,15 @@ def robots() -> None:
         pieces.append(f'\n## sensors.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
         pieces.append(f"{prose(sensor.Parameters.__doc__ or '')}\n\n```python\n{getsource(rule)}```\n\n")
         pieces.append(key_table(keys_of(name)))
-    for name, module in (("radio", radio), ("silence", silence), ("wind", wind)):
+    for name, radio in RADIOS.items():
+        kinds = [kind for kind in radios.RULES if getattr(radio, kind) is not None]
+        module = sys.modules[getattr(radio, kinds[0]).__module__ if kinds else f"airflock.radios.{name}"]
+        pieces.append(f'\n## radio.kind = "{name}"\n\n{prose(module.__doc__ or "")}\n\n')
+        pieces.append(f"{prose(radio.Parameters.__doc__ or '')}\n\n")
+        for rule in (getattr(radio, kind) for kind in kinds):
+            pieces.append(f"```python\n{getsource(rule)}```\n\n")
+        pieces.append(key_table(keys_of(name if name != "constant" and name != "links" else "radio")))
+    for name, module in (("silence", silence), ("wind", wind)):
         pieces.append(f"\n## {name}\n\n{prose(module.__doc__ or '')} {prose(module.Parameters.__doc__ or '')}\n\n")
         rules = [value for value in vars(module).values() if getattr(value, "__module__", "") == module.__name__]
         for rule in rules:
@@ -254,6 +264,11 @@ def vocabulary() -> None:
         "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
         "decide": "of a model: returns the command, and its Memory where it has one",
         "meet": "of a topology: says whom of those that it hears an agent meets",
+        "missed": "of a radio: the probability that nothing of what one agent sends another in a decision arrives",
+        "missed_few": "of a radio: the same, where few packets are sent in a decision",
+        "receive": "of a radio: 1 if a packet arrives, else 0, and its Packet where it has one",
+        "late": "of a radio: how much later than the delay a packet comes, s",
+        "carry": "of a radio: where the sender of the newest packet is believed to be now, m",
         "move": "of a body: returns the velocity after a step",
         "pair": "of an order parameter: asked for each pair of agents",
         "linked": "of an order parameter: whether two agents belong to one cluster",

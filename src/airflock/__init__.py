@@ -9,6 +9,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.checking.bodies import check_body as check_body
     from airflock.checking.metrics import check_metric as check_metric
     from airflock.checking.models import check_model as check_model
+    from airflock.checking.radios import check_radio as check_radio
     from airflock.checking.sensors import check_sensor as check_sensor
     from airflock.checking.types import check_types as check_types
     from airflock.core.contract import body as body
@@ -18,6 +19,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.core.parameters import Parameters as Parameters
     from airflock.core.parameters import choice as choice
     from airflock.core.parameters import quantity as quantity
+    from airflock.core.radio import radio as radio
     from airflock.core.sensor import sensor as sensor
     from airflock.display.displays import display as display
     from airflock.engine.flight import Flight as Flight
@@ -66,6 +68,7 @@ _WHERE = {
     "metric": "airflock.core.contract",
     "fault": "airflock.core.fault",
     "sensor": "airflock.core.sensor",
+    "radio": "airflock.core.radio",
     "metric_set": "airflock.metrics.registry",
     "quantity": "airflock.core.parameters",
     "choice": "airflock.core.parameters",
@@ -74,6 +77,7 @@ _WHERE = {
     "check_metric": "airflock.checking.metrics",
     "check_body": "airflock.checking.bodies",
     "check_sensor": "airflock.checking.sensors",
+    "check_radio": "airflock.checking.radios",
     "check_types": "airflock.checking.types",
     "simulate": "airflock.recordings.flights",
     "Flight": "airflock.engine.flight",

@@ -24,6 +24,7 @@ from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
 from airflock.onboard.fields import frozen
+from airflock.radios.registry import RADIOS
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, counter_clockwise, polygon_fault
 from flocks import ISLANDS, PENTAGON
@@ -50,6 +51,7 @@ FLIGHTS = {
     }),
     "swarm": ("couzin_2002/torus", {"agents": 10, "body.noise": None, "duration": 3.0}),
 }  # fmt: skip
+PLAIN = Hearing.simulated(RADIOS["constant"], RADIOS["constant"].Parameters())
 
 
 def place_of(scenario):
@@ -199,7 +201,7 @@ def test_only_the_newest_sound_packet_counts():
 
 
 def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock():
-    one = pilot(hearing=Hearing.simulated(links=False))
+    one = pilot(hearing=PLAIN)
     own, east = State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0), State(9.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     assert one.hear(1, east, 7.0, 5.0), "its clock is 2 s ahead"
     assert one.hear(1, east._replace(x=8.0), 4.0, 5.0), "now it is right again"
@@ -207,7 +209,7 @@ def test_a_simulated_radio_of_one_delay_is_heard_once_and_believes_every_clock()
     assert heard.state.x == 8.0 and heard.age == 1.0
     met, alone = one.decide(own, 5.0).command, one.decide(own, 5.2).command
     assert met != alone and not one.heard(5.2)
-    links = pilot(hearing=Hearing.simulated(links=True))
+    links = pilot(hearing=Hearing.simulated(RADIOS["links"], RADIOS["links"].Parameters()))
     links.hear(1, east, 4.0, 5.0)
     links.decide(own, 5.0)
     assert links.heard(500.0)[0].state.x == 9.0 + 496.0
@@ -247,7 +249,10 @@ def test_a_neighbour_counts_as_heard_or_as_lost_but_never_as_both(age, distance)
 
 def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
     """With the rule of silence the law hears it until it is lost; without, it is gone at the next decision."""
-    hearing, own = Hearing.simulated(links=False), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    hearing, own = (
+        PLAIN,
+        State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0),
+    )
     for rule, known in ((Silence(rule="stop", patience=1.5), True), (None, False)):
         one = pilot(silence=rule, hearing=hearing)
         one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 1.0)
@@ -258,7 +263,7 @@ def test_a_missing_packet_does_not_make_a_pilot_forget_who_sent_the_last():
 
 def test_who_is_lost_when_its_packet_comes_is_not_heard():
     """A patience shorter than the delay: the simulator hears nobody then, and so does its pilot."""
-    one = pilot(silence=Silence(rule="stop", patience=0.3), hearing=Hearing.simulated(links=False))
+    one = pilot(silence=Silence(rule="stop", patience=0.3), hearing=PLAIN)
     one.hear(1, State(6.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.35)
     assert not one.heard(0.35) and one.heard(0.25)
 

@@ -15,6 +15,7 @@ import pytest
 
 from airflock.core import random
 from airflock.core.agent import State
+from airflock.core.radio import lost
 from airflock.errors import ScenarioError
 from airflock.fleet import compare
 from airflock.fleet.dice import OuterNoise, PacketDice, SensorDice
@@ -32,6 +33,8 @@ from airflock.onboard.log import replay
 from airflock.onboard.mission import Phase
 from airflock.onboard.ports import open_port
 from airflock.onboard.run import fly as fly_node
+from airflock.radios import jitter, links
+from airflock.radios.registry import RADIOS
 from airflock.recordings.scores import measure
 from fleets import card, fleet, scenario
 
@@ -105,21 +108,30 @@ def test_the_same_seed_gives_the_same_bits_in_two_processes():
 @pytest.mark.parametrize("kind", ["constant", "links"])
 def test_the_ether_loses_the_packets_that_the_simulator_loses(kind):
     """Counted by arrivals: the share that a radio of the simulator lets through at this distance."""
-    from airflock.body import radio
-
-    k = radio.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
-    ether = Ether(k, [1, 2], 3, 0.2)
+    k = links.Parameters(kind=kind, delay=0.2, loss=0.6 if kind == "constant" else 0.0, loss_at=80.0, far=60.0)
+    ether = Ether(RADIOS[kind], k, [1, 2], 3, 0.2)
     at, count = [(0.0, 0.0, 0.0), (70.0, 0.0, 0.0)], 4000
     heard = 0
     for step in range(count):
         ether.send(0.2 * step, 0, b"x")
         heard += len(list(ether.deliver(0.2 * step + 0.2, at)))
     if kind == "constant":
-        share = 1.0 - radio.lost(70.0, k)
+        share = 1.0 - lost(70.0, k)
     else:
-        fast, slow = (radio.received(70.0, float(link), k) for link in (0, 1))
+        fast, slow = (links.received(70.0, float(link), k) for link in (0, 1))
         share = 1.0 - (1.0 - fast) ** 2 * (0.8 + 0.2 * (1.0 - slow))  # the slow link sends in each fifth period
     assert heard / count == pytest.approx(share, abs=0.03)
+
+
+def test_the_ether_brings_packets_as_late_as_the_radio_says():
+    k = jitter.Parameters(delay=0.2, jitter=0.3, longest=9.0)
+    ether, at, late = Ether(RADIOS["jitter"], k, [1, 2], 3, 0.1), [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0)], []
+    for step in range(2000):
+        ether.send(0.1 * step, 0, str(step).encode(), at)
+    for tick in range(21_000):
+        late += [0.01 * tick - 0.1 * int(data) - 0.2 for _, data in ether.deliver(0.01 * tick, at)]
+    assert len(late) == 2000 and min(late) > -1e-6
+    assert sum(late) / len(late) == pytest.approx(0.3 + 0.005, rel=0.1)  # looked for every 10 ms
 
 
 @pytest.mark.parametrize("three", [False, True])

@@ -7,19 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airflock.body.radio import (
-    FEW,
-    Parameters,
-    either,
-    lost,
-    missed,
-    missed_few,
-    packets,
-    power,
-    received,
-    thrice,
-    unheard,
-)
+from airflock.core.radio import FEW, either, lost, packets
+from airflock.core.reception import unheard
+from airflock.radios.links import Parameters, missed, missed_few, power, received, thrice
+from airflock.radios.registry import RADIOS
 
 K = Parameters(loss=0.3)
 
@@ -63,11 +54,12 @@ def test_nothing_arrives_where_every_packet_is_missed(distance, fast, slow):
 
 @given(st.floats(0.0, 500.0), st.integers(0, 2000))
 def test_nothing_arrives_where_one_of_two_mishaps_happens(distance, step):
-    assert unheard(distance, step, 0.2, K) == lost(distance, K)  # a constant radio sends once
+    known = {"distance": distance}
+    assert unheard(RADIOS["constant"], K, step, 0.2, known) == lost(distance, K)  # a constant radio sends once
     linked = Parameters(kind="links", loss=0.3)
     sent = packets(step, linked.fast_rate, 0.2), packets(step, linked.slow_rate, 0.2)
     arrives = (1.0 - lost(distance, linked)) * (1.0 - missed(distance, *sent, linked))
-    assert unheard(distance, step, 0.2, linked) == pytest.approx(1.0 - arrives, abs=1e-12)
+    assert unheard(RADIOS["links"], linked, step, 0.2, known) == pytest.approx(1.0 - arrives, abs=1e-12)
     assert either(0.4, 1.0) == pytest.approx(1.0) and either(0.0, 0.4) == 0.4
 
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import dryden, radio, wind
+from airflock.body import dryden, wind
 from airflock.checking.flock import of_model
-from airflock.core import random
+from airflock.core import radio, random
 from airflock.core.agent import State, answer
 from airflock.core.contract import Metric
 from airflock.core.maths import norm
@@ -33,6 +33,14 @@ LIMIT = 1e8  # m; no radio reaches farther
 
 
 @dataclass
+class Link:
+    """What the radio of one agent keeps of another: its Packet, and what is under way: when it is due, what it says."""
+
+    packet: Any = None
+    way: tuple[float, State, float] | None = None
+
+
+@dataclass
 class Agent:
     """One agent in the air.
 
@@ -41,6 +49,7 @@ class Agent:
     command    : what it flies by: its pilot's last command, if no fault has overruled it
     own, sent  : errors of its own and of its sent measurements: position error q (m), velocity error u (m/s)
     rays       : how many it cast at its last decision
+    links      : by the number of another agent, what the radio keeps of what that one sends
     faults     : by kind, the latest that has hit it; present : whether it is there
     """
 
@@ -54,6 +63,7 @@ class Agent:
     own: State = State(*ZERO, *ZERO)
     sent: State = State(*ZERO, *ZERO)
     rays: float = 0.0
+    links: dict[int, Link] = field(default_factory=dict)
     faults: dict[str, Suffering] = field(default_factory=dict)
     present: bool = True
 
@@ -134,7 +144,7 @@ def boarded(scenario: Scenario, seed: int, place: Place, i: int, state: State) -
     period = clock(scenario)["decide_every"] * scenario.flight.dt
     pilot = Pilot(
         law[0], p, place.seen(reach_of_walls(law[0], p)), index=i, period=period, groups=groups_of(scenario),
-        hearing=Hearing.simulated(links=scenario.radio.kind == "links"), silence=scenario.silent_by(),
+        hearing=Hearing.simulated(scenario.transceiver, scenario.radio), silence=scenario.silent_by(),
         body=scenario.vehicle, b=b,
         flat=scenario.dimensions == 2, seed=seed, wing=scenario.wing, aero=scenario.aero,
         told=scenario.model.flock is not None, topology=scenario.meets, t=scenario.topology,
@@ -283,13 +293,69 @@ def hear(
         carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
         carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
-        period = clock(scenario)["decide_every"] * scenario.flight.dt
-        u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
         if in_range:
             found.add(j)
-        if in_range and carries and u >= radio.unheard(distance, number, period, k):
-            flock[i].pilot.hear(j, said[j], time - late + theirs, time + mine)
+        link = flock[i].links.setdefault(j, Link())
+        if in_range and carries and arrives(scenario, seed, number, place, i, j, flock, link, time + mine):
+            wait = lateness(scenario, seed, number, place, i, j, flock)
+            if link.way is None:  # one packet at a time is under way
+                link.way = time + wait, said[j], time - late + theirs
+        if link.way is not None and link.way[0] <= time + 0.5 * scenario.flight.dt:
+            flock[i].pilot.hear(j, link.way[1], link.way[2], time + mine)
+            link.way = None
     return found
+
+
+def asked_of_radio(
+    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent]
+) -> dict[str, Any]:
+    """What rules of the radio may ask for of what agent j sends agent i."""
+    own, n, period = flock[i].state, len(flock), clock(scenario)["decide_every"] * scenario.flight.dt
+    there = [k for k, agent in enumerate(flock) if agent.present]
+    seen = {k: place.beside(own, flock[k].state) for k in there}
+    apart = {k: norm(s.x - own.x, s.y - own.y, s.z - own.z) for k, s in seen.items()}
+    reach, true = norm(min(scenario.radio.range, LIMIT), 0.0, 0.0), seen[j]
+    pair = i * n + j
+    chances = [random.uniform(word) for word in random.words(seed, random.AIR, 0, number, pair)]
+    sent = {
+        link: radio.packets(float(number), getattr(scenario.radio, rate), period)
+        for link, rate in zip(("fast", "slow"), scenario.transceiver.rates, strict=False)
+    }
+    return sent | {
+        "distance": apart[j], "dx": true.x - own.x, "dy": true.y - own.y, "dz": true.z - own.z,
+        "talkers": float(sum(apart[k] <= reach for k in there if k != i)),
+        "clear": 0.0 if place.blocked(*own[:3], *true[:3]) else 1.0, "step": float(number), "period": period,
+        **{f"u{c}": u for c, u in enumerate(chances)},
+        **{f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))},
+        "k": scenario.radio,
+    }  # fmt: skip
+
+
+def arrives(
+    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent], link: Link, now: float
+) -> bool:
+    """Whether anything of what agent j sends agent i in a decision arrives; `now` by the clock of agent i."""
+    kind, k = scenario.transceiver, scenario.radio
+    asked = asked_of_radio(scenario, seed, number, place, i, j, flock)
+    if kind.receive is not None:
+        newest = flock[i].pilot.packets.get(j)
+        asked |= {"age": now - newest.sent_at if newest else now + 1e9}
+        asked["packet"] = link.packet or (kind.Packet() if kind.Packet else None)
+        found = answer(kind.receive, "receive", asked, kind.name)
+        hit, link.packet = found if kind.Packet else (found, None)
+        if hit <= 0.5:
+            return False
+    missed = answer(kind.missed, "missed", asked, kind.name) if kind.missed is not None else 0.0
+    u = random.pair_uniform(seed, random.PACKET, 0, number, i, j, len(flock))
+    return u >= missed + (1.0 - missed) * radio.lost(asked["distance"], k)
+
+
+def lateness(scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent]) -> float:
+    """How late what agent j sends agent i in a decision comes, s; 0.0 over a radio that brings all in time."""
+    kind = scenario.transceiver
+    if kind.late is None:
+        return 0.0
+    return max(0.0, answer(kind.late, "late", asked_of_radio(scenario, seed, number, place, i, j, flock), kind.name))
 
 
 # --------------------------------------------------------------------------------------------------------- motion

@@ -43,7 +43,7 @@ def packed(tmp_path):
         "several_set": '{ scenario = "vasarhelyi_2018/4ms", set = { "model.kind" = "EVIL" } }'.replace("EVIL", evil),
     }.items():
         (tmp_path / f"{name}.toml").write_text(f'scenarios = ["vasarhelyi_2018/4ms", {entry}]\n')
-    for section in ("body", "sensors", "metrics"):
+    for section in ("body", "sensors", "radio", "metrics"):
         text = SCENARIO.replace("evil.py", "vasarhelyi_2018") + f'[{section}]\nkind = "evil.py"\n'
         (tmp_path / f"{section}.toml").write_text(text)
     text = 'extends = "vasarhelyi_2018/4ms"\n[[faults]]\nkind = "evil.py"\nat = 0.1\n'
@@ -143,6 +143,7 @@ WAYS = {
     ),
     "body of a scenario": (python('airflock.load("body.toml")'), CONSENT),
     "sensor of a scenario": (python('airflock.load("sensors.toml")'), CONSENT),
+    "radio of a scenario": (python('airflock.load("radio.toml")'), CONSENT),
     "law of a group": (python('airflock.load("groups.toml")'), CONSENT),
     "metrics of a scenario": (python('airflock.load("metrics.toml")'), CONSENT),
     "faults of a scenario": (python('airflock.load("faults.toml")'), CONSENT),

@@ -11,15 +11,18 @@ from airflock.body.registry import BODIES
 from airflock.checking.bodies import check_body
 from airflock.checking.metrics import check_metric
 from airflock.checking.models import check_model
+from airflock.checking.radios import check_radio
 from airflock.checking.report import CheckError
 from airflock.checking.sensors import check_sensor
 from airflock.checking.units import Units, factor
 from airflock.core.contract import body, metric, model
+from airflock.core.radio import radio
 from airflock.core.sensor import sensor
 from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import METRICS, SETS
 from airflock.models import vasarhelyi_2018, viragh_2014
 from airflock.models.vasarhelyi_2018 import Sums
+from airflock.radios.registry import RADIOS
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.sensors.registry import SENSORS
 
@@ -58,6 +61,11 @@ def test_every_sensor_keeps_the_standing_list(name):
     assert not check_sensor(name).broken
 
 
+@pytest.mark.parametrize("name", RADIOS)
+def test_every_radio_keeps_the_standing_list(name):
+    assert not check_radio(name).broken
+
+
 def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
     assert not check_model(str(Path(__file__).parents[2] / "examples" / "own_rule.py")).broken
 
@@ -67,6 +75,7 @@ def test_the_example_of_a_law_of_ones_own_keeps_the_standing_list():
     [
         (check_model, "vasarhely", "did you mean vasarhelyi_2018"),
         (check_body, "multirotr", "did you mean multirotor"),
+        (check_radio, "lnks", "did you mean links"),
         (check_sensor, "gns", "did you mean gnss"),
         (check_metric, "ordr", "did you mean order"),
         (check_metric, "nowhere.py", "no such file"),
@@ -227,3 +236,33 @@ def liar(s):
 def test_what_is_planted_in_a_sensor_is_found(rules, truth):
     with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
         check_sensor(sensor(rules, "planted"))
+
+
+def beyond(distance, k):
+    return distance / k.range * 2.0
+
+
+def short(distance):
+    return 1.0 if distance > 30.0 else 0.0
+
+
+def masted(x, y, z, age):
+    return x * (1.0 + 0.01 * age), y, z
+
+
+def stale(x, y, z, vx, vy, vz):
+    return x + 0.1 * vx, y + 0.1 * vy, z
+
+
+def always(u0):
+    return 1.0
+
+
+@pytest.mark.parametrize(
+    ("rules", "truth"),
+    [({"missed": beyond}, "chances"), ({"missed": short}, "units"), ({"receive": always, "carry": masted}, "place"),
+     ({"receive": always, "carry": stale}, "fresh")],
+)  # fmt: skip
+def test_what_is_planted_in_a_radio_is_found(rules, truth):
+    with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
+        check_radio(radio(rules, "planted"))

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.body import radio
 from airflock.core import random
 from airflock.errors import RecordingError, ScenarioError
 from airflock.identify import body, packets, periods, synthetic
@@ -17,6 +16,7 @@ from airflock.identify import sensors as standing
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
 from airflock.identify.run import HARDER, UNITS, Number, identify
+from airflock.radios import links
 from airflock.sensors import langevin
 
 STEP = 0.05
@@ -119,8 +119,8 @@ def heard_by(k, count=60_000, delay=0.4, jitter=0.02, seed=2, drones=6):
     i = g.integers(0, drones, count)
     j = (i + g.integers(1, drones, count)) % drones
     d = g.uniform(0.0, 150.0, count)
-    fast = np.array([radio.received(x, 0.0, k) for x in d])
-    slow = np.array([radio.received(x, 1.0, k) for x in d])
+    fast = np.array([links.received(x, 0.0, k) for x in d])
+    slow = np.array([links.received(x, 1.0, k) for x in d])
     missed = (1.0 - fast) ** 2 * np.where(g.random(count) < 0.2, 1.0 - slow, 1.0)
     sent = g.uniform(0.0, 300.0, count)
     t = sent + delay + ahead[i] + g.normal(0.0, jitter, count)
@@ -129,7 +129,7 @@ def heard_by(k, count=60_000, delay=0.4, jitter=0.02, seed=2, drones=6):
 
 
 def test_delay_and_clocks_come_back_from_packets_of_both_directions():
-    heard, ahead = heard_by(radio.Parameters(kind="links"))
+    heard, ahead = heard_by(links.Parameters(kind="links"))
     found = packets.fit_delay(heard)
     assert found.value == pytest.approx(0.4, rel=0.02) and found.interval[0] < 0.4 < found.interval[1]
     assert found.scatter == pytest.approx(0.02, rel=0.1)
@@ -140,7 +140,7 @@ def test_delay_and_clocks_come_back_from_packets_of_both_directions():
 
 
 def test_the_curve_of_reception_comes_back():
-    k = radio.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
+    k = links.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
     found = packets.fit_links(heard_by(k)[0], 0.2, k)
     assert not found.refused
     for name in packets.LINKS:

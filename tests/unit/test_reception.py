@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import airflock
-from airflock.body.radio import lost
+from airflock.core.radio import lost
 from airflock.errors import RecordingError
 from airflock.plots.reception import received
 from airflock.recordings.reception import reception

@@ -149,8 +149,8 @@ class World:
             meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan)
 
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, step, 0.7, 0.2, state["words"], draw, None, pick, plan=plan,
-            model=model, sums=sums, images=plan.periodic,
+            range(n), range(n), flock, numbers, whole, n, step, 0.7, 0.2, *around, state["words"], draw, None, pick,
+            plan=plan, model=model, sums=sums, images=plan.periodic,
         )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
         deciding.decide(

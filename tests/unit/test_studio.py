@@ -597,8 +597,8 @@ def test_links_by_radio_join_the_pairs_in_range_and_pale_with_the_loss():
         tuple(p) for p in np.argwhere(np.triu(far < 30.0, 1)).tolist()
     }
     np.testing.assert_allclose(length, far[pairs[:, 0], pairs[:, 1]])
-    k = airflock.load(PRESET, {"radio.loss": 0.5}).radio
-    at, share = arrival(k)
+    lossy = airflock.load(PRESET, {"radio.loss": 0.5})
+    at, share = arrival(lossy.transceiver, lossy.radio)
     np.testing.assert_allclose(np.interp([0.0, 40.0, 80.0], at, share), [1.0, 0.875, 0.5], atol=1e-4)
 
 

@@ -97,10 +97,13 @@ def test_every_word_of_the_vocabulary_has_a_type():
     )
     for kind, words in VOCABULARY.items():
         text = f"def {kind}({', '.join(words)}): pass\n"
-        text += "".join(f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent"))
+        text += "".join(
+            f"class {name}: pass\n" for name in ("Sums", "Walls", "Memory", "Shared", "Pair", "Agent", "Packet")
+        )
         text += "class Member: pass\nclass Cluster: pass\nclass Parameters: pass\n"
         beside = {"limits": ["move"], "exact": ["measure"], "bounds": ["measure"]}
         beside |= dict.fromkeys(("decide", "meet", "move", "sample", "measure", "error", *FAULT), [])
+        beside |= {"missed": [], "receive": [], "late": [], "missed_few": ["missed"], "carry": ["late"]}
         text += "".join(f"def {name}(): pass\n" for name in beside.get(kind, ["decide", "sample"]))
         (rule,) = [
             node

@@ -1,4 +1,4 @@
-"""Layer 2: what lies between a wish and a motion: body, sensors, radio, wind.
+"""Layer 2: what lies between a wish and a motion: body and wind.
 
 The package can be called: `airflock.body(globals())` gathers a body of your own (`core.contract.body`).
 """

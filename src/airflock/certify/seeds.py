@@ -32,6 +32,8 @@ def identity(scenario: Scenario) -> str:
     told["laws"] = [scenario.model.name, scenario.vehicle.name]
     if scenario.sensor.name != USUAL:  # so that certificates from before there were others stay what they are
         told["laws"].append(scenario.sensor.name)
+    if "kind" not in told["radio"]:  # which tells those of the usual record apart
+        told["laws"].append(scenario.transceiver.name)
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 

@@ -40,7 +40,7 @@ WHOLE = ("agents",)
 def usual_keys(scenario: Scenario) -> tuple[str, ...]:
     """Numbers of the environment that a scenario uses and that a factor can move."""
     known = declared(scenario)
-    links = scenario.radio.kind == "links"
+    links = scenario.transceiver.keeps
     of_links = ("radio.far", "radio.received_far")
     return tuple(
         key

@@ -171,6 +171,8 @@ def _result(item: ast.FunctionDef, kind: str, names: _Names, scalar: bool) -> st
         return 'tuple[float, float, float, "Memory"]'
     if "Memory" in names.bound and kind == "measure":
         return f'tuple[{", ".join(["float"] * 6)}, "Memory"]'
+    if "Packet" in names.bound and kind == "receive":
+        return 'tuple[float, "Packet"]'
     if "Memory" in names.bound and kind == "agent":
         return 'tuple["Agent", "Memory"]'
     if not found or found[0].islower() or found == "None":

@@ -12,7 +12,7 @@ Found = TypeVar("Found")
 
 
 class CheckError(AirflockError, AssertionError):
-    """A law, an order parameter, a body or a sensor breaks a truth that it does not declare (VIOLATES)."""
+    """A law, an order parameter, a body, a sensor or a radio breaks a truth that it does not declare (VIOLATES)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Report:
-    """What was checked of one law, order parameter, body or sensor."""
+    """What was checked of one law, order parameter, body, sensor or radio."""
 
     name: str
     truths: tuple[Truth, ...]

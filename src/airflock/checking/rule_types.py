@@ -4,6 +4,7 @@ LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
 MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
 SENSOR = ("measure", "error", "exact", "bounds")
+RADIO = ("missed", "missed_few", "receive", "late", "carry")
 FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
 COLUMNS = "MutableSequence[float]"
 
@@ -26,6 +27,7 @@ RECORDS = {
     "own": "Own", "percept": "Percept", "sums": "Sums", "walls": "Walls", "memory": "Memory", "shared": "Shared",
     "pair": "Pair", "agents": "Agent", "members": "Member", "clusters": "Cluster", "mean": "Mean", "wing": "Wing",
     "aero": "Descent", "p": "Parameters", "q": "Parameters", "b": "Parameters", "s": "Parameters", "f": "Parameters",
+    "k": "Parameters", "packet": "Packet",
 }  # fmt: skip
 OF_FLOCK = {
     **dict.fromkeys(("x", "y", "z", "vx", "vy", "vz"), COLUMNS), "n": "int", "shared": "SharedColumns", "work": "Any",
@@ -34,6 +36,8 @@ ROWS = ("dx", "dy", "dz", "r2", "hidden", "fade", "met", "heap", "weak")
 # where a word means something else than in the other kinds
 SPECIAL = {
     "meet": {**dict.fromkeys(ROWS, COLUMNS), "n": "int", "t": "Topology"},
+    "missed": {"fast": "int", "slow": "int"},
+    "missed_few": {"fast": "int", "slow": "int"},
     "flock": OF_FLOCK,
     "survey": OF_FLOCK,
     "workspace": {"n": "int"},
@@ -41,7 +45,7 @@ SPECIAL = {
     "faults": {"edges": "str"},
 }
 # of the record of parameters, by owner
-LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "s": SENSOR, "f": FAULT}
+LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "s": SENSOR, "k": RADIO, "f": FAULT}
 STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
@@ -52,7 +56,8 @@ RESULTS = {
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
     "radio": "tuple[float, float]", "measure": STATE, "error": "tuple[float, float]", "exact": "bool",
-    "bounds": "list[str]",
+    "bounds": "list[str]", "missed": "float", "missed_few": "float", "receive": "float", "late": "float",
+    "carry": VECTOR,
 }  # fmt: skip
 
 
@@ -69,6 +74,8 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
         kinds |= {"meet": "meet"}
     if not kinds and functions & {"measure", "error"}:
         kinds = {name: name for name in SENSOR}
+    if not kinds and functions & {"missed", "receive", "late"}:
+        kinds = {name: name for name in RADIO}
     if not kinds:  # elsewhere these are names of helpers
         kinds = {name: name for name in FAULT}
     return {name: kind for name, kind in kinds.items() if name in functions}

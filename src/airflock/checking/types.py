@@ -21,6 +21,7 @@ SLIM = """
 from typing import Any
 from airflock.core.contract import body as body, metric as metric, model as model
 from airflock.core.sensor import sensor as sensor
+from airflock.core.radio import radio as radio
 from airflock.core.parameters import Parameters as Parameters, choice as choice, quantity as quantity
 def __getattr__(name: str) -> Any: ...
 """
@@ -66,7 +67,7 @@ class TypeReport(NamedTuple):
 
 
 def check_types(files: str | Path | Sequence[str | Path], *, out: str | Path | None = None) -> TypeReport:
-    r"""Let a type checker read rule files: laws, bodies, order parameters, metric sets, sensors, faults.
+    r"""Let a type checker read rule files: laws, bodies, order parameters, metric sets, sensors, radios, faults.
 
     The argument names of a rule say what it is given, so the file needs no annotations: a copy is made in which every
     argument has the type of the vocabulary, and mypy reads the copy. It tells a parameter that does not exist
@@ -132,7 +133,10 @@ def _copies(names: Sequence[str]) -> dict[str, TypedCopy]:
             faults.append(where)
             continue
         if not copies[name].rules:
-            needed = "a law has decide, a body move, an order parameter sample, a sensor measure or error"
+            needed = (
+                "a law has decide, a body move, an order parameter sample, a sensor measure or error, a radio missed, "
+                "receive or late"
+            )
             faults.append(f"{name}: holds no rule; {needed}")
     if faults:
         raise RuleError("\n".join(faults))
@@ -203,7 +207,7 @@ def _ours() -> Iterator[tuple[Path, str]]:
 
 def shipped() -> list[Path]:
     """Our own rule files."""
-    folders = ("models", "body", "metrics", "sensors", "faults")
+    folders = ("models", "body", "metrics", "sensors", "radios", "faults")
     return [*(PACKAGE / name for name in SCALAR), *(p for f in folders for p in sorted((PACKAGE / f).glob("*.py")))]
 
 

@@ -194,5 +194,6 @@ COUNTERPARTS: dict[str, Counterpart] = {
 # public functions that no command needs: they are what a program does between two of them
 LIBRARY = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
-    "sensor", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor", "quantity", "choice",
+    "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor",
+    "check_radio", "quantity", "choice",
 )  # fmt: skip

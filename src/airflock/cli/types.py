@@ -11,7 +11,7 @@ from airflock.errors import AirflockError
 
 def types(
     files: Annotated[
-        list[str], typer.Argument(metavar="FILE.py...", help="Laws, bodies, sensors, order parameters, faults.")
+        list[str], typer.Argument(metavar="FILE.py...", help="Laws, bodies, sensors, radios, order parameters, faults.")
     ],
     out: Annotated[
         Path | None,

@@ -12,6 +12,7 @@ from airflock.core import random
 from airflock.core.agent import Decision, Heard, State, answer, decide, first_memory
 from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
+from airflock.core.radio import Radio
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import back, complete, could_be_near, counts, stands_until
 from airflock.core.topology import Topology, met_of
@@ -55,6 +56,7 @@ class Hearing:
     once        : they say something at the one decision after they came, as over a radio of one constant delay
     early       : how far (s) in the future they may seem to be, by two clocks that differ
     in_order    : believe stamps: what is older than what is known says nothing
+    radio, k    : kind of radio whose rule carries them forward instead, and its numbers
     """
 
     extrapolate: bool = True
@@ -62,11 +64,13 @@ class Hearing:
     once: bool = False
     early: float = EARLY
     in_order: bool = True
+    radio: Radio | None = None
+    k: Any = None
 
     @classmethod
-    def simulated(cls, links: bool) -> "Hearing":
-        """As a simulated agent hears: packets of one constant delay count once, those of links until the next one."""
-        return cls(extrapolate=links, forget=FAR, once=not links, early=FAR, in_order=False)
+    def simulated(cls, radio: Radio, k: Any) -> "Hearing":
+        """As a simulated agent hears: packets of a plain radio count once, of one that keeps them until the next."""
+        return cls(False, forget=FAR, once=not radio.keeps, early=FAR, in_order=False, radio=radio, k=k)
 
 
 class Packet:
@@ -88,6 +92,14 @@ def level(state: State) -> State:
     """A state in the plane."""
     x, y, _, vx, vy, _ = state
     return State(x, y, 0.0, vx, vy, 0.0)
+
+
+def carried(radio: Radio, k: Any, state: State, age: float) -> State:
+    """State of the newest packet, of this age (s), as a radio's rule carries it on to now."""
+    if radio.carry is None:
+        return state
+    x, y, z = answer(radio.carry, "carry", {**state._asdict(), "age": age, "k": k}, radio.name)
+    return state._replace(x=x, y=y, z=z)
 
 
 class Senses(Percept):
@@ -215,6 +227,7 @@ class Pilot:
             told = age <= rule.forget and not over
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
+                state = state if rule.radio is None else carried(rule.radio, rule.k, state, age)
                 found.append(Heard(who, level(state) if self.flat else state, age, group=self.group_of(who)))
         return found
 

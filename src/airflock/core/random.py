@@ -21,6 +21,7 @@ FAULT = 10  # when faults begin and whom they hit: step is the occurrence, agent
 SPREAD = 11  # tolerances of manufacture: step is the number's place in its record
 PACKET = 12  # whether anything of what one agent sends another arrives: agent is the number of the pair, `pair_number`
 FADE = 16  # strength of the signal between one pair, the same both ways
+AIR = 17  # what a radio's own rules ask for: agent is the number of the pair, receiver * agents + sender
 
 PRIMITIVES = ("word", "multiply_high", "multiply_low", "add32", "xor32", "uniform", "normal_pair")
 

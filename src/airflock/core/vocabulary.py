@@ -143,6 +143,40 @@ AXIS_ERROR = {
     "g": "normal random number of this axis",
     "period": "time between two measurements, s",
 }
+_PACKET = {
+    "distance": "true distance of the two, m",
+    "clear": "1.0 if nothing that stands in the world lies between the two, else 0.0",
+    "talkers": "how many others are within radio.range of the receiver: all send, the sender among them",
+    "step": "number of the decision",
+    "period": "time between two decisions, s",
+}
+_CHANCES = {
+    **{f"u{c}": "uniform random number between 0 and 1, new for each pair and decision" for c in range(4)},
+    **{f"g{c}": "normal random number, new for each pair and decision" for c in range(4)},
+}
+MISSED = {
+    **_PACKET,
+    "fast": "packets that the first of RATES sends in this decision",
+    "slow": "packets that the second of RATES sends in this decision",
+}
+RECEIVED = {
+    **_PACKET,
+    "dx": "true offset from the receiver to the sender, east, m",
+    "dy": "the same, north, m",
+    "dz": "the same, up, m",
+    "age": "age of the newest packet that the receiver has of the sender, s; 1e9 or more before the first",
+    "packet": "the radio's Packet of this pair",
+    **_CHANCES,
+}
+CARRIED = {
+    "x": "position in the newest packet, east, m",
+    "y": "the same, north, m",
+    "z": "the same, up, m",
+    "vx": "velocity in the newest packet, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "age": "age of the newest packet, s",
+}
 MEET = {
     "n": "number of others",
     "dx": "offsets to the others as believed, east, m; dx[j] is that to number j",
@@ -218,6 +252,11 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "f": "the fault's parameters",
     },
     "leaves": {"f": "the fault's parameters"},
+    "missed": {**MISSED, "k": "the radio's parameters"},
+    "missed_few": {**MISSED, "k": "the radio's parameters"},
+    "receive": {**RECEIVED, "k": "the radio's parameters"},
+    "late": {**_PACKET, **_CHANCES, "k": "the radio's parameters"},
+    "carry": {**CARRIED, "k": "the radio's parameters"},
     "meet": {**MEET, "t": "the topology's parameters"},
     "fitness": {
         "values": "order parameters of one flight, by name",

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.plan import NEVER as NEVER
 from airflock.engine.plan import Plan
-
-NEVER = -1e9  # s; time stamp of a packet that has not come
 
 
 def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
@@ -29,3 +28,8 @@ def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
     """The defaults of a Memory for each of m lanes: (field, lane)."""
     starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
     return np.repeat(np.array(starts, real)[:, None], m, axis=1)
+
+
+def of_pairs(plan: Plan, receivers: int, senders: int, real: Any) -> NDArray[Any]:
+    """What is kept of pairs of agents that have heard nothing of each other: (number, receiver, sender)."""
+    return np.tile(np.array(plan.of_pair, real)[:, None, None], (1, receivers, senders))

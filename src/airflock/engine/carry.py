@@ -25,7 +25,8 @@ def carry(old: State, new: State, step: int) -> None:
     if new.plan.dryden == old.plan.dryden:
         new.arrays["gust"][:] = old.arrays["gust"]
     if old.plan.packets and new.plan.packets:
-        new.arrays["store"][...] = old.arrays["store"][:, lanes[: old.agents]][..., lanes]
+        kept = None if old.plan.radio == new.plan.radio else 2 * new.plan.dimensions + 1  # another radio begins anew
+        new.arrays["store"][:kept] = old.arrays["store"][:kept, lanes[: old.agents]][..., lanes]
     _remembered(old, new, lanes)
     if np.array_equal(old.tables.shapes, new.tables.shapes) and old.arrays["later"].shape == new.arrays["later"].shape:
         for name in ("counts", "later", "shapes"):

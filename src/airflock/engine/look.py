@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from airflock.body import radio
 from airflock.core import agent as one
-from airflock.core import random, silence
+from airflock.core import radio, random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.contract import Model
 from airflock.core.maths import norm
+from airflock.core.pilot import carried
 from airflock.core.topology import met_of
 from airflock.engine.beginnings import NEVER
 from airflock.engine.place import Place
@@ -149,12 +149,10 @@ def _heard(
             packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
-            if stamp <= NEVER / 10.0 or not (plan.links or silence.counts(age, scenario.silent_by())):
+            if stamp <= NEVER / 10.0 or not (plan.radio.keeps or silence.counts(age, scenario.silent_by())):
                 continue
-            at, v = packet[:axes], packet[axes : 2 * axes]
-            on = age if plan.links else 0.0
-            believed = Motion(*(a + b * on for a, b in zip(at, v, strict=True)), *flat, *v, *flat)
-            yield Heard(j, believed, age, fade, groups[j])
+            sent = Motion(*packet[:axes], *flat, *packet[axes : 2 * axes], *flat)
+            yield Heard(j, carried(plan.radio, k, sent, age), age, fade, groups[j])
         elif distance * distance > reach[j]:
             continue
         elif not plan.lossy or random.pair_uniform(seed, random.PACKET, world, number, i, j, n) >= radio.lost(

@@ -1,7 +1,7 @@
 """Needs: how much memory and time a flight takes on this machine, judged before it is compiled and flown.
 
 What grows with the flock is counted: rows of numbers, past states that a delay asks for, a packet of each pair where
-radio links lose some, the grid, and the frames of a recording; and looks at pairs, at what stands in the way, at wings.
+the radio keeps them, the grid, and the frames of a recording; and looks at pairs, at what stands in the way, at wings.
 """
 
 import os
@@ -104,7 +104,7 @@ def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     past = times["ring"] * states if plan.noisy or plan.delayed else 0
-    numbers = (ROWS + kept + past) * width + (agents * (states + 1) * width if plan.packets else 0)
+    numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
     cells = 8 * grid.CHUNKS * (grid.CELLS * agents + grid.SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)
 

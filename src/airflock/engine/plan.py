@@ -9,8 +9,11 @@ from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import choices
+from airflock.core.radio import Radio, forward
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
+from airflock.radios.registry import RADIOS
+from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.sensors.registry import SENSORS, USUAL
 from airflock.world import arena, edges, excursion, rays
 from airflock.world.place import obstacle_rule, raised
@@ -19,6 +22,9 @@ WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
     "seed_high", "corners", "obstacles", "faces_0", "faces_1", "born",
 )  # fmt: skip
+
+NEVER = -1e9  # s; time stamp of a packet that has not come
+GONE = -1.0  # s; when what is not under way is due
 
 
 class OwnLaw(NamedTuple):
@@ -76,7 +82,8 @@ class Plan:
     stop      : the flight ends at its first collision
     wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
     aero_choices : those of drag descent, where it is added to the model
-    few       : each of two lossy links sends at most `radio.FEW` packets in a decision
+    radio     : which packets arrive; radio_choices its compile-time constants. lossy: some are lost by radio.loss
+    few       : each of its rates sends at most `core.radio.FEW` packets in a decision
     silent    : an agent stops while a neighbour that it has lost could be near
     sequential: one agent after another perceives, decides and moves
     faults    : kinds of fault that may occur
@@ -113,7 +120,8 @@ class Plan:
     noisy: bool = True
     delayed: bool = True
     lossy: bool = False
-    links: bool = False
+    radio: Radio = RADIOS[USUAL_RADIO]
+    radio_choices: tuple[tuple[str, str], ...] = ()
     few: bool = True
     silent: bool = False
     windy: bool = False
@@ -216,12 +224,57 @@ class Plan:
     @property
     def perturbed(self) -> bool:
         """Whether distances as perceived are not the true ones, which decide who is in range."""
-        return self.told or self.believes or self.links or bool(self.suffers("radio"))
+        return self.told or self.believes or self.radio.keeps or bool(self.suffers("radio"))
 
     @property
     def packets(self) -> bool:
         """Whether agents keep the last packet of each other one."""
-        return self.links or self.silent
+        return self.radio.keeps or self.silent
+
+    @property
+    def missed(self) -> Callable[..., Any] | None:
+        """The rule for the probability that nothing arrives, the quicker one where it serves."""
+        return self.radio.missed_few if self.few and self.radio.missed_few is not None else self.radio.missed
+
+    @property
+    def turns(self) -> bool:
+        """Whether the radio carries senders of packets on otherwise than straight forward."""
+        return self.radio.carry is not None and self.radio.carry is not forward
+
+    @property
+    def draws(self) -> bool:
+        """Whether one random number decides whether anything arrives; a rule `receive` draws its own."""
+        return self.lossy or self.radio.missed is not None
+
+    def rolls(self, names: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
+        """Of these random numbers, in their places, those that the radio's own rules ask for."""
+        return tuple((c, name) for c, name in enumerate(names) if self.radio.asks(name))
+
+    @property
+    def shades(self) -> bool:
+        """Whether the radio is asked with whether something stands between two agents, and something can."""
+        return self.radio.asks("clear") and (self.obstacles or self.scene)
+
+    @property
+    def waiting(self) -> int:
+        """Where the packet that is under way begins among what is kept of a pair; the last of it is when it is due."""
+        return 2 * self.dimensions + 1
+
+    @property
+    def pocket(self) -> int:
+        """Where the Packet of the radio begins among what is kept of a pair."""
+        return 2 * self.waiting + 1 if self.radio.late is not None else self.waiting
+
+    @property
+    def of_pair(self) -> tuple[float, ...]:
+        """What is kept of each pair, as it is before anything was sent.
+
+        Position, velocity and time stamp of the newest packet; where packets come late, the same of the one under way
+        and when it is due (GONE: none is under way); the radio's Packet.
+        """
+        packet = (*(0.0,) * (2 * self.dimensions), NEVER)
+        under_way = (*packet, GONE) if self.radio.late is not None else ()
+        return (*packet, *under_way, *self.radio.beginnings) if self.packets else packet
 
     @property
     def hides(self) -> bool:
@@ -258,7 +311,8 @@ class Plan:
         aero: dict[str, str | float] = dict(self.aero_choices)
         body: dict[str, str | float] = dict(self.body_choices)
         sensor: dict[str, str | float] = dict(self.sensor_choices)
-        return {"p": dict(self.model_choices), "b": body, "s": sensor, "wing": wing, "aero": aero}
+        radio: dict[str, str | float] = dict(self.radio_choices)
+        return {"p": dict(self.model_choices), "b": body, "s": sensor, "k": radio, "wing": wing, "aero": aero}
 
     @property
     def senses(self) -> bool:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import NEVER, first_memories, memories
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.tables import AWAY
 
 if TYPE_CHECKING:
@@ -68,9 +68,9 @@ def _set(state: "State", here: int) -> None:
         work[rows[axis], lanes] = AWAY
         state.arrays["past"][:, c, lanes] = AWAY
     if plan.packets:
-        store = state.arrays["store"]
-        store[:, lanes] = store[:, :, lanes] = 0.0
-        store[-1, lanes] = store[-1, :, lanes] = NEVER
+        store, count = state.arrays["store"], state.agents - here
+        store[:, lanes] = of_pairs(plan, count, store.shape[2], work.dtype)
+        store[:, :, lanes] = of_pairs(plan, store.shape[1], count, work.dtype)
     count, real = state.agents - here, work.dtype
     state.arrays["memory"][:, lanes] = memories(plan, count, real)
     for name in state.solved:  # what rules of the whole flock go on from is found anew

@@ -10,6 +10,8 @@ from airflock.aero import descent
 from airflock.aero import wing as wings
 from airflock.core.contract import Model
 from airflock.core.fault import RULES, Fault
+from airflock.core.radio import RULES as RADIO_RULES
+from airflock.core.radio import Radio
 from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
 from airflock.engine import law
@@ -88,6 +90,27 @@ def probe_sensor(sensor: Sensor) -> None:
         raise RuleError(f"{_place(rule)}: {sensor.name}.{kind} must return {shape}")
     if sensor.Memory is not None:
         _same_length(rule, answer[-1], sensor.Memory, sensor.name)
+
+
+@cache
+def probe_radio(radio: Radio) -> None:
+    """The same for the rules of a radio."""
+    for kind in RADIO_RULES:
+        rule = getattr(radio, kind)
+        if rule is None:
+            continue
+        law.check(rule)
+        given: dict[str, Any] = {name: 0.5 + 0.01 * place for place, name in enumerate(VOCABULARY[kind])}
+        given |= {"fast": 2, "slow": 1, "k": radio.Parameters()}
+        given["packet"] = radio.Packet() if radio.Packet is not None else None
+        answer = _call(rule, kind, given, radio.name)
+        receives = "1.0 or 0.0, Packet(...)" if radio.Packet is not None else "1.0 or 0.0"
+        wanted = {"receive": receives, "carry": "x, y, z"}.get(kind, "one number")
+        count = len(wanted.split(", "))
+        if (len(answer) if isinstance(answer, tuple) else 1) != count:
+            raise RuleError(f"{_place(rule)}: {radio.name}.{kind} must return {wanted}")
+        if kind == "receive" and radio.Packet is not None:
+            _same_length(rule, answer[1], radio.Packet, radio.name)
 
 
 def _shared(model: Model, given: dict[str, Any]) -> Any:

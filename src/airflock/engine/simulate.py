@@ -7,14 +7,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from airflock.body import radio
 from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
+from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Build, OwnLaw, Plan, constants_of, make_plan
-from airflock.engine.probe import probe, probe_fault, probe_sensor
+from airflock.engine.probe import probe, probe_fault, probe_radio, probe_sensor
 from airflock.engine.state import State
 from airflock.engine.tables import tables
 from airflock.errors import FlightError, ScenarioError
@@ -52,6 +52,7 @@ def plan_of(
         probe_fault(kind)
     if scenario.errs:
         probe_sensor(scenario.sensor)
+    probe_radio(scenario.transceiver)
     return make_plan(
         scenario.model,
         scenario.parameters,
@@ -80,7 +81,8 @@ def plan_of(
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
         aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
-        links=scenario.radio.kind == "links",
+        radio=scenario.transceiver,
+        radio_choices=_radio_choices(scenario),
         few=_few_packets(scenario),
         silent=scenario.silence.rule == "stop",
         faults=kinds,
@@ -103,12 +105,15 @@ def _sensing(scenario: Scenario) -> dict[str, Any]:
 
 
 def _few_packets(scenario: Scenario) -> bool:
-    """Whether each of two lossy links sends at most `radio.FEW` packets between two decisions; True without links."""
-    k = scenario.radio
-    if k.kind != "links":
-        return True
+    """Whether each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
+    rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
     period = clock(scenario)["decide_every"] * scenario.flight.dt
-    return max(k.fast_rate, k.slow_rate) * period <= radio.FEW - 0.1  # rounding may make it one packet more
+    return max(rates, default=0.0) * period <= FEW - 0.1  # rounding may make it one packet more
+
+
+def _radio_choices(scenario: Scenario) -> tuple[tuple[str, str], ...]:
+    """Choices of the radio that its rules can read: the kind of those that share a record is none of them."""
+    return tuple(sorted((k, v) for k, v in choices(scenario.radio).items() if k != "kind"))
 
 
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
@@ -358,7 +363,7 @@ def _pays(scenario: Scenario) -> bool:
         and scenario.model.neighbour is not None
         and perfect
         and _by_cells(scenario)
-        and scenario.radio.kind == "constant"
+        and not scenario.transceiver.keeps
         and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)

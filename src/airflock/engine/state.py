@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import NEVER, first_memories, memories
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.onsets import Onset, strike
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
@@ -321,14 +321,13 @@ def _layout(
     """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
     m, dims = lanes(agents), plan.dimensions
     label = np.int32 if plan.bits == 32 else np.int64
-    packets = (2 * dims + 1, agents, m) if plan.packets else (2 * dims + 1, 1, 1)
+    pairs = (agents, m) if plan.packets else (1, 1)
     values, sums = sums_of(plan)
     beginnings = {
         "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
         "values": values, "sums": sums,
-        "store": np.zeros(packets, real), "reached": np.full(goals, -1.0, real),
+        "store": of_pairs(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
     }  # fmt: skip
-    beginnings["store"][2 * dims] = NEVER
     columns = sum(map(len, plan.records.values()))
     gusts = (5 if plan.dryden else 3,)
     shaped: dict[str, tuple[tuple[int, ...], Any]] = {

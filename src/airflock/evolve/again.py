@@ -23,7 +23,7 @@ def cautious(scenario: Scenario, r_coll: float = 1.5, delay: float = 1.0) -> dic
 def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], search: Mapping[str, Any]) -> Study:
     """Study of workaround (i): the scenario's space, searched under the stricter settings."""
     own: dict[str, Any] = {"law": scenario.model, "measures": scenario.measures, "vehicle": scenario.vehicle}
-    own["sensor"] = scenario.sensor
+    own["sensor"], own["transceiver"] = scenario.sensor, scenario.transceiver
     found = make(scenario.document, f"{scenario.name}, stricter", settings, **own)
     return replace(make_study({}, found.name, search=search, scenario=found), space=space)
 

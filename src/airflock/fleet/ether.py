@@ -8,8 +8,10 @@ import heapq
 import math
 import random as dice
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
-from airflock.body import radio
+from airflock.core.radio import Radio
+from airflock.core.reception import Reception, unheard
 from airflock.fleet.dice import PacketDice
 from airflock.fleet.faults import Fault
 from airflock.fleet.rogue import forged
@@ -22,16 +24,19 @@ Vector = tuple[float, float, float]
 class Ether:
     """Datagrams between the members of a fleet.
 
-    k : parameters of the radio; members: system ids; period: s between two packets of a drone
+    radio, k : kind of radio and its numbers; members: system ids; period: s between two packets of a drone
+    clear : whether nothing stands between two places, m; None: nothing stands anywhere
     site : of the flight, by which forged packets tell places
     reach : how far (m) faults let the first of two drones, by their places, be heard by the second at a time, s
     """
 
     def __init__(
-        self, k: radio.Parameters, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
-        reach: Callable[[int, int, float], float] | None = None, site: Site | None = None,
+        self, radio: Radio, k: Any, members: Sequence[int], seed: int, period: float, faults: Sequence[Fault] = (),
+        reach: Callable[[int, int, float], float] | None = None,
+        clear: Callable[[Vector, Vector], bool] | None = None, site: Site | None = None,
     ):  # fmt: skip
-        self._k, self._members, self._period, self._faults = k, list(members), period, faults
+        self._radio, self._k, self._members, self._period, self._faults = radio, k, list(members), period, faults
+        self._reception, self._clear = Reception(radio, k, seed, len(members), period), clear
         self._site = site
         self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
@@ -39,16 +44,35 @@ class Ether:
         self._dice = dice.Random(f"ether {seed}")
         self.sent = self.arrived = 0
 
-    def send(self, now: float, who: int, datagram: bytes) -> None:
-        """A drone, by its place in the list of members, sends a datagram to all."""
+    def send(self, now: float, who: int, datagram: bytes, at: Sequence[Vector] = ()) -> None:
+        """A drone, by its place in the list of members, sends a datagram to all; at: true positions, m."""
         for to in range(len(self._members)):
             if to != who:
-                self._push(now + self._k.delay + self._late(to, now), who, to, datagram)
+                late = self._late(to, now) + self._slow(now, who, to, at)
+                self._push(now + self._k.delay + late, who, to, datagram)
         for f in self._faults:
             if f.kind in ("rogue", "impostor") and f.holds(self._members[who], now) and self._site is not None:
                 false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
                 for to in range(len(self._members)):
                     self._push(now + self._k.delay, who, to, false)
+
+    def _slow(self, now: float, who: int, to: int, at: Sequence[Vector]) -> float:
+        """How much later a packet comes by the rule of the radio, s."""
+        if self._radio.late is None or not at:
+            return 0.0
+        return self._reception.late(to, who, round((now + self._k.delay) / self._period), self._known(who, to, at))
+
+    def _known(self, who: int, to: int, at: Sequence[Vector]) -> dict[str, float]:
+        """What rules of the radio may ask for of a pair."""
+        here, there = at[to], at[who]
+        known = {"distance": math.dist(here, there)}
+        known |= {name: b - a for name, a, b in zip(("dx", "dy", "dz"), here, there, strict=True)}
+        if self._radio.asks("talkers"):
+            near = [math.dist(here, other) <= self._k.range for other in at]
+            known["talkers"] = float(sum(near)) - 1.0
+        if self._radio.asks("clear") and self._clear is not None:
+            known["clear"] = 1.0 if self._clear(here, there) else 0.0
+        return known
 
     def _push(self, due: float, who: int, to: int, datagram: bytes) -> None:
         heapq.heappush(self._queue, (round(due, 6), self._count, who, to, datagram))
@@ -66,23 +90,26 @@ class Ether:
         while self._queue and self._queue[0][0] <= now + SLACK:
             _, _, who, to, datagram = heapq.heappop(self._queue)
             self.sent += 1
-            if not self._passes(now, number, who, to, math.dist(at[who], at[to])):
+            if not self._passes(now, number, who, to, at):
                 continue
             self.arrived += 1
             yield to, self._bent(to, now, datagram)
             if any(self._dice.random() < f.amount for f in self._of("duplicate", to, now)):
                 yield to, datagram
 
-    def _passes(self, now: float, number: int, who: int, to: int, distance: float) -> bool:
-        """Whether a packet over this distance (m) gets through."""
-        k = self._k
-        if distance > k.range or (self._reach is not None and distance > self._reach(who, to, now)):
+    def _passes(self, now: float, number: int, who: int, to: int, at: Sequence[Vector]) -> bool:
+        """Whether a packet gets through between two drones at these places, m."""
+        distance = math.dist(at[who], at[to])
+        if distance > self._k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
         if self._faults and (
             self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
         ):
             return False
-        missed = radio.unheard(distance, number, self._period, k)
+        known = self._known(who, to, at)
+        if not self._reception.hears(to, who, number, known):
+            return False
+        missed = unheard(self._radio, self._k, number, self._period, known)
         return bool(missed <= 0.0 or self._drawn(number, to, who) >= missed)
 
     def _cut(self, now: float, who: int, to: int) -> bool:

@@ -232,7 +232,8 @@ async def craft_life(plan: Plan, i: int) -> Life:
 async def ether_life(plan: Plan) -> Life:
     """Life of the ether: packets of nodes reach those whom the radio lets them reach, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
-    ether = Ether(plan.scenario.radio, card.members, plan.seed, card.safety.status_period, plan.faults, site=card.site)
+    flown, period = plan.scenario, card.safety.status_period
+    ether = Ether(flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, site=card.site)
     at: list[tuple[float, float, float]] = [(0.0, 0.0, 0.0)] * len(card.members)
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
@@ -243,7 +244,7 @@ async def ether_life(plan: Plan) -> Life:
         now = plan.now
         for data, sender in ports.ether.read_from():
             if sender in who:
-                ether.send(now, who[sender], data)
+                ether.send(now, who[sender], data, at)
             elif sender == ports.watch.here:
                 for radio in radios:
                     ports.ether.send(data, radio)

@@ -60,7 +60,8 @@ class Fleet:
             for who in card.members
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
-        self.ether = Ether(scenario.radio, card.members, seed, card.safety.status_period, faults, reach, card.site)
+        radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
+        self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
         words = SensorDice(seed, len(card.members))
         self._sensing = [
             Sensing(scenario.sensor, own, seed, i, flat=card.flat, words=partial(words, drone=i))
@@ -150,7 +151,12 @@ class Fleet:
             for data in out.autopilot:
                 node.autopilot(vehicle.receive(data, now), now)
             for datagram in out.radios[0]:
-                self.ether.send(now, i, datagram)
+                self.ether.send(now, i, datagram, at)
+
+    def _clear(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> bool:
+        """Whether nothing stands between two places of vehicles, m."""
+        a, b = (self.card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
+        return not self.card.place.blocked(*a[:3], *b[:3])
 
     def _is(self, kind: str, who: int, now: float) -> bool:
         return any(f.kind == kind and f.holds(who, now) for f in self.faults)

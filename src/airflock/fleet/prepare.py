@@ -9,6 +9,7 @@ from shapely.geometry import Polygon
 
 from airflock.body.motion import Parameters as Multirotor
 from airflock.core.parameters import Parameters
+from airflock.core.radio import forward
 from airflock.core.silence import complete
 from airflock.errors import CardError
 from airflock.fleet.individuals import records_of
@@ -55,7 +56,7 @@ def card_document(
     height = max(HEIGHT, limits.base - low) if height is None else height
     top = limits.base + limits.layer * (len(members) - 1)
     stands, period = scenario.stands(), scenario.sensors.period or scenario.flight.dt
-    held = scenario.radio.kind == "constant" and as_simulated
+    held = not scenario.transceiver.keeps and as_simulated
     silent = not as_simulated or scenario.silence.rule == "stop" if silent is None else silent
     silence = complete(scenario.silence, _speed(scenario), scenario.radio.delay, "stop" if silent else "fly_on")
     return {
@@ -75,7 +76,7 @@ def card_document(
         "shapes": {"shapes": stands.shapes.tolist(), "nodes": stands.nodes.tolist(), "links": stands.links.tolist()},
         "radio": {
             "delay": scenario.radio.delay,
-            "extrapolate": not held,
+            "extrapolate": not as_simulated or scenario.transceiver.carry is forward,
             "forget": scenario.radio.delay + 0.5 * period if held else 5.0,
         },
         "silence": plain(silence),

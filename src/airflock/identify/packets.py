@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 
-from airflock.body import radio
+from airflock.core.radio import Packets
 from airflock.errors import RecordingError
+from airflock.radios import links, table
 
 LINKS = ("near", "far", "received_near", "received_far")
 COLUMNS = ("receiver", "sender", "t", "stamp")
@@ -32,7 +33,7 @@ class RadioFit:
 
 
 class Curve(NamedTuple):
-    """What `body.radio.received` reads of the radio's parameters."""
+    """What `radios.links.received` reads of the radio's parameters."""
 
     near: float
     far: float
@@ -40,12 +41,17 @@ class Curve(NamedTuple):
     received_far: float
 
 
+def curve_of(k: Packets) -> links.Parameters:
+    """Numbers of a radio by which reception curves are fitted; the usual ones of a radio that has none of its own."""
+    return k if isinstance(k, links.Parameters) else links.Parameters(delay=k.delay, range=k.range)
+
+
 @cache
 def _kernel() -> Any:
     """Probability that nothing arrives, by row, compiled from the rule itself."""
     from numba import njit
 
-    received = njit(radio.received)
+    received = njit(links.received)
 
     @njit
     def kernel(distance, fast, slow, k):  # type: ignore[no-untyped-def]
@@ -123,7 +129,7 @@ def fit_delay(heard: pd.DataFrame) -> DelayFit:
 
 
 def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
-    """Reception curve of `body.radio.received` from rows of got and not got per decision and pair.
+    """Reception curve of `radios.links.received` from rows of got and not got per decision and pair.
 
     heard  : receiver, sender, t, stamp, distance, got; if it is known, fast and slow: packets due on each link
     period : time between decisions, s; k: radio parameters whose rates of packets are kept
@@ -176,6 +182,34 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
                 f"only known to ± {half:.0%} from {len(heard)} rows: fly more, and pairs farther apart"
             )
     return found
+
+
+def table_of(heard: pd.DataFrame, spacing: float) -> dict[str, float]:
+    """Entries of a radio of kind "table" from rows of got and not got per decision and pair.
+
+    heard   : with the columns distance (m) and got (0 or 1)
+    spacing : distance between one entry and the next, m
+
+    Returns spacing and received_0 to received_15: the least-squares fit of the table's straight lines. An entry without
+    a row within one spacing takes the value of the nearest one that has any.
+
+    Raises RecordingError where a column is missing, no row is left, or the spacing is not positive.
+    """
+    lacking = [name for name in ("distance", "got") if name not in heard]
+    if lacking:
+        raise RecordingError(f"heard: no column {', '.join(lacking)}; give distance (m) and got (0 or 1)")
+    if not spacing > 0.0:
+        raise RecordingError(f"spacing = {spacing:g} m is not positive")
+    s, got = heard["distance"].to_numpy(float) / spacing, heard["got"].to_numpy(float)
+    number = np.arange(table.ENTRIES)
+    hats = np.maximum(1.0 - np.abs(s[:, None] - number), 0.0)
+    seen = np.flatnonzero(hats.sum(axis=0) > 0.0)
+    if not len(seen):
+        raise RecordingError(f"heard: no pair within {table.ENTRIES * spacing:g} m; give a longer spacing")
+    inside = s <= table.ENTRIES - 1
+    found = lsq_linear(hats[np.ix_(inside, seen)], got[inside], (0.0, 1.0)).x
+    shares = found[np.abs(number[:, None] - seen).argmin(axis=1)]
+    return {"spacing": float(spacing), **{f"received_{n}": float(share) for n, share in enumerate(shares)}}
 
 
 def _lowest(loss: Any, farthest: float) -> list[Any]:

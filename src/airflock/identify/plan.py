@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from airflock.identify.packets import curve_of
 from airflock.scenarios.scenario import Scenario
 
 
@@ -21,6 +22,7 @@ def flight_card(like: Scenario) -> list[Flight]:
     hold = max(4.0 * tau + step / a_max, 2.0)
     repeats = max(8, round(180.0 / (2.0 * hold)))
     cruise = min(step, 10.0)
+    far = curve_of(like.radio).far
     return [
         Flight(
             "stand", 120.0,
@@ -35,8 +37,8 @@ def flight_card(like: Scenario) -> list[Flight]:
             ("body.tau", "body.a_max", "body.noise"),
         ),
         Flight(
-            "pairs", max(60.0, 2.0 * 2.0 * like.radio.far / cruise),
-            f"two drones from 5 m to {2.0 * like.radio.far:.0f} m apart and back at {cruise:.0f} m/s; both log "
+            "pairs", max(60.0, 2.0 * 2.0 * far / cruise),
+            f"two drones from 5 m to {2.0 * far:.0f} m apart and back at {cruise:.0f} m/s; both log "
             "receiver, sender, own time and stamp of every packet",
             ("radio.delay", "radio.near", "radio.far", "radio.received_near", "radio.received_far"),
         ),

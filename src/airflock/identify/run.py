@@ -233,8 +233,8 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
     late = packets.fit_delay(table)
     origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
     tell("radio.delay", late.value, late.interval, origin, late.reason)
-    links = packets.fit_links(table, scenario.sensors.period, scenario.radio)
-    lossy = scenario.radio.kind == "links"
+    links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
+    lossy = scenario.transceiver.name == "links"
     for name in packets.LINKS:
         why = links.refused.get(name, "") or (
             "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"

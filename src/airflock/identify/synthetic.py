@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from airflock.body import radio
-from airflock.core import random
+from airflock.core import radio, random
 from airflock.identify.logs import MISSING, Logs
+from airflock.identify.packets import curve_of
+from airflock.radios import links
 from airflock.recordings.flights import simulate
 from airflock.recordings.perception import packet_uniforms
 from airflock.scenarios.scenario import Scenario
@@ -124,10 +125,10 @@ def _packets(
     scenario: Scenario, seed: int, times: Array, place: Array, clocks: Array, disturbed: Disturbed, generator: Any
 ) -> pd.DataFrame:
     """Rows of every pair and decision of a radio of two lossy links."""
-    k_, period, n = scenario.radio, scenario.sensors.period, place.shape[2]
+    k_, period, n = curve_of(scenario.radio), scenario.sensors.period, place.shape[2]
     every = max(1, round(period / (times[1] - times[0])))
     i, j = np.nonzero(~np.eye(n, dtype=bool))
-    arrives = np.vectorize(radio.received, otypes=[float], excluded=[1, 2])
+    arrives = np.vectorize(links.received, otypes=[float], excluded=[1, 2])
     parts = []
     for step, points in enumerate(place[::every]):
         d = np.hypot(*(points[:, i] - points[:, j]))

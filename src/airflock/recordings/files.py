@@ -15,6 +15,7 @@ from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
 from airflock.machine import processor
 from airflock.metrics.registry import SETS
+from airflock.radios.registry import RADIOS
 from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import check
@@ -137,7 +138,7 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
         )
     for name in attributes.own_laws_of_groups(document):
         raise RecordingError(f"recording: a group was flown with a law of its own, {name!r}, which is not in the file")
-    for section, known in (("body", BODIES), ("sensors", SENSORS), ("metrics", SETS)):
+    for section, known in (("body", BODIES), ("sensors", SENSORS), ("radio", RADIOS), ("metrics", SETS)):
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:
             raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")

@@ -1,7 +1,7 @@
 """What each agent measured and whom it heard, beside a recording: flown in parts, drawn again from the same counters.
 
 The flight is the closed one, bit for bit: it is cut at its decisions, which an open flight may be. Measured states are
-read from it; packets of a radio of constant loss are drawn again by the numbers that the driver drew them by.
+read from it; packets of a plain radio are drawn again by the numbers that the driver drew them by.
 """
 
 from collections.abc import Sequence
@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.body import radio
-from airflock.core import random
+from airflock.core import radio, random
 from airflock.engine.flight import Flight
 from airflock.errors import FlightError
 from airflock.recordings.layout import DIMENSIONS, UNITS
@@ -102,7 +101,7 @@ def packet_uniforms(seed: int, world: int, decision: int, agents: int) -> Array:
 def _stamps(flight: Flight, stamps: Array, number: int, now: float, late: float) -> Array:
     """When what each agent knows of each other one was sent, s, after a decision; nan: never heard."""
     k, n = flight.scenario.radio, flight.agents
-    if k.kind == "links":
+    if flight.scenario.transceiver.keeps:
         return np.where(np.eye(n, dtype=bool), np.nan, flight.sent)
     place = flight.state[: flight.scenario.dimensions].astype(float)
     offset = place[:, None, :] - place[:, :, None]  # from receiver (first) to sender

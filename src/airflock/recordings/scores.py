@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from airflock.aero import descent
 from airflock.body.registry import BODIES
 from airflock.core.contract import Model
-from airflock.core.parameters import Parameters, declarations
+from airflock.core.parameters import Parameters, declarations, number_names
+from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
 from airflock.doors import from_outside
 from airflock.engine import cpu
@@ -25,6 +26,7 @@ from airflock.errors import RecordingError
 from airflock.executors.scores import scores
 from airflock.metrics import nearest
 from airflock.metrics.registry import POWER, SETS, reports
+from airflock.radios.registry import RADIOS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
 from airflock.scenarios.files import loaded
@@ -250,6 +252,9 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
     if not _in_file(_kind(document, "sensors"), SENSORS):
         document = {**document, "sensors": {k: v for k, v in document["sensors"].items() if k == "period"}}
+    if not _in_file(_kind(document, "radio"), RADIOS):
+        common = {key: value for key, value in document["radio"].items() if key in number_names(Packets)}
+        document = {**document, "radio": common}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)

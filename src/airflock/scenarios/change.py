@@ -8,6 +8,7 @@ from airflock.body.registry import BODIES
 from airflock.core.contract import Model
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import SETS
+from airflock.radios.registry import RADIOS
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
@@ -15,14 +16,19 @@ from airflock.scenarios.scenario import Scenario
 from airflock.sensors.registry import SENSORS
 
 # what a scenario holds beside a section, that section, and the kinds that are ours
-KINDS = (("measures", "metrics", SETS), ("vehicle", "body", BODIES), ("sensor", "sensors", SENSORS))
+KINDS = (
+    ("measures", "metrics", SETS),
+    ("vehicle", "body", BODIES),
+    ("sensor", "sensors", SENSORS),
+    ("transceiver", "radio", RADIOS),
+)
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
 
 def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """The scenario with keys set anew, checked as a whole as if it came from a file.
 
-    Its law, its body, its sensor and its order parameters stay those that it has where they are no names of ours,
+    Its law, body, sensor, radio and order parameters stay those that it has where they are no names of ours,
     unless their kind is set anew. Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}

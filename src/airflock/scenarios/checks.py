@@ -7,10 +7,13 @@ from typing import Any
 
 from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Body, Metric, MetricSet, Model, body
+from airflock.core.radio import Packets, Radio, radio
 from airflock.core.sensor import Sensor, sensor
 from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
 from airflock.metrics.registry import SETS, USUAL, metric_set
+from airflock.radios.registry import RADIOS
+from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
 from airflock.sensors.registry import SENSORS
@@ -87,6 +90,28 @@ def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:
     return found.lacks(s=s, period=period, dt=flight.dt)
 
 
+def radio_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Radio, list[str]]:
+    """Radio of the section radio, by its key kind; and what is wrong with it."""
+    usual = RADIOS[USUAL_RADIO]
+    kind = table.get("kind", usual.name) if isinstance(table, Mapping) else usual.name
+    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
+    if isinstance(kind, str) and kind in RADIOS:
+        return RADIOS[kind], []
+    if isinstance(kind, str) and kind.endswith(".py"):
+        try:
+            return radio(own_code("radio.kind", kind, folder, trust=trust), Path(kind).stem), []
+        except AirflockError as fault:
+            return _stand_in(kind), str(fault).splitlines()
+    near = get_close_matches(str(kind), RADIOS, n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(RADIOS)}, or a file that ends in .py"
+    return _stand_in(kind), [f"radio.kind = {kind!r}: unknown radio; {hint}"]
+
+
+def _stand_in(kind: Any) -> Radio:
+    """A radio in place of one that cannot be had, by whose common numbers the rest is judged."""
+    return Radio(str(kind), Packets)
+
+
 def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:
     """Metric set of the section metrics, by its key kind; and what is wrong with it."""
     kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL
@@ -106,17 +131,17 @@ def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) 
 IDEAL = {"radio.kind": "'constant'", "sensors.kind": "'perfect'"}  # what is not ideal at 0
 
 
-def order_faults(flight: Any, found: Sensor, sensors: Any, radio: Any) -> list[str]:
+def order_faults(flight: Any, found: Sensor, sensors: Any, link: Radio, k: Any) -> list[str]:
     """Sequential update is for agents that see each other as they are, at every step."""
-    if flight.update == "synchronous" or sensors is None or radio is None:
+    if flight.update == "synchronous" or sensors is None or k is None:
         return []
     late = sensors.period if round(sensors.period / flight.dt) > 1 else 0.0
     ideal = {
         "sensors.kind": 0.0 if found.is_exact(sensors) else found.name,
         "sensors.period": late,
-        "radio.delay": radio.delay,
-        "radio.loss": radio.loss,
-        "radio.kind": 0.0 if radio.kind == "constant" else radio.kind,
+        "radio.delay": k.delay,
+        "radio.loss": k.loss,
+        "radio.kind": link.name if link.keeps else 0.0,
     }
     return [
         f"{key} = {value}: update = 'sequential' needs ideal perception at every step; set {key} = "

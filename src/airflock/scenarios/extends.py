@@ -4,20 +4,23 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from airflock.core.parameters import number_names
+from airflock.core.radio import Packets
 from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
 LONGEST = 10  # files in a chain of extends
-KINDS = ("model", "body", "sensors", "scene", "goals", "start")  # sections in which another kind means other keys
-SHARED = {"sensors": ("period",)}  # but for these, which every kind has
+# sections in which another kind means other keys
+KINDS = ("model", "body", "sensors", "radio", "scene", "goals", "start")
+SHARED = {"sensors": ("period",), "radio": number_names(Packets)}  # but for these, which every kind has
 Read = Callable[[str, Path | None], tuple[dict[str, Any], Path]]
 
 
 def extended(document: Mapping[str, Any], where: str, folder: Path | None, read: Read) -> tuple[dict[str, Any], str]:
     """A document with everything of the file that it extends, and which file that was ("" for none).
 
-    Keys of the document go before those of the file. Where it names another kind of model, body, sensor, scene, goals
-    or start, that section's other keys are not taken over. What a paper published of the file is not either.
+    Keys of the document go before those of the file. Where it names another kind of model, body, sensor, radio, scene,
+    goals or start, that section's other keys are not taken over. What a paper published of the file is not either.
 
     where  : name of the document, for faults
     folder : where the names of files are looked for
@@ -60,9 +63,9 @@ def _plain(value: Any) -> Any:
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A document whose own files (a law, a body, a sensor, order parameters, a mesh) are named from anywhere."""
+    """A document whose own files (a law, a body, a sensor, a radio, metrics, a mesh) are named from anywhere."""
     result = dict(document)
-    kinds = [(section, "kind") for section in ("model", "body", "sensors", "metrics")]
+    kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "metrics")]
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None

@@ -10,6 +10,9 @@ from typing import Any
 from airflock.core.contract import Body
 from airflock.core.contract import body as gathered_body
 from airflock.core.fault import Fault, fault
+from airflock.core.parameters import number_names
+from airflock.core.radio import Packets, Radio
+from airflock.core.radio import radio as gathered_radio
 from airflock.core.sensor import Sensor
 from airflock.core.sensor import sensor as gathered_sensor
 from airflock.doors import from_outside, is_file, read_toml
@@ -49,6 +52,7 @@ def load(
     metrics: Any = None,
     body: Any = None,
     sensor: Any = None,
+    radio: Any = None,
     faults: Any = None,
     laws: Any = None,
     trust: bool = False,
@@ -73,6 +77,8 @@ def load(
         A body of your own carries the agents: a `Body`, a namespace, or a name or file.
     sensor : optional
         A sensor of your own by which agents know themselves: a `Sensor`, a namespace, or a name or file.
+    radio : optional
+        A radio of your own by which agents hear each other: a `Radio`, a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
@@ -81,7 +87,7 @@ def load(
         `airflock.model` gives, or a list of these.
     trust : bool
         Whether code that the file names, or a file that it extends, may run: a law, also of a group, a body, a sensor,
-        order parameters.
+        a radio, order parameters.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def load(
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
-        document, own = _given(document, metrics, body, sensor)
+        document, own = _given(document, metrics, body, sensor, radio)
         own["kinds"] = _kinds(faults)
         own["laws"] = {law.name: law for law in map(given_law, _several(laws))}
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
@@ -137,8 +143,10 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
-def _given(document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics, the body and the sensor which the caller gives, and these for `make`.
+def _given(
+    document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any, radio: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A document that names the metrics, the body, the sensor and the radio which the caller gives, and these.
 
     Giving them is consent to run them. Raises ScenarioError.
     """
@@ -166,6 +174,14 @@ def _given(document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any) ->
     if sensor is not None:
         period = {key: value for key, value in document.get("sensors", {}).items() if key == "period"}
         document["sensors"] = {**period, "kind": own["sensor"].name}
+    if isinstance(radio, (str, os.PathLike)):
+        own["transceiver"], more = checks.radio_of({"kind": str(radio)}, trust=True)
+        faults = [*faults, *more]
+    elif radio is not None:
+        own["transceiver"] = radio if isinstance(radio, Radio) else gathered_radio(radio)
+    if radio is not None:
+        kept = {key: value for key, value in document.get("radio", {}).items() if key in number_names(Packets)}
+        document["radio"] = {**kept, "kind": own["transceiver"].name}
     if faults:
         raise ScenarioError(faults)
     return document, own

@@ -6,9 +6,11 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from airflock.body.registry import BODIES
-from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
+from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, number_names, with_unit
+from airflock.core.radio import Packets
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
+from airflock.radios.registry import RADIOS
 from airflock.scenarios.faulty import Timing
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.sections import SECTIONS, Flight
@@ -17,6 +19,8 @@ from airflock.sensors.registry import SENSORS
 
 TOP = "top"  # the keys before the first section
 FAMILIES = {"model": MODELS, "body": BODIES, "sensors": SENSORS, "faults": KINDS}  # sections with records by kind
+OF_ALL = number_names(Packets)  # keys of every radio, which the section [radio] tells
+OTHER_RADIOS = {name: radio for name, radio in RADIOS.items() if radio.Parameters is not SECTIONS["radio"]}
 
 
 class Key(NamedTuple):
@@ -24,7 +28,7 @@ class Key(NamedTuple):
 
     name    : as it is written after --set, for instance "radio.delay"; of an entry of [[faults]] or [[groups]] behind
     the name of the list
-    of      : the model, body, sensor or kind of fault that the key belongs to; "" where it is always there
+    of      : the model, body, sensor, radio or kind of fault that the key belongs to; "" where it is always there
     kind    : "number", "choice", "points", "text", "list" or "table"
     default : None means "derived from the rest of the scenario", or that there is none
     unit    : SI unit; "1" for a plain number, "" for what has none
@@ -73,7 +77,7 @@ class Section(NamedTuple):
 
 @cache
 def sections() -> Mapping[str, Section]:
-    """Sections by name: the top, every model, body and sensor, the other sections, the lists, every kind of fault."""
+    """Sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
     result = {TOP: _section(TOP, "at the top", "", Flight)}
     for name in MODELS:
         result[name] = _section(name, f'model.kind = "{name}"', "model", find_model(name).Parameters, name)
@@ -83,6 +87,9 @@ def sections() -> Mapping[str, Section]:
     for name, record in SECTIONS.items():
         if name not in FAMILIES:
             result[name] = _section(name, f"[{name}]", name, record)
+    for name, radio in OTHER_RADIOS.items():
+        found = _section(name, f'radio.kind = "{name}"', "radio", radio.Parameters, name)
+        result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
     groups = "Agents that have numbers of their own of the law or the body."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
     shared = _section("faults", "[[faults]]", "faults", Timing)
@@ -101,8 +108,8 @@ def keys(section: str | None = None) -> list[Key]:
     ----------
     section : str, optional
         A section ("radio"), "model", "body", "sensors" or "faults" for all models, bodies, sensors or kinds of fault,
-        one of them by its name ("couzin_2002", "multirotor", "gnss", "motor"), "top" for the keys before the first
-        section, or a key ("radio.delay", "delay"). By default all.
+        one of them or of the radios by its name ("couzin_2002", "gnss", "jitter", "motor"), "top" for the keys before
+        the first section, or a key ("radio.delay", "delay"). By default all.
 
     Returns
     -------
@@ -129,6 +136,8 @@ def keys(section: str | None = None) -> list[Key]:
         return every
     if section in KINDS:  # all that an entry of this kind may hold, and keys of the same name
         return [*known[section].keys, *known["faults"].keys, *(key for key in every if _last(key) == section)]
+    if section in OTHER_RADIOS:  # behind what all radios have
+        return [*(key for key in known["radio"].keys if _last(key) in OF_ALL), *known[section].keys]
     if section in known and section not in FAMILIES:
         return list(known[section].keys)
     found = [key for key in every if section in (key.name, _last(key), key.name.partition(".")[0])]

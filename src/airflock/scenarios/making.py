@@ -9,10 +9,13 @@ from typing import Any
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.fault import Fault
-from airflock.core.parameters import declarations
+from airflock.core.parameters import declarations, number_names
+from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.doors import is_file
 from airflock.errors import AirflockError, ParameterError, ScenarioError
+from airflock.radios.registry import RADIOS
+from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.scenarios import (
     checks,
     faulty,
@@ -36,8 +39,10 @@ from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
-FAMILIES: Mapping[str, Mapping[str, Any]] = {"body": BODIES, "sensors": SENSORS}
-KINDS = {"body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",))}  # usual kind; keys of every kind
+FAMILIES: Mapping[str, Mapping[str, Any]] = {"body": BODIES, "sensors": SENSORS, "radio": RADIOS}
+KINDS = {  # usual kind; keys of every kind
+    "body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",)), "radio": (USUAL_RADIO, number_names(Packets)),
+}  # fmt: skip
 
 
 def make(
@@ -50,6 +55,7 @@ def make(
     measures: MetricSet | None = None,
     vehicle: Body | None = None,
     sensor: Sensor | None = None,
+    transceiver: Radio | None = None,
     kinds: Mapping[str, Fault] | None = None,
     laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
@@ -58,7 +64,7 @@ def make(
     """Scenario from a nested dict.
 
     where : names it in faults; notes : what is known of it already
-    law, measures, vehicle, sensor : a model, a metric set, a body, a sensor given directly, not by name
+    law, measures, vehicle, sensor, transceiver : a model, a metric set, a body, a sensor, a radio given directly
     kinds : kinds of fault given directly, by name; laws : laws that groups may name
     trust : whether code that the document names may run
     """
@@ -91,14 +97,19 @@ def make(
         sensor, more = checks.sensor_of(merged.get("sensors", {}), folder, trust=trust)
         faults += more
         merged = _understood(merged, "sensors", sensor.Parameters) if more else merged
+    if transceiver is None:
+        transceiver, more = checks.radio_of(merged.get("radio", {}), folder, trust=trust)
+        faults += more
+        merged = _understood(merged, "radio", transceiver.Parameters) if more else merged
     own = SECTIONS | {"body": vehicle.Parameters, "sensors": sensor.Parameters, "metrics": measures.Parameters}
+    own |= {"radio": transceiver.Parameters}
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
     merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, sensor, measures)
+    faults += more + _faults_between(parts, found, sensor, transceiver, measures)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
     single, told_of, more = _individuals(merged, parts, found, (vehicle, sensor), folder, kinds, laws, trust)
     faults += more
@@ -107,8 +118,8 @@ def make(
     published = _published(merged.get("published", {}))
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
-        name=where, model=found, vehicle=vehicle, sensor=sensor, measures=measures, published=published,
-        document=merged, **parts, **single,
+        name=where, model=found, vehicle=vehicle, sensor=sensor, transceiver=transceiver, measures=measures,
+        published=published, document=merged, **parts, **single,
     )  # fmt: skip
     faults = _derived_faults(scenario) or places.place_faults(scenario)
     if faults:
@@ -164,17 +175,25 @@ def _beside(scene: Any, folder: Path | None) -> Any:
 
 
 def _with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """A document without the numbers of its body or sensor, where the settings name another kind; and notes of it."""
+    """A document without the numbers of its body, sensor or radio, where settings name another kind; notes of it."""
     notes: list[str] = []
     for section, (usual, shared) in KINDS.items():
         given, key = document.get(section, {}), f"{section}.kind"
         if key not in settings or not isinstance(given, Mapping) or settings[key] == given.get("kind"):
+            continue
+        if section == "radio" and _share_a_record(settings[key], given.get("kind", usual)):
             continue
         if set(given) - {"kind", *shared}:
             kind = given.get("kind", usual)
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
         document = {**document, section: {name: given[name] for name in shared if name in given}}
     return document, tuple(notes)
+
+
+def _share_a_record(one: Any, other: Any) -> bool:
+    """Whether two radios have the same numbers, so that a scenario may change from one to the other by the kind."""
+    known = [RADIOS.get(kind) if isinstance(kind, str) else None for kind in (one, other)]
+    return all(known) and len({radio.Parameters for radio in known if radio}) == 1
 
 
 def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -220,7 +239,7 @@ def _parts(
     faults: list[str] = []
     for section, record in records.items():
         given = merged.get(section, {})
-        if section in KINDS and isinstance(given, Mapping):
+        if section in KINDS and isinstance(given, Mapping) and not hasattr(record, "kind"):
             given = {key: value for key, value in given.items() if key != "kind"}
         kinds = {name: member.Parameters for name, member in FAMILIES.get(section, {}).items()}
         parts[section], more = schema.check(section, given, record, kinds=kinds)
@@ -235,7 +254,9 @@ def _parts(
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], found: Model | None, sensor: Sensor, measures: MetricSet) -> list[str]:
+def _faults_between(
+    parts: Mapping[str, Any], found: Model | None, sensor: Sensor, transceiver: Radio, measures: MetricSet
+) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight = parts["flight"]
@@ -252,7 +273,7 @@ def _faults_between(parts: Mapping[str, Any], found: Model | None, sensor: Senso
         faults += geometry.faults(parts["world"], count, separation or 0.0, begin)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += timing.faults(flight, parts["sensors"].period, parts["metrics"])
-        faults += checks.order_faults(flight, sensor, parts["sensors"], parts["radio"])
+        faults += checks.order_faults(flight, sensor, parts["sensors"], transceiver, parts["radio"])
         faults += checks.silence_faults(parts["silence"].rule, flight, found) if parts["silence"] is not None else []
         faults += checks.metric_faults(measures, parts["metrics"], parts["world"])
         faults += wings.faults(parts, found, measures)

@@ -7,11 +7,12 @@ from typing import Any
 
 from airflock.aero import descent
 from airflock.aero import wing as wings
-from airflock.body import radio, wind
+from airflock.body import wind
 from airflock.core import random
 from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import number_names
+from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete
@@ -37,7 +38,7 @@ class Scenario:
     model and parameters : the flocking law and its numbers
     body, sensors, radio, topology, wind, world, scene, goals, start, wing, aero, silence, metrics : records, SI units
     flight    : number of agents, duration (s), motion step (s)
-    vehicle, sensor, measures : body, sensor and metric set that `body`, `sensors` and `metrics` hold the numbers of
+    vehicle, sensor, transceiver, measures : what `body`, `sensors`, `radio` and `metrics` hold the numbers of
     groups    : agents that share numbers or a law; faults: what befalls single agents
     published : order parameter → (mean, SD or None) that a paper reports for exactly this scenario
     document  : the plain nested dict that this scenario was made from
@@ -55,7 +56,7 @@ class Scenario:
     parameters: Any
     body: Any
     sensors: Any
-    radio: radio.Parameters
+    radio: Packets
     wind: wind.Parameters
     world: arena.Parameters
     scene: scenery.Parameters
@@ -69,6 +70,7 @@ class Scenario:
     flight: Flight
     vehicle: Body
     sensor: Sensor
+    transceiver: Radio
     measures: MetricSet
     groups: tuple[Group, ...] = ()
     faults: tuple[Entry, ...] = ()

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from airflock.aero import descent, wing
-from airflock.body import dryden, motion, radio, wind
+from airflock.body import dryden, motion, wind
 from airflock.core import silence
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
 from airflock.metrics import parameters as metrics
+from airflock.radios import links
 from airflock.sensors import langevin
 from airflock.topology import parameters as topology
 from airflock.world import arena, goals, scenery, start
@@ -74,7 +75,7 @@ class Section(NamedTuple):
     """One section of a scenario.
 
     key     : its table in a scenario file; empty for the keys at the top
-    record  : its parameters; None where the model brings them. A body, a sensor and a metric set may bring others
+    record  : its parameters; None where the model brings them. Body, sensor, radio and metric set may bring others
     letter  : what rules and drivers call its numbers; empty where no driver reads any
     derived : what drivers read instead of the record itself
     """
@@ -95,7 +96,7 @@ ORDER = (
     Section("model", None, "p"),
     Section("body", motion.Parameters, "b"),
     Section("sensors", langevin.Parameters, "s"),
-    Section("radio", radio.Parameters, "k"),
+    Section("radio", links.Parameters, "k"),
     Section("wind", wind.Parameters, "a", wind.Steady),
     Section("world", arena.Parameters, "w", Geometry),
     Section("scene", scenery.Parameters),

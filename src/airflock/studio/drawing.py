@@ -1,6 +1,5 @@
 """Drawing: what stands, and the flocks of all sides frame by frame: darts, trails, links, collisions."""
 
-import math
 from collections import deque
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -8,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.body import radio
+from airflock.core.radio import Radio
+from airflock.core.reception import share
 from airflock.metrics.registry import numbers_of
 from airflock.stage import colours
 from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
@@ -68,7 +68,7 @@ class Flock:
         if kind == "radio":
             k = self.side.scenario.radio
             pairs, length = self.pairs.linked(min(k.range, 1e8))
-            arrives = np.interp(length, *arrival(k))
+            arrives = np.interp(length, *arrival(self.side.scenario.transceiver, k))
             points = self.position[pairs]
             tones = PALE - arrives[:, None] * (PALE - 0.8 * tone)
         else:
@@ -79,14 +79,10 @@ class Flock:
 
 
 @lru_cache(maxsize=16)
-def arrival(k: radio.Parameters) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Distances, m, and the probability that a packet arrives over them, on one of the links."""
-    far = np.linspace(0.0, min(k.range, 4.0 * max(k.loss_at, k.far)), 129)
-    if k.kind == "links":
-        missed = [math.prod(1.0 - radio.received(r, slow, k) for slow in (0.0, 1.0)) for r in far.tolist()]
-    else:
-        missed = [radio.lost(r, k) for r in far.tolist()]
-    return far, 1.0 - np.array(missed)
+def arrival(radio: Radio, k: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Distances, m, and the probability that one packet of each rate arrives over them where nobody else sends."""
+    far = np.linspace(0.0, min(k.range, 4.0 * max(k.loss_at, getattr(k, "far", 0.0))), 129)
+    return far, np.array([share(radio, k, r) for r in far.tolist()])
 
 
 class Drawing:

@@ -34,7 +34,7 @@ def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tupl
     return {
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
         "pasts": (whole["ring"], 2 * dims, lanes) if heard else (1, 1, 1),
-        "stores": (2 * dims + 1, lanes, lanes) if plan.links else (2 * dims + 1, 1, 1),
+        "stores": (2 * dims + 1, lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
         "works": (rows, lanes) if table else (1, 1),
         "all_words": (4, lanes) if table else (1, 1),
         "all_mem": (max(model, 1), lanes) if table else (1, 1),

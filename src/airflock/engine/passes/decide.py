@@ -24,8 +24,9 @@ def neighbours(build: Builder) -> None:
     meet = Call(f"meet({', '.join([perceive.MEET, *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image
     made = specialise(
-        build, meeting.neighbours, decision=argument("k_"), draw=draw, drawn=drawn, meet=meet, sums=sums, images=images
-    )
+        build, meeting.neighbours, n=argument("n"), decision=argument("k_"), draw=draw, drawn=drawn, meet=meet,
+        sums=sums, images=images,
+    )  # fmt: skip
     if plan.grid:
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return

@@ -43,13 +43,13 @@ def meet(build: Builder) -> None:
 
 
 def around(plan: Plan) -> tuple[str, ...]:
-    """What stands in the world, where neighbours may be hidden: further arguments of `meet` and `neighbours`."""
-    return ("edges", "spans", "scene") if plan.hides else ()
+    """What stands in the world, where it may hide neighbours or shade the radio: more arguments of the two stages."""
+    return ("edges", "spans", "scene") if plan.hides or plan.shades else ()
 
 
 def receive(build: Builder) -> None:
     """Function receive, where packets are lost: random words of what is sent to four agents, or to one of a pair."""
-    if not (build.plan.lossy or build.plan.links):
+    if not build.plan.draws:
         return
     made = specialise(build, hearing.word if build.by_pairs else hearing.draw, decision=argument("k_"))
     build.function(RECEIVE[build.by_pairs], made.lines, f"return {made.answer}")

@@ -18,6 +18,23 @@ def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan)
     return flock.number[i] * whole.born + flock.number[j] if plan.absence else i * n + j
 
 
+def free_way(
+    x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, r: Any, whole: Any, edges: Any, spans: Any, scene: Any,
+    *, plan: Plan,
+) -> Any:  # fmt: skip
+    """How far (m) obstacles and the scene leave a ray free on its first r metres."""
+    free = r
+    if plan.obstacles:
+        for o in range(whole.obstacles):
+            if plan.obstacle is polygon.prism:
+                free = least(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, edges, spans[o, 0], spans[o, 1]))
+            else:
+                free = least(free, rays.to_edges(x, y, ux, uy, edges, spans[o, 0], spans[o, 1]))
+    if plan.scene:
+        free = least(free, bvh.cast(x, y, z, ux, uy, uz, r, ZERO, *tree(scene)))
+    return free
+
+
 def hide(
     i: int, others: Iterable[int], flock: Flock, whole: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan
 ) -> None:
@@ -30,20 +47,7 @@ def hide(
             ux = flock.away[X][j] / r
             uy = flock.away[Y][j] / r
             uz = flock.away[Z][j] / r
-            free = r
-            if plan.obstacles:
-                for o in range(whole.obstacles):
-                    if plan.obstacle is polygon.prism:
-                        free = least(
-                            free,
-                            polygon.ray_to_prism(
-                                x[X][i], x[Y][i], x[Z][i], ux, uy, uz, edges, spans[o, 0], spans[o, 1]
-                            ),
-                        )
-                    else:
-                        free = least(free, rays.to_edges(x[X][i], x[Y][i], ux, uy, edges, spans[o, 0], spans[o, 1]))
-            if plan.scene:
-                free = least(free, bvh.cast(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, ZERO, *tree(scene)))
+            free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
             flock.hidden[j] = ONE if free < r else ZERO
 
 

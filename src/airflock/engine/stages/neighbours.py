@@ -9,14 +9,17 @@ from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
 from airflock.engine.stages.receive import (
+    believed,
     by_clock,
     carried,
     carries,
+    crowd,
     first_of_four,
     hear,
     newest,
     on_record,
     sent,
+    shade,
     unheard,
     word_of,
 )  # fmt: skip
@@ -38,6 +41,7 @@ from airflock.engine.stages.words import (
     choose,
     integer,
     least,
+    real,
     reduced,
     totals,
     vector,
@@ -65,13 +69,15 @@ def kin(i: int, j: int, flock: Flock, *, plan: Plan) -> Any:
 
 
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
-    agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, decision: int, time: float, late: float,
-    words: Any, draw: Callable[[int], None] | None, drawn: Callable[[int, int], Any] | None,
-    meet: Callable[[int], None], *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
+    agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, whole: Any, n: int, decision: int,
+    time: float, late: float, edges: Any, spans: Any, scene: Any, words: Any, draw: Callable[[int], None] | None,
+    drawn: Callable[[int, int], Any] | None, meet: Callable[[int], None],
+    *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
 ) -> None:  # fmt: skip
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : how old is what is heard on arrival, s
+    edges, spans, scene : what stands in the world, where it shades the radio
     draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
     drawn  : instead of it, draws the random word of what agent j sends agent i
     meet   : finds whom of those whom agent i hears it meets, where that is not all of them
@@ -79,7 +85,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
     """
     axes, k, w = range(plan.dimensions), numbers.k, numbers.w
-    selective = plan.lossy or plan.links
+    selective = plan.draws
     true_range = plan.perturbed  # who is in range is a matter of true distances
     # A neighbour at exactly the range or the reach counts. Squares of distances that carry the guard TINY, which only
     # double precision can tell, are compared with squares that carry it, too.
@@ -89,9 +95,8 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     if model.reach is not None and not plan.varies("p"):
         near = least(ask(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if exact else near * near
-    if plan.links:
-        fast = sent(decision, k.fast_rate, numbers)
-        slow = sent(decision, k.slow_rate, numbers)
+    fast = sent(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
+    slow = sent(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
     for i in agents:
         ii = integer(i)
         own_p = numbers_of(i, "p", flock, numbers, plan=plan)
@@ -119,6 +124,12 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             h[a] = f * v[a]
         for c, how in sums:
             total[c] = START[how]
+        if plan.radio.asks("talkers"):  # noqa: SIM108 - a helper of several lines stands where it is assigned
+            talkers = crowd(i, others, range_ * range_, flock, w, plan=plan)
+        else:
+            talkers = ZERO
+        if plan.shades:
+            shade(i, others, range_ * range_, flock, w, whole, edges, spans, scene, plan=plan)
         for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
             for j in others:
                 d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
@@ -132,13 +143,23 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     apart2 = sum(o[a] * o[a] for a in axes)
                 if plan.packets and part != ADD:
                     carried2 = carries(i, j, range_ * range_, flock, plan=plan)
-                    hear(i, j, apart2, carried2, fast, slow, lot, drawn, time - late, packet, flock, numbers, plan=plan)
+                    known = {
+                        "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": talkers,
+                        "clear": flock.clear[j] if plan.shades else ONE, "step": real(decision),
+                        "period": numbers.c.period, "fast": fast, "slow": slow,
+                    }  # fmt: skip
+                    hear(
+                        i, j, apart2, carried2, known, lot, drawn, late, time, packet, flock, numbers, whole, decision,
+                        n, plan=plan,
+                    )  # fmt: skip
                 elif plan.packets:
                     newest(i, j, packet, flock, plan=plan)
                 if plan.packets:
                     age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
+                    if plan.turns:
+                        at = believed(age, packet, k, plan=plan)
                     for a in axes:
-                        d[a] = carried(a, age, packet, plan=plan) - own[a]
+                        d[a] = (at[a] if plan.turns else carried(a, age, packet, plan=plan)) - own[a]
                         dv[a] = packet[a + plan.dimensions] - v[a]
                 else:
                     for a in axes:
@@ -170,7 +191,9 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     ok = ok & (r2 <= near2)
                 if plan.lossy and not plan.packets and part != ADD:
                     distance = math.sqrt(apart2 + TINY) if true_range else r
-                    ok = ok & (random.uniform(word_of(i, j, lot, drawn)) >= unheard(distance, ZERO, ZERO, k, plan=plan))
+                    ok = ok & (
+                        random.uniform(word_of(i, j, lot, drawn)) >= unheard({"distance": distance}, k, plan=plan)
+                    )
                 if part == HEAR:
                     if plan.meeting("dx") or plan.hides:
                         for a in axes:

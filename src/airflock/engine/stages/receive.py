@@ -1,16 +1,39 @@
-"""Receive: which packets of the others arrive at an agent, and over two lossy links the newest that it has of each."""
+"""Receive: which packets of the others arrive at an agent, and where they are kept the newest that it has of each."""
 
 import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from airflock.body import radio
-from airflock.core import random, silence
+from airflock.core import radio, random, silence
 from airflock.engine.plan import Plan
+from airflock.engine.stages.meet import free_way, pair_number
 from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import HALF, TINY, choose, integer, least, real
+from airflock.engine.stages.words import (
+    GONE,
+    HALF,
+    ONE,
+    SIDES,
+    TINY,
+    ZERO,
+    X,
+    Y,
+    Z,
+    ask,
+    choose,
+    fields,
+    integer,
+    least,
+    most,
+    real,
+    totals,
+    vector,
+)  # fmt: skip
+from airflock.world.edges import nearest_image
 
 PACKET = random.PACKET
+AIR = random.AIR
+MORE = random.AIR + 256  # a second draw of the same pair
+UNIFORM, NORMAL = ("u0", "u1", "u2", "u3"), ("g0", "g1", "g2", "g3")  # random numbers that a rule may ask for
 
 
 def first_of_four(i: int, flock: Flock) -> Any:
@@ -53,17 +76,16 @@ def sent(decision: int, rate: Any, numbers: Any) -> Any:
     return integer(radio.packets(real(decision), rate, numbers.c.period))
 
 
-def unheard(distance: Any, fast: Any, slow: Any, k: Any, *, plan: Plan) -> Any:
-    """Probability that nothing of what one agent sends another arrives, in range."""
+def unheard(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
+    """Probability that nothing of what one agent sends another arrives, in range.
+
+    about : what a rule may ask for of the two and of the decision
+    """
     return (
-        radio.either(radio.lost(distance, k), _missed(distance, fast, slow, k, plan=plan))
-        if plan.lossy and plan.links
-        else (_missed(distance, fast, slow, k, plan=plan) if plan.links else radio.lost(distance, k))
+        radio.either(radio.lost(about["distance"], k), ask(plan.missed, **about, k=k))
+        if plan.lossy and plan.missed is not None
+        else (ask(plan.missed, **about, k=k) if plan.missed is not None else radio.lost(about["distance"], k))
     )
-
-
-def _missed(distance: Any, fast: Any, slow: Any, k: Any, *, plan: Plan) -> Any:
-    return radio.missed_few(distance, fast, slow, k) if plan.few else radio.missed(distance, fast, slow, k)
 
 
 def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
@@ -71,39 +93,163 @@ def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
     return least(least(range2, flock.reach_in[i]), flock.reach_out[j]) if plan.suffers("radio") else range2
 
 
+def offset(i: int, j: int, a: int, w: Any, flock: Flock, *, plan: Plan) -> Any:
+    """True offset from agent i to agent j along one axis, to its nearest image, m."""
+    return (
+        nearest_image(flock.position[a][j] - flock.position[a][i], getattr(w, SIDES[a]))
+        if plan.periodic
+        else flock.position[a][j] - flock.position[a][i]
+    )
+
+
+def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
+    """How many others are truly within the range of the radio of agent i."""
+    talkers = ZERO
+    for j in others:
+        o = vector()
+        for a in range(plan.dimensions):
+            o[a] = offset(i, j, a, w, flock, plan=plan)
+        near = sum(o[a] * o[a] for a in range(plan.dimensions)) <= range2
+        talkers = talkers + choose(near & (integer(j) != integer(i)), ONE, ZERO)
+    return talkers
+
+
+def shade(
+    i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any,
+    *, plan: Plan,
+) -> None:  # fmt: skip
+    """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
+    x = flock.position
+    for j in others:
+        flock.clear[j] = ONE
+        o = vector()
+        for a in range(plan.dimensions):
+            o[a] = offset(i, j, a, w, flock, plan=plan)
+        apart2 = sum(o[a] * o[a] for a in range(plan.dimensions)) + TINY
+        if (apart2 <= range2) & (integer(j) != integer(i)):
+            r = math.sqrt(apart2)
+            ux = o[X] / r
+            uy = o[Y] / r
+            uz = o[Z] / r
+            free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
+            flock.clear[j] = ZERO if free < r else ONE
+
+
+def chances(i: int, j: int, flock: Flock, whole: Any, decision: int, n: int, *, plan: Plan) -> dict[str, Any]:
+    """Random numbers of one pair and decision that rules of the radio may ask for, by name."""
+    pair = pair_number(i, j, n, flock, whole, plan=plan)
+    u, g = totals(), totals()
+    if plan.rolls(UNIFORM):
+        u[0], u[1], u[2], u[3] = random.draw(pair, decision, AIR, whole.world, whole.seed_low, whole.seed_high)
+    if plan.rolls(NORMAL):
+        w0, w1, w2, w3 = random.draw(pair, decision, MORE, whole.world, whole.seed_low, whole.seed_high)
+        g[0], g[1] = random.normal_pair(w0, w1)
+        g[2], g[3] = random.normal_pair(w2, w3)
+    return {
+        **{name: random.uniform(u[c]) for c, name in plan.rolls(UNIFORM)},
+        **{name: g[c] for c, name in plan.rolls(NORMAL)},
+    }
+
+
 def hear(
-    i: int, j: int, apart2: Any, carried2: Any, fast: Any, slow: Any, lot: Any,
-    drawn: Callable[[int, int], Any] | None, stamp: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan,
+    i: int, j: int, apart2: Any, carried2: Any, about: dict[str, Any], lot: Any,
+    drawn: Callable[[int, int], Any] | None, late: Any, time: Any, packet: Any, flock: Flock, numbers: Any,
+    whole: Any, decision: int, n: int, *, plan: Plan,
 ) -> None:  # fmt: skip
     """Where packets are kept: `packet` is then the newest that agent i has of agent j.
 
     apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
-    fast, slow       : packets sent on each link; stamp : when, s
+    about            : what rules of the radio may ask for of the two and of the decision
+    late, time       : how old a packet is that comes at once, and now, s
     """
     dims = plan.dimensions
     got = apart2 <= carried2
-    if plan.lossy or plan.links:
-        miss = unheard(math.sqrt(apart2 + TINY), fast, slow, numbers.k, plan=plan)
+    if plan.draws:
+        miss = unheard(about, numbers.k, plan=plan)
+    rolled = chances(i, j, flock, whole, decision, n, plan=plan)
+    if plan.radio.receive is not None:
+        passed = received(i, j, got, {**about, **rolled}, time, flock, numbers, plan=plan)
+        got = got & passed
+    if plan.draws:
         got = got & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
-    for a in range(dims):
-        packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
-        packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
-    packet[2 * dims] = choose(got, by_clock(stamp, j, flock, plan=plan), flock.packet[2 * dims][i, j])
+    if plan.radio.late is not None:
+        send(i, j, got, {**about, **rolled}, late, time, flock, numbers, plan=plan)
+        deliver(i, j, time, packet, flock, numbers, plan=plan)
+    else:
+        for a in range(dims):
+            packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
+            packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
+        packet[2 * dims] = choose(got, by_clock(time - late, j, flock, plan=plan), flock.packet[2 * dims][i, j])
     for c in range(2 * dims + 1):
         flock.packet[c][i, j] = packet[c]
 
 
+def received(
+    i: int, j: int, near: Any, about: dict[str, Any], time: Any, flock: Flock, numbers: Any, *, plan: Plan
+) -> Any:
+    """Whether a packet arrives by the radio's own rule; its Packet is then the new one, where packets carry so far."""
+    age = by_clock(time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
+    if plan.radio.Packet is not None:
+        kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in fields(plan.radio.Packet)])
+        hit = ask(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
+        for c in fields(plan.radio.Packet):
+            flock.packet[plan.pocket + c][i, j] = choose(near, hit[1][c], flock.packet[plan.pocket + c][i, j])
+    else:
+        hit = ask(plan.radio.receive, **about, age=age, k=numbers.k)
+    return (hit[0] if plan.radio.Packet is not None else hit) > HALF
+
+
+def send(
+    i: int, j: int, got: Any, about: dict[str, Any], late: Any, time: Any, flock: Flock, numbers: Any, *, plan: Plan
+) -> None:
+    """What agent j sends agent i and is not lost goes under way, unless another packet of this pair is."""
+    dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
+    goes = got & (flock.packet[due][i, j] < HALF * GONE)
+    wait = ask(plan.radio.late, **about, k=numbers.k)
+    for a in range(dims):
+        flock.packet[first + a][i, j] = choose(goes, flock.heard_position[a][j], flock.packet[first + a][i, j])
+        flock.packet[first + a + dims][i, j] = choose(
+            goes, flock.heard_velocity[a][j], flock.packet[first + a + dims][i, j]
+        )
+    flock.packet[first + 2 * dims][i, j] = choose(
+        goes, by_clock(time - late, j, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
+    )
+    flock.packet[due][i, j] = choose(goes, time + most(wait, ZERO), flock.packet[due][i, j])
+
+
+def deliver(i: int, j: int, time: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+    """What is due by now has come; half a step is as good as none."""
+    first, due = plan.waiting, 2 * plan.waiting
+    come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= time + HALF * numbers.c.dt)
+    for c in range(plan.waiting):
+        packet[c] = choose(come, flock.packet[first + c][i, j], flock.packet[c][i, j])
+    flock.packet[due][i, j] = choose(come, GONE, flock.packet[due][i, j])
+
+
 def carried(a: int, age: Any, packet: Any, *, plan: Plan) -> Any:
-    """Where the sender of a packet is believed to be, along one axis: over two links it is carried forward, m."""
-    return packet[a] + packet[a + plan.dimensions] * age if plan.links else packet[a]
+    """Where the sender of a packet is believed to be along one axis, m: where it was, or carried forward.
+
+    Written out what `core.radio.forward` says: as a call, compilers add up in another order, and flights differ by it.
+    """
+    return packet[a] + packet[a + plan.dimensions] * age if plan.radio.carry is radio.forward else packet[a]
+
+
+def believed(age: Any, packet: Any, k: Any, *, plan: Plan) -> Any:
+    """The same by any other rule of the radio, of all axes at once."""
+    return ask(
+        plan.radio.carry, x=packet[X], y=packet[Y], z=packet[Z] if plan.dimensions == 3 else ZERO,
+        vx=packet[plan.dimensions + X], vy=packet[plan.dimensions + Y],
+        vz=packet[plan.dimensions + Z] if plan.dimensions == 3 else ZERO, age=age, k=k,
+    )  # fmt: skip
 
 
 def on_record(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
     """Whether the newest packet that an agent has of another one, of this age (s), says something.
 
-    Over two links it does until the next one comes; where lost neighbours stop an agent, until they count as lost.
+    Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
+    as lost.
     """
-    return packet[2 * plan.dimensions] > -1e8 if plan.links else silence.counts(age, numbers.silence) > HALF
+    return packet[2 * plan.dimensions] > -1e8 if plan.radio.keeps else silence.counts(age, numbers.silence) > HALF
 
 
 def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:

@@ -45,8 +45,8 @@ class Flock:
     position, velocity, command          : true state (m, m/s), and what was asked of the body
     measured_position, measured_velocity : own state as the agent believes it
     heard_position, heard_velocity       : its state as others hear it
-    packet                               : over two lossy links, the newest packet of each pair: packet[c][i, j] is
-                                           number c (position, velocity, time stamp) of what agent i has of agent j
+    packet                               : where packets are kept, those of each pair: packet[c][i, j] is number c
+                                           (`Plan.of_pair`) of what agent i has of agent j
     own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
     sent_error, sent_drift               : the same of what is sent to others
     reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
@@ -56,6 +56,7 @@ class Flock:
     away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
                                            whom it does not hear
     hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
+    clear                                : whether nothing stands in the way of packets from each of them (1 or 0)
     met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
     sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
     body, sense                          : what the body and the sensor remember, by field of their Memory
@@ -121,6 +122,11 @@ class Flock:
     def hidden(self) -> Row:
         """Whether something that stands in the world hides each other agent, 1 or 0."""
         return self._take("hidden")
+
+    @property
+    def clear(self) -> Row:
+        """Whether nothing stands between one agent and each other one, 1 or 0."""
+        return self._take("clear")
 
     @property
     def fade(self) -> Row:

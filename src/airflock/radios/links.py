@@ -1,41 +1,27 @@
-"""Radio: what neighbours' data suffer on the way."""
+"""Links: two unreliable radio links; data are carried forward (Vásárhelyi et al. 2018, Drone setup)."""
 
-import math
 from dataclasses import dataclass
 
-from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
+from airflock.core.radio import Packets, forward
 
-S5 = "Vásárhelyi et al. 2018, Table S5"
-FEW = 3  # packets
 SETUP = "Vásárhelyi et al. 2018, Drone setup and Fig. 8"
 FIG8 = "our choice in the spirit of Fig. 8"
+KINDS = ("constant", "links", "table", "congestion", "shadow", "bursts", "jitter")
+RATES = ("fast_rate", "slow_rate")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Record):
+class Parameters(Packets):
     """Status packets between agents: constant delay and range, optional loss, or two unreliable links."""
 
-    delay: float = quantity(
-        1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
-    )
-    range: float = quantity(80.0, "m", low=0.0, high=1e8, source=S5, meaning="largest distance of communication")
-    loss: float = quantity(
-        0.0,
-        "1",
-        low=0.0,
-        high=1.0,
-        source="authors' program",
-        meaning="probability of losing a packet at the distance loss_at; grows with the square of the distance",
-    )
-    loss_at: float = quantity(
-        80.0, "m", low=0.1, high=1e6, source="authors' program", meaning="distance at which loss is meant"
-    )
     kind: str = choice(
         "constant",
-        ("constant", "links"),
+        KINDS,
         source=SETUP,
-        meaning="constant: every packet in range arrives after delay; links: two lossy links, data extrapolated",
+        meaning="constant: every packet in range arrives after delay; links: two lossy links, data extrapolated; "
+        "table: a measured table of reception; congestion: more talkers, more loss; shadow: buildings weaken signals; "
+        "bursts: losses in rows; jitter: delays differ; or a file that ends in .py",
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")
@@ -43,12 +29,6 @@ class Parameters(Record):
     far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="outages begin beyond")
     received_near: float = quantity(0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="received share below near")
     received_far: float = quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="received share at far")
-
-
-def lost(distance, k):
-    """Probability that a packet over a distance (m) is lost, 0-1 (authors' program: quadratic in the distance)."""
-    s = distance / k.loss_at
-    return min(k.loss * s * s, 1.0)
 
 
 def received(distance, slow, k):
@@ -87,26 +67,8 @@ def missed(distance, fast, slow, k):
 
 
 def missed_few(distance, fast, slow, k):
-    """The same for at most FEW packets on each link."""
+    """The same for at most three packets on each link."""
     return thrice(1.0 - received(distance, 0.0, k), fast) * thrice(1.0 - received(distance, 1.0, k), slow)
 
 
-def either(a, b):
-    """Probability that at least one of two independent mishaps happens, 0-1."""
-    return a + b - a * b
-
-
-def unheard(distance, step, period, k):
-    """Probability that nothing arrives of what an agent sends another in decision number `step`, in range, 0-1.
-
-    distance : between the two, m; period : time between decisions, s
-    """
-    if k.kind == "constant":
-        return lost(distance, k)
-    sent = packets(step, k.fast_rate, period), packets(step, k.slow_rate, period)
-    return either(lost(distance, k), missed(distance, *sent, k))
-
-
-def packets(step, rate, period):
-    """How many packets a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
-    return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
+carry = forward

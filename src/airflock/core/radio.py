@@ -1,0 +1,180 @@
+"""The contract of a radio: which packets of others arrive, when, and where their senders are believed to be since.
+
+A kind of radio is a module with `Parameters` and plain rules. `missed` tells the probability that nothing of what one
+agent sends another in a decision arrives; a random number then decides, for all pairs in vectors. `receive` is the
+longer form: it is handed random numbers and what is kept of the pair, and decides itself. The argument names are the
+declaration, as of every rule (`core.vocabulary`).
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from airflock.core.contract import names_of
+from airflock.core.parameters import Parameters, number_names, quantity
+from airflock.core.vocabulary import asks
+from airflock.errors import RuleError
+
+S5 = "Vásárhelyi et al. 2018, Table S5"
+FEW = 3  # packets of each rate in a decision, up to which `missed_few` serves
+RULES = ("missed", "missed_few", "receive", "late", "carry")
+LINKS = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
+
+
+@dataclass(frozen=True, kw_only=True)
+class Packets(Parameters):
+    """What every radio has: a delay, a range, and a loss that grows with the square of the distance."""
+
+    delay: float = quantity(
+        1.0, "s", low=0.0, high=30.0, source=S5, usual=(0.0, 5.0), meaning="age of neighbours' data on arrival"
+    )
+    range: float = quantity(80.0, "m", low=0.0, high=1e8, source=S5, meaning="largest distance of communication")
+    loss: float = quantity(
+        0.0,
+        "1",
+        low=0.0,
+        high=1.0,
+        source="authors' program",
+        meaning="probability of losing a packet at the distance loss_at; grows with the square of the distance",
+    )
+    loss_at: float = quantity(
+        80.0, "m", low=0.1, high=1e6, source="authors' program", meaning="distance at which loss is meant"
+    )
+
+
+def lost(distance, k):
+    """Probability that a packet over a distance (m) is lost, 0-1 (authors' program: quadratic in the distance)."""
+    s = distance / k.loss_at
+    return min(k.loss * s * s, 1.0)
+
+
+def either(a, b):
+    """Probability that at least one of two independent mishaps happens, 0-1."""
+    return a + b - a * b
+
+
+def packets(step, rate, period):
+    """How many packets a link of `rate` (1/s) sends in decision number `step` of length `period` (s)."""
+    return math.floor((step + 1.0) * rate * period + 1e-6) - math.floor(step * rate * period + 1e-6)
+
+
+def forward(x, y, z, vx, vy, vz, age):
+    """Position (m) carried forward with the velocity (m/s) for so long, s: exact for straight flight."""
+    return x + vx * age, y + vy * age, z + vz * age
+
+
+@dataclass(frozen=True)
+class Radio:
+    """A kind of radio: parameters and rules, gathered from a module or any namespace.
+
+    name       : how scenarios refer to it
+    Parameters : record of its numbers; delay, range, loss and loss_at are among them
+    missed     : probability that nothing of what an agent sends another in one decision arrives
+    missed_few : the same where each of RATES sends at most FEW packets in a decision; quicker
+    receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is asked once for each
+                 pair in range and decision
+    late       : how much later than `delay` a packet comes, s. While one is under way, those behind it are dropped
+    carry      : where the sender of the newest packet is believed to be now, m; without it, where it was then
+    Packet     : NamedTuple of what `receive` keeps of one pair, each field with its value at the start
+    rates      : at most two numbers of Parameters, packets per second; `missed` may ask how many each sends (LINKS)
+    violates   : truths of `airflock.check_radio` that do not hold for it, and why (VIOLATES)
+
+    Of a radio with `missed`, `receive` or `late` the newest packet counts until the next one comes, as long as its
+    sender is in range. Without any of them each packet counts at the decision that it comes at.
+    """
+
+    name: str
+    Parameters: type
+    missed: Callable[..., Any] | None = None
+    missed_few: Callable[..., Any] | None = None
+    receive: Callable[..., Any] | None = None
+    late: Callable[..., Any] | None = None
+    carry: Callable[..., Any] | None = None
+    Packet: type | None = None
+    rates: tuple[str, ...] = ()
+    violates: Mapping[str, str] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        return hash((self.name, *(getattr(self, rule) for rule in RULES)))
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the newest packet counts until the next one comes."""
+        return self.missed is not None or self.receive is not None or self.late is not None
+
+    @property
+    def beginnings(self) -> tuple[float, ...]:
+        """What each field of its Packet is at the start of a flight."""
+        return tuple(getattr(self.Packet, "_field_defaults", {}).values())
+
+    def asks(self, *names: str) -> bool:
+        """Whether one of its rules asks for any of these names."""
+        found = {name for kind in RULES if (rule := getattr(self, kind)) for name in asks(rule, kind, self.name)}
+        return bool(found & set(names))
+
+
+def radio(namespace: Any, name: str = "") -> Radio:
+    """Gather a radio from a module, a class or a mapping of names; refuse what the contract does not know.
+
+    Parameters
+    ----------
+    namespace : module, class or mapping
+        Holds at least one of the rules missed, receive, late and carry; if it likes, Parameters, RATES, and Packet (a
+        NamedTuple whose fields have the values of the start), which receive asks for as `packet` and returns.
+    name : str, optional
+        How the radio is called; by default the namespace's.
+
+    Returns
+    -------
+    Radio
+        To be given to `airflock.load(..., radio=...)`.
+
+    Raises
+    ------
+    RuleError
+        If it has no rule, or both missed and receive, or a rule asks for what there is not.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> class Nearby:
+    ...     def missed(distance):
+    ...         return 0.1 if distance < 30.0 else 0.9
+    >>> airflock.radio(Nearby).Parameters().range
+    80.0
+    """
+    found, name = names_of(namespace, name)
+    rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
+    asked = {kind: asks(rule, kind, name) for kind, rule in rules.items()}
+    if not rules:
+        raise RuleError(f"radio {name} has no rule; give missed or receive, late, carry")
+    if "missed" in rules and "receive" in rules:
+        raise RuleError(f"radio {name} has missed and receive; give one of them")
+    if set(rules) <= {"carry", "missed_few"}:
+        raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive or late as well")
+    packet = found.get("Packet")
+    if ("packet" in asked.get("receive", ())) is (packet is None):
+        raise RuleError(f"radio {name}: a rule receive that asks for packet and a NamedTuple Packet come together")
+    if packet is not None and set(getattr(packet, "_field_defaults", {})) != set(getattr(packet, "_fields", "-")):
+        raise RuleError(f"radio {name}: Packet is a NamedTuple whose fields all have a value for the start")
+    record, rates = _whole(found.get("Parameters"), name), tuple(found.get("RATES", ()))
+    unknown = [rate for rate in rates if rate not in number_names(record)]
+    if unknown or len(rates) > len(LINKS):
+        raise RuleError(f"radio {name}: RATES = {rates} are not at most two numbers of Parameters")
+    wanted = set(asked.get("missed", ())) & set(LINKS) - set(LINKS[: len(rates)])
+    if wanted:
+        raise RuleError(f"radio {name}: missed asks for {sorted(wanted)[0]}, which RATES does not name")
+    return Radio(name, record, Packet=packet, rates=rates, violates=dict(found.get("VIOLATES", {})), **rules)
+
+
+def _whole(record: Any, owner: str) -> type:
+    """A radio's own parameters, which hold what all radios have."""
+    if record is None:
+        return Packets
+    if not (isinstance(record, type) and issubclass(record, Parameters)):
+        raise RuleError(f"radio {owner}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    if set(number_names(Packets)) <= set(number_names(record)):
+        return record
+    made = type("Parameters", (record, Packets), {"__module__": record.__module__, "__doc__": record.__doc__})
+    return dataclass(frozen=True, kw_only=True)(made)

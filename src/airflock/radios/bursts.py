@@ -1,0 +1,40 @@
+"""Bursts: each link is now good, now bad, so packets are lost in rows (Gilbert 1960, Elliott 1963)."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from airflock.core.parameters import quantity
+from airflock.core.radio import Packets, forward
+
+OURS = "our choice"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Packets):
+    """A link of two states, apart for each receiver and sender. Its share of bad time is outage_rate · outage_time
+    / (1 + outage_rate · outage_time).
+    """
+
+    outage_rate: float = quantity(0.1, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often a good link fails")
+    outage_time: float = quantity(2.0, "s", low=0.001, high=1e4, source=OURS, meaning="mean time that it stays bad")
+    received_good: float = quantity(0.98, "1", low=0.0, high=1.0, source=OURS, meaning="received share while good")
+    received_bad: float = quantity(0.0, "1", low=0.0, high=1.0, source=OURS, meaning="received share while bad")
+
+
+class Packet(NamedTuple):
+    """Whether the link of one pair is bad, 1 or 0."""
+
+    bad: float = 0.0
+
+
+def receive(u0, u1, period, packet, k):
+    """1.0 if what is sent in a decision arrives, else 0.0; and whether the link is bad by now."""
+    stays = u0 < math.exp(-period / k.outage_time)
+    fails = u0 < 1.0 - math.exp(-k.outage_rate * period)
+    bad = (1.0 if stays else 0.0) if packet.bad > 0.5 else (1.0 if fails else 0.0)
+    share = k.received_bad if bad > 0.5 else k.received_good
+    return 1.0 if u1 < share else 0.0, Packet(bad)
+
+
+carry = forward

@@ -1,0 +1,29 @@
+"""Jitter: packets come later than the delay, by times that differ from packet to packet.
+
+A link carries one packet of a pair at a time: what is sent meanwhile is dropped, as by a sender that repeats a packet
+until it is acknowledged. So data grow older than the delay and its jitter alone.
+"""
+
+import math
+from dataclasses import dataclass
+
+from airflock.core.parameters import quantity
+from airflock.core.radio import Packets, forward
+
+OURS = "our choice"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Packets):
+    """A delay with an exponential part. A decision acts on what has come by then."""
+
+    jitter: float = quantity(0.1, "s", low=0.0, high=30.0, source=OURS, meaning="mean of what comes on top of delay")
+    longest: float = quantity(2.0, "s", low=0.0, high=60.0, source=OURS, meaning="most that comes on top of it")
+
+
+def late(u0, k):
+    """How much later than the delay a packet comes, s: exponential, cut off at `longest`."""
+    return min(-k.jitter * math.log(u0), k.longest)
+
+
+carry = forward
