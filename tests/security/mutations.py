@@ -388,12 +388,15 @@ def commanded(words, folder, tell=False):
 def no_flights():
     """Whatever would compile or fly in this process ends there."""
     from airflock.display import show
-    from airflock.engine import cpu, simulate, store
+    from airflock.engine import cpu, interpreted, simulate, store
+    from airflock.fleet import lockstep
 
     def flown(*_, **__):
         raise Flown
 
     store.load_driver = cpu.load_driver = flown
+    lockstep.Fleet.advance = flown
+    interpreted.flight_driver = flown
     simulate.compile_for = show.fly_show = flown
     simulate.in_threads = flown
 

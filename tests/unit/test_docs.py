@@ -13,6 +13,7 @@ from airflock.scenarios.laws import MODELS
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))
+import links  # noqa: E402
 import words  # noqa: E402
 
 LONG = " ".join(["word"] * 36) + "."
@@ -66,3 +67,15 @@ def test_a_tour_takes_less_than_thirty_lines_of_the_user_s_own():
         tree = ast.parse(path.read_text(encoding="utf-8"))
         lines = {line for node in tree.body[1:] for line in range(node.lineno, node.end_lineno + 1)}
         assert len(lines) <= 30, path.name
+
+
+def test_a_link_that_leads_nowhere_is_told(tmp_path):
+    (tmp_path / "a.html").write_text(
+        '<h2 id="one">1</h2><a href="b.html#two"><a href="#one"><a href="https://x.org/y">'
+    )
+    (tmp_path / "b.html").write_text('<a href="a.html#one"><a href="a.html#two"><img src="c.png">')
+    assert links.faults(tmp_path) == [
+        "a.html: b.html#two leads to no heading",
+        "b.html: a.html#two leads to no heading",
+        "b.html: c.png leads to no file",
+    ]

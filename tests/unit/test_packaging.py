@@ -33,4 +33,9 @@ def test_the_citation_names_this_version_and_every_publication_of_a_shipped_pape
 def test_every_extra_stands_in_the_table_of_the_documentation():
     page = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
     told = set(re.findall(r"^\| `\[(\w+)\]` \|", page, re.M))
-    assert told == set(PROJECT["optional-dependencies"]) - {"browser", "lint", "dev"}  # for who works on Airflock
+    assert told == set(PROJECT["optional-dependencies"]) - {
+        "browser",
+        "mavsdk",
+        "lint",
+        "dev",
+    }  # for who works on Airflock

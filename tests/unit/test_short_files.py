@@ -104,6 +104,13 @@ def test_a_last_word_of_several_sections_or_none_is_refused(key, fault):
         load(NAME, {key: 1.0})
 
 
+def test_a_key_of_another_kind_is_told_its_kind():
+    with pytest.raises(ScenarioError, match="sensors.sd: unknown key; it belongs to sensors.kind = 'gnss'"):
+        load(NAME, {"sensors.sd": 1.5})
+    with pytest.raises(ScenarioError, match="body.motor: unknown key; it belongs to body.kind = 'quadrotor'"):
+        load(NAME, {"body.motor": 0.1})
+
+
 def test_a_key_may_not_be_given_whole_and_by_its_last_word():
     with pytest.raises(ScenarioError, match="radio.delay is given twice"):
         load(NAME, {"radio.delay": 1.0, "delay": 0.4})

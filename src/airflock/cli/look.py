@@ -57,7 +57,8 @@ def plot(
     from airflock.plots.save import save_figure
 
     settings = options.settings(changes, agents, duration)
-    figure = picture(what, kind, seed=seed, start=begin, stop=end, settings=settings, law=law, trust=trust)
+    with options.compiling_told():
+        figure = picture(what, kind, seed=seed, start=begin, stop=end, settings=settings, law=law, trust=trust)
     save_figure(figure, out)
     tables.say(f"saved {out}")
 
@@ -95,7 +96,8 @@ def video(
     from airflock.plots.video import video as make_video
 
     ffmpeg()  # before anything flies
-    recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
+    with options.compiling_told():
+        recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)
@@ -129,12 +131,13 @@ def replay(
     from airflock.scenarios.files import load
 
     settings = options.settings(changes, agents, duration)
-    if what.lower().endswith(".nc"):
-        recording = flight_of(what, seed, settings, law, trust=trust)
-    else:
-        scenario = load(what, settings, law, trust=trust)
-        check_colour(scenario, colour)
-        recording = flight_of(scenario, seed)
+    with options.compiling_told():
+        if what.lower().endswith(".nc"):
+            recording = flight_of(what, seed, settings, law, trust=trust)
+        else:
+            scenario = load(what, settings, law, trust=trust)
+            check_colour(scenario, colour)
+            recording = flight_of(scenario, seed)
     made = make_replay(recording, rate=rate, colour=colour)
     made.save(page)
     tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

@@ -11,6 +11,7 @@ from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
+COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
 ]
@@ -123,13 +124,30 @@ def compile_aloud(scenario: Any, precision: int, device: str) -> None:
     from airflock.cli.tables import say
     from airflock.engine.simulate import compile_for
 
-    told = Timer(1.0, say, ["compiling … (once for this kind of flight; later ones begin at once)"])
+    told = Timer(1.0, say, [COMPILING])
     told.daemon = True
     told.start()
     try:
         compile_for(scenario, precision=precision)
     finally:
         told.cancel()
+
+
+@contextmanager
+def compiling_told() -> Iterator[None]:
+    """Tell a terminal, once, if what is done meanwhile compiles for longer than 1 s."""
+    import sys
+
+    if not sys.stderr.isatty():
+        yield
+        return
+    from numba.core.event import install_listener
+
+    from airflock.cli.tables import say
+    from airflock.engine.heeding import Telling
+
+    with install_listener("numba:run_pass", Telling(lambda: say(COMPILING))):
+        yield
 
 
 @contextmanager

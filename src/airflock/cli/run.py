@@ -114,7 +114,7 @@ def score(
 
     options.writable((series, TABLES))
     changed = options.settings(changes)
-    with Opening(files[0]) as first:  # another process opens it while this one imports
+    with options.compiling_told(), Opening(files[0]) as first:  # another process opens it while this one imports
         if groups:
             _groups([first, *files[1:]], files, changed, as_json)
         else:

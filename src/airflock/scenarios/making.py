@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from airflock.body.registry import BODIES
 from airflock.core.contract import Body, MetricSet, Model
 from airflock.core.fault import Fault
 from airflock.core.parameters import declarations, number_names
@@ -34,9 +35,11 @@ from airflock.scenarios.ground import file_faults
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+FAMILIES: Mapping[str, Mapping[str, Any]] = {"body": BODIES, "sensors": SENSORS, "radio": RADIOS}
 KINDS = {  # usual kind; keys of every kind
     "body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",)), "radio": (USUAL_RADIO, number_names(Packets)),
 }  # fmt: skip
@@ -238,7 +241,8 @@ def _parts(
         given = merged.get(section, {})
         if section in KINDS and isinstance(given, Mapping) and not hasattr(record, "kind"):
             given = {key: value for key, value in given.items() if key != "kind"}
-        parts[section], more = schema.check(section, given, record)
+        kinds = {name: member.Parameters for name, member in FAMILIES.get(section, {}).items()}
+        parts[section], more = schema.check(section, given, record, kinds=kinds)
         faults += more
     top: dict[str, Any] = {key: merged[key] for key in ("agents", "duration", "dt", "update") if key in merged}
     parts["flight"], more = schema.check("", top, Flight)

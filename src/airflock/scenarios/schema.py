@@ -68,8 +68,14 @@ def _holds(interval: Any, value: Any) -> bool:
     return sound and numbers[0] <= value <= numbers[-1]
 
 
-def check(section: str, given: Mapping[str, Any], record: type, beside: Sequence[str] = ()) -> tuple[Any, list[str]]:
-    """Record made from a section, or None, and all faults in it; `beside`: further keys that its table may hold."""
+def check(
+    section: str, given: Mapping[str, Any], record: type, beside: Sequence[str] = (),
+    kinds: Mapping[str, type] | None = None,
+) -> tuple[Any, list[str]]:  # fmt: skip
+    """Record made from a section, or None, and all faults in it.
+
+    beside : further keys that its table may hold; kinds : records that the section has with another kind
+    """
     if not isinstance(given, Mapping):
         return None, [f"{section} = {given!r} is not a table of keys"]
     values, faults = plain(section, given, record)
@@ -77,22 +83,24 @@ def check(section: str, given: Mapping[str, Any], record: type, beside: Sequence
         clean = schema(record)(**values)
     except ValidationError as error:
         for item in error.errors():
-            line = _line(section, item, record, beside)
+            line = _line(section, item, record, beside, kinds or {})
             if line not in faults:
                 faults.append(line)
         return None, faults
     return (None if faults else record(**clean.model_dump())), faults
 
 
-def _line(section: str, item: Any, record: type, beside: Sequence[str] = ()) -> str:
-    """One complaint of pydantic in our words; `beside`: keys of the same table that the record does not hold."""
+def _line(section: str, item: Any, record: type, beside: Sequence[str], kinds: Mapping[str, type]) -> str:
+    """One complaint of pydantic in our words; `beside`, `kinds`: as of `check`."""
     key = str(item["loc"][0]) if item["loc"] else ""
     name = f"{section}.{key}".lstrip(".")
     known = {n: d for n, d, _ in declarations(record)}
     if item["type"] == "extra_forbidden":
         may = [*known, *beside]
         near = get_close_matches(key, may, n=1, cutoff=0.5)
+        of = [kind for kind, other in kinds.items() if key in {known for known, _, _ in declarations(other)}]
         hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(may)}"
+        hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
         return f"{name}: unknown key; {hint}"
     declared, value = known[key], item["input"]
     if isinstance(declared, Quantity):
