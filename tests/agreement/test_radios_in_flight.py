@@ -158,7 +158,7 @@ def test_what_is_no_radio_is_said_in_one_line(rules, said):
     ("keys", "said"),
     [
         ({"radio.kind": "lnks"}, "radio.kind = 'lnks': unknown radio; did you mean links"),
-        ({"radio.kind": "table", "radio.near": 3.0}, "radio.near: unknown key"),
+        ({"radio.kind": "table", "radio.near": 3.0}, "radio.near: unknown key; it belongs to radio.kind"),
         ({"radio.kind": "jitter", "radio.jitter": -1.0}, r"radio.jitter = -1 s lies outside \[0, 30\] s"),
         ({"radio.kind": "table", "update": "sequential", "radio.delay": 0.0}, "set radio.kind = 'constant'"),
     ],
