@@ -35,7 +35,6 @@ def test_every_extra_stands_in_the_table_of_the_documentation():
     told = set(re.findall(r"^\| `\[(\w+)\]` \|", page, re.M))
     assert told == set(PROJECT["optional-dependencies"]) - {
         "browser",
-        "mavsdk",
         "lint",
         "dev",
     }  # for who works on Airflock

@@ -127,7 +127,7 @@ def misfits(
         own = {letter: {key: v for (of, key), v in group.numbers.items() if of == letter} for letter in "pbs"}
         if group.law is None and not any(own.values()):
             continue
-        told: dict[str, Any] = {**parts, "parameters": replace(base, **own["p"])}
+        told: dict[str, Any] = {**parts, "parameters": base and replace(base, **own["p"])}
         told["body"] = parts["body"] and replace(parts["body"], **own["b"])
         told["sensors"] = parts["sensors"] and replace(parts["sensors"], **own["s"])
         more = checks.body_faults(vehicle, told, law) + (checks.sensor_faults(sensor, told) if own["s"] else [])

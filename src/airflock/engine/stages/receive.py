@@ -109,8 +109,8 @@ def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, p
         o = vector()
         for a in range(plan.dimensions):
             o[a] = offset(i, j, a, w, flock, plan=plan)
-        near = sum(o[a] * o[a] for a in range(plan.dimensions)) <= range2
-        talkers = talkers + choose(near & (integer(j) != integer(i)), ONE, ZERO)
+        audible = sum(o[a] * o[a] for a in range(plan.dimensions)) <= range2
+        talkers = talkers + choose(audible & (integer(j) != integer(i)), ONE, ZERO)
     return talkers
 
 
