@@ -116,6 +116,8 @@ def models() -> None:
 
 
 def _reproduced(name: str) -> str:
+    if name not in PAPERS:
+        return "The publication's text was not at hand: closed forms that follow from the law are tested exactly."
     paper = PAPERS[name]
     link = f"[{paper}](../papers/{paper}/index.md)"
     if name == "viragh_2014":
