@@ -29,4 +29,4 @@ for axes, name in zip(figure.subplots(1, 2), ("ring", "hunt"), strict=True):
     axes.set_title(f"v_hunt = {scenario.laws[1].parameters.v_hunt:g} m/s")
     axes.set_xlabel("east, m")
 figure.axes[0].set_ylabel("north, m")
-figure.axes[0].legend(frameon=False, loc="upper right")
+figure.legend(*figure.axes[0].get_legend_handles_labels(), frameon=False, loc="outside lower center", ncols=2)
