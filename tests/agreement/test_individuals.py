@@ -1,5 +1,7 @@
 """Agents that differ, fail, leave and join: what a flight does about them, by truths that need no engine."""
 
+from concurrent.futures import Future
+
 import numpy as np
 import pytest
 
@@ -547,3 +549,23 @@ def test_a_recording_with_gaps_flies_again_to_the_same_bits(tmp_path):
     recording = airflock.simulate(load(PAPER, {**SMALL, "faults": [{"kind": "fails", **ONCE}]}), 1, device="python")
     path = airflock.save(recording, tmp_path / "flight.nc")
     assert "same bits" in str(airflock.validate(path))
+
+
+def test_a_fault_that_has_waited_for_its_compiler_begins_when_it_is_taken_over(monkeypatch):
+    waiting = []
+
+    def later(job):
+        waiting.append((Future(), job))
+        return waiting[-1][0]
+
+    monkeypatch.setattr("airflock.engine.course.in_background", later)
+    flight = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.0)
+    flight.fault("motor", [2], wait=False, share=0.0).fault("radio_silent", [1], wait=False).advance(0.5)
+    assert flight.waiting and not flight.faults
+    future, job = waiting[-1]
+    future.set_result(job())
+    flight.advance(0.5)
+    at_once = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.5)
+    at_once.fault("motor", [2], share=0.0).fault("radio_silent", [1]).advance(0.5)
+    assert flight.faults == at_once.faults and len(flight.faults) == 2
+    assert np.array_equal(flight.state, at_once.state)

@@ -16,6 +16,7 @@ from airflock.engine.onsets import onsets
 from airflock.engine.simulate import finish, opened
 from airflock.engine.state import State
 from airflock.errors import FlightError
+from airflock.scenarios.change import begun
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_background
 
@@ -141,8 +142,12 @@ class Course:
             self._take(new, said, compiled.result())
 
     def _take(self, scenario: Scenario, events: Sequence[Event], state: State) -> None:
-        """Go on as another scenario, in a new window of scores."""
+        """Go on as another scenario, in a new window of scores. Faults that have waited for a compiler begin now."""
         self.begin()
+        now = (self.step + (1 if self.sensed else 0)) * scenario.flight.dt
+        on_time = begun(scenario, _faults_at_the_end(events), now)
+        if on_time is not scenario:
+            scenario, state = on_time, self._opened(on_time, state.plan.absence)
         if self.state.plan.absence and not state.plan.absence:  # somebody left while the change waited
             state = self._opened(scenario, absence=True)
         if self.step > self.since:
@@ -230,6 +235,17 @@ class Course:
             coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
             self.state.expect((*before, *coming))
         self.note("branch", world=world)
+
+
+def _faults_at_the_end(events: Sequence[Event]) -> int:
+    """How many of a scenario's last faults these events have added."""
+    count = 0
+    for event in events:
+        if event.kind == "fault":
+            count += 1
+        elif event.kind == "change" and "faults" in event.data:
+            count = 0
+    return count
 
 
 def _compiled(state: State) -> State:

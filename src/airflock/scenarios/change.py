@@ -62,6 +62,15 @@ def named(scenario: Scenario) -> list[dict[str, Any]]:
     return [{**entry, "kind": found.fault.name} for entry, found in zip(given, scenario.faults, strict=True)]
 
 
+def begun(scenario: Scenario, count: int, at: float) -> Scenario:
+    """The scenario whose last faults, so many of them, begin at a time, s; itself where they do already."""
+    entries = named(scenario)
+    last = entries[len(entries) - count :]
+    if all(entry["at"] == at for entry in last):
+        return scenario
+    return remade(scenario, {"faults": [*entries[: len(entries) - count], *({**entry, "at": at} for entry in last)]})
+
+
 def variant(
     what: Scenario | str | os.PathLike[str], settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False
 ) -> Scenario:

@@ -102,7 +102,7 @@ class Panel:
             stroke, width = ("#E69F00", 0.7) if edge else (TONES[number], 2.0)
             points = uplot.Series_Points(show=False)
             series.append(uplot.Series(label=name, points=points, stroke=stroke, width=width))
-        shade = (uplot.Band(series=(len(names), len(names) - 1), fill="rgba(230,159,0,0.2)"),) if band else None
+        shade = (uplot.Band(series=(len(names) - 1, len(names)), fill="rgba(230,159,0,0.2)"),) if band else None
         zero = np.zeros(2)
         return self.server.gui.add_uplot(
             (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade,
