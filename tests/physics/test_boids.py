@@ -8,7 +8,7 @@ import pytest
 
 from airflock.body.turning import Parameters as Turning
 from airflock.body.turning import move as turn
-from airflock.core.maths import arc_cosine
+from airflock.core.maths import angle_between, arc_cosine
 from airflock.engine import cpu
 from airflock.engine.simulate import plan_of, score_flight
 from airflock.engine.tables import tables
@@ -20,6 +20,15 @@ from airflock.world import edges, rays
 def test_arc_cosine_is_the_library_s():
     x = np.linspace(-1.0, 1.0, 4001)
     assert max(abs(arc_cosine(c) - math.acos(c)) for c in x) < 3e-8
+
+
+def test_small_angles_between_directions_are_as_exact_as_large_ones(seed):
+    rng = np.random.default_rng(seed)
+    for angle in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.5, 1.0, 1.1, 2.0, 3.0, math.pi - 1e-7, math.pi):
+        a, b = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
+        found = angle_between(*a, *(math.cos(angle) * a + math.sin(angle) * b))
+        assert abs(found - angle) < 3e-8 * min(max(angle, 1e-8), 1.0) + 1e-15
+    assert angle_between(0.0, 0.0, 0.0, 1.0, 0.0, 0.0) == pytest.approx(0.5 * math.pi, abs=3e-8)
 
 
 def test_a_boid_sees_within_half_its_field_of_view_and_everybody_below_the_floor():

@@ -6,7 +6,7 @@ from typing import Any
 from airflock.core.agent import State, answer
 from airflock.core.contract import Model
 from airflock.core.maths import FAR
-from airflock.engine.plan import EDGES
+from airflock.engine.planning import EDGES
 from airflock.engine.tables import unbuilt
 from airflock.scenarios.scenario import Scenario
 from airflock.world import bvh, goals

@@ -1,6 +1,6 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 from airflock.body.registry import BODIES
 from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
-from airflock.core.parameters import choices
 from airflock.core.radio import Radio, forward
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.sensors.registry import SENSORS, USUAL
-from airflock.world import arena, edges, excursion, rays
-from airflock.world.place import obstacle_rule, raised
+from airflock.world import arena, edges, rays
 
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
@@ -339,72 +337,3 @@ class Plan:
     def records(self) -> dict[str, tuple[str, ...]]:
         """Columns of the parameter row, by record name, in order."""
         return dict(self.numbers)
-
-
-def arena_surfaces(world: arena.Parameters) -> tuple[tuple[Callable[..., Any], ...], Callable[..., float]]:
-    """Families of surfaces of an arena, and its excursion function; a periodic one has no walls to feel or to leave."""
-    if world.edges == "periodic":
-        return (), excursion.beyond_nothing
-    three = world.dimensions == "3"
-    caps = (arena.plane,) if three else ()
-    ground = {"square": (arena.plane,), "polygon": caps, "circle": (arena.cylinder,), "none": ()}[world.arena]
-    if world.arena == "square" and world.walls == "nearest_per_axis":
-        return (arena.slab,), excursion.beyond_box
-    beyond = {
-        "square": excursion.beyond_box,
-        "polygon": excursion.beyond_polygon,
-        "circle": excursion.beyond_cylinder,
-        "none": excursion.beyond_nothing,
-    }[world.arena]
-    if three and world.arena == "circle":
-        return (arena.cylinder, arena.plane), beyond
-    return ground, beyond
-
-
-def arena_ray(world: arena.Parameters) -> Callable[..., float]:
-    """Free distance along a direction to the arena's walls."""
-    return rays.to_nothing if world.edges == "periodic" else RAYS[world.arena]
-
-
-RAYS = {"square": rays.to_box, "polygon": rays.to_polygon, "circle": rays.to_cylinder, "none": rays.to_nothing}
-EDGES = {"open": None, "bounce": edges.bounce, "periodic": edges.wrap}
-
-
-def constants_of(
-    model: Model, parameters: Any, varied: tuple[tuple[str, str], ...]
-) -> tuple[tuple[str, str | float], ...]:
-    """Choices of a law, and its usual numbers where they are so and do not differ among agents."""
-    usual: dict[str, str | float] = {
-        name: number
-        for name, number in model.usual.items()
-        if getattr(parameters, name) == number and ("p", name) not in varied
-    }
-    return tuple(sorted((usual | choices(parameters)).items()))
-
-
-def make_plan(
-    model: Model,
-    parameters: Any,
-    metrics: tuple[Metric, ...],
-    world: arena.Parameters,
-    numbers: Mapping[str, tuple[str, ...]],
-    **options: Any,
-) -> Plan:
-    """Plan for a model with these parameters (only their choices matter) in this world; numbers: fields by letter."""
-    surfaces, beyond = arena_surfaces(world)
-    return Plan(
-        model=model,
-        model_choices=constants_of(model, parameters, options.get("varied", ())),
-        numbers=tuple(numbers.items()),
-        metrics=metrics,
-        surfaces=surfaces,
-        excursion=beyond,
-        ray=arena_ray(world),
-        edge=EDGES[world.edges],
-        dimensions=int(world.dimensions),
-        obstacles=bool(world.obstacles),
-        obstacle=obstacle_rule(world),
-        polygon=world.arena == "polygon" and world.edges != "periodic",
-        raised=raised(world),
-        **options,
-    )

@@ -13,7 +13,8 @@ from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure, needs
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Build, OwnLaw, Plan, constants_of, make_plan
+from airflock.engine.plan import Build, OwnLaw, Plan
+from airflock.engine.planning import constants_of, make_plan
 from airflock.engine.probe import probe, probe_fault, probe_radio, probe_sensor
 from airflock.engine.state import State
 from airflock.engine.tables import tables

@@ -71,7 +71,7 @@ def extents(scenario: Scenario) -> tuple[float, float, float]:
 
 
 def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
-    """Rows of the surface functions of `plan.arena_surfaces`, and how many belong to each family."""
+    """Rows of the surface functions of `planning.arena_surfaces`, and how many belong to each family."""
     world, three = scenario.world, scenario.dimensions == 3
     h, z = 0.5 * world.side, 0.5 * world.height
     low, high = heights_of(world)

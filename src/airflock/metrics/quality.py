@@ -8,7 +8,7 @@ body, yet compares the distance of two centres with it; so does the program, and
 import math
 from typing import NamedTuple
 
-from airflock.core.maths import arc_cosine, norm
+from airflock.core.maths import angle_between, norm
 
 REPORTS = {
     "extension_cm": ("cm", "mean distance to the centre"),
@@ -61,8 +61,8 @@ def offset_from(x, y, z, mean):
 
 def angle_from(hx, hy, hz, mean):
     """Angle (rad) between a heading and a mean heading (Eq. 16); a quarter turn where one of them is zero."""
-    along = (hx * mean.hx + hy * mean.hy + hz * mean.hz) / norm(mean.hx, mean.hy, mean.hz)
-    return arc_cosine(along)
+    f = 1.0 / norm(mean.hx, mean.hy, mean.hz)
+    return angle_between(hx, hy, hz, f * mean.hx, f * mean.hy, f * mean.hz)
 
 
 def agent(x, y, z, hx, hy, hz, pair, mean, q):
