@@ -161,7 +161,7 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
     """Standard deviations in declared units."""
     found, faults = {}, []
     for key, entry in given.items():
-        value = entry["value"] if isinstance(entry, Mapping) else entry
+        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
             faults.append(f"{where}.{key}: unknown number")
