@@ -461,6 +461,7 @@ def test_a_group_measures_by_numbers_of_its_own():
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
+        ([{"agents": float("inf")}], "groups.0..agents = inf is neither a list of agents nor a number of them"),
         ([{"agents": 101}], "is neither a list of agents nor a number of them up to 100"),
         ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
         ([{"agents": [100]}], "there is no agent 100"),
