@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import cpu
-from airflock.engine.simulate import driver_text, finish, fly, plan_of
+from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import FlightError, RuleError, ScenarioError
 from airflock.faults.registry import KINDS
 from airflock.recordings.flights import recording_of
 from airflock.recordings.scores import measure
 from airflock.scenarios.files import load, presets
+from inside import course, cpu
 
 SMALL = {"agents": 8, "duration": 6.0, "start.kind": "ball", "start.radius": 40.0}
 OPEN = {"world.arena": "none", "world.walls": "every_edge"}
@@ -264,7 +264,7 @@ def test_a_battery_lands_the_agent_when_it_is_empty():
 
 def test_faults_that_come_at_random_come_as_often_as_they_should():
     scenario = load(PAPER, {"agents": 20, "duration": 3600.0, "faults": [{"kind": "motor", "per_hour": 30.0}]})
-    from airflock.engine.onsets import onsets
+    from airflock.scenarios.onsets import onsets
 
     counts = [onsets(scenario, seed) for seed in range(60)]
     assert np.mean([len(found) for found in counts]) == pytest.approx(30.0, abs=4.0 * np.sqrt(30.0 / 60.0))
@@ -287,7 +287,7 @@ def test_any_cuts_and_any_way_to_say_it_give_the_same_bits():
             flight.advance(steps=steps)
         scores = flight.finish()
         assert flight.frames.tobytes() == closed.frames.tobytes()
-        assert repr(scores) == repr(finish(scenario, closed.values))
+        assert repr(scores) == repr(scenario.judged(closed.values))
     sensed = airflock.open(scenario, 3, record=True, device="python")
     while not sensed.over:
         sensed.sense().advance(steps=20)
@@ -435,7 +435,7 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
     plan = plan_of(scenario, precision=64, record=True, grid=False)
     from dataclasses import replace
 
-    from airflock.engine.tables import tables
+    from inside import tables
 
     numbers = tables(scenario, plan, 3)
     same = replace(numbers, own=np.full_like(numbers.own, base.body.tau))
@@ -563,7 +563,7 @@ def test_a_fault_that_has_waited_for_its_compiler_begins_when_it_is_taken_over(m
         waiting.append((Future(), job))
         return waiting[-1][0]
 
-    monkeypatch.setattr("airflock.engine.course.in_background", later)
+    monkeypatch.setattr(course, "in_background", later)
     flight = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.0)
     flight.fault("motor", [2], wait=False, share=0.0).fault("radio_silent", [1], wait=False).advance(0.5)
     assert flight.waiting and not flight.faults

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock import atomic
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.errors import AirflockError, StudioError
 from airflock.recordings.files import save
 from airflock.replays import replay
