@@ -63,7 +63,7 @@ class FleetPage:
             self.arrivals = panel.chart("packets per second and drone", ["heard here"])
         panel.command("Next drone", "S", lambda: self.ask(lambda: self.by(1)))
         self._course: deque[tuple[float, ...]] = deque(maxlen=KEPT)
-        self._counted = 0, clock()
+        self._counted: deque[tuple[float, int]] = deque(maxlen=round(2.0 * CHARTS))
         view.on_click(lambda origin, way: self.ask(lambda: self._clicked(np.asarray(origin), np.asarray(way))))
         self.frame(True)
 
@@ -149,9 +149,9 @@ class FleetPage:
         motion = np.array([peer.state[3:] for m in flying if (peer := observer.peers[m]).state]).reshape(-1, 3)
         speed = np.linalg.norm(motion, axis=1) if len(motion) else np.full(1, np.nan)
         gap = Pairs(places).nearest() if len(places) > 1 else np.nan
-        count, since = self._counted
-        rate = (observer.accepted - count) / max(now - since, 1e-6) / len(observer.card.members)
-        self._counted = observer.accepted, now
+        self._counted.append((now, observer.accepted))
+        since, before = self._counted[0]
+        rate = (observer.accepted - before) / len(observer.card.members) / (now - since) if now > since else np.nan
         self._course.append((now - observer.begun, speed.mean(), speed.min(), speed.max(), gap, rate))
         columns = np.array(self._course).T
         time_, mean, slowest, fastest, nearest, rates = (np.ascontiguousarray(column) for column in columns)
