@@ -151,6 +151,11 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     return measure(recording, settings)[1]
 
 
+def courses(scenario: Scenario) -> list[str]:
+    """Names of the order parameters that have a value at every instant of a flight: the columns of `over_time`."""
+    return [name for name, _, _ in columns(plan_of(scenario.alike()).metrics)]
+
+
 def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
     """Order parameters of a recording, and their course over time.
 
