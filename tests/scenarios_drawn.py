@@ -333,6 +333,10 @@ def radio(keys: dict[str, Any], rng: Random, length: float) -> None:
     if kind == "bursts":
         keys |= {"radio.outage_rate": rng.choice((0.0, 3.0)), "radio.outage_time": rng.choice((0.1, 1.0))}
         keys["radio.received_bad"] = rng.choice((0.0, 0.5))
+    if kind == "vision":
+        keys |= {"radio.field": rng.choice((2.0, 6.2)), "radio.field_up": rng.choice((1.0, 3.1))}
+        keys |= {"radio.missed": rng.choice((0.0, 0.4)), "radio.hold": rng.choice((0.0, 0.3))}
+        keys |= {"radio.range_sd": rng.choice((0.0, 0.2)), "radio.smoothing": rng.choice((0.001, 0.3))}
     if kind == "jitter":
         keys |= {"radio.jitter": rng.choice((0.0, 0.05, 0.3)), "radio.longest": rng.choice((0.0, 0.1, 2.0))}
 
