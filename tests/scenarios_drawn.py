@@ -2,8 +2,7 @@
 
 A draw is small, 2 to 6 agents for about a second, and often sits on an edge on purpose: agents on a lattice whose step
 is the range of the radio or of the law, at equal distances and equal speeds, beside boxes on the same lattice, so that
-spheres and rays touch what they pass. `drawn` takes any `random.Random`: that of Hypothesis, which can then shrink it,
-or a seeded one.
+spheres and rays touch what they pass. `drawn` takes any `random.Random`; a seeded one draws the same in every process.
 """
 
 from itertools import combinations, product

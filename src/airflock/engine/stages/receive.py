@@ -125,9 +125,9 @@ def shade(
         o = vector()
         for a in range(plan.dimensions):
             o[a] = offset(i, j, a, w, flock, plan=plan)
-        apart2 = sum(o[a] * o[a] for a in range(plan.dimensions)) + TINY
+        apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
         if (apart2 <= range2) & (integer(j) != integer(i)):
-            r = math.sqrt(apart2)
+            r = math.sqrt(apart2 + TINY)
             ux = o[X] / r
             uy = o[Y] / r
             uz = o[Z] / r
