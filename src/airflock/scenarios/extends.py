@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
+from airflock.core.vectors import overruled
 from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
@@ -55,7 +56,7 @@ def _section(key: str, base: Any, own: Any) -> Any:
         return own
     other = key in KINDS and "kind" in own and _plain(own["kind"]) != _plain(base.get("kind"))
     kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
-    return {**kept, **own}
+    return {**overruled(kept, own), **own}
 
 
 def _plain(value: Any) -> Any:
