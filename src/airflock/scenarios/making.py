@@ -22,6 +22,7 @@ from airflock.scenarios import (
     faulty,
     formats,
     geometry,
+    group_keys,
     group_laws,
     groups,
     places,
@@ -75,11 +76,12 @@ def make(
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
+    document, settings, in_groups = group_keys.with_groups(document, settings or {})
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
     document, left_out = _with_kinds(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
-    faults += more
+    faults += in_groups + more
     found = law
     if found is None and not more:
         try:
