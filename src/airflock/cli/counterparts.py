@@ -196,5 +196,5 @@ COUNTERPARTS: dict[str, Counterpart] = {
 LIBRARY = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor",
-    "check_radio", "quantity", "choice",
+    "check_radio", "check_topology", "quantity", "choice",
 )  # fmt: skip
