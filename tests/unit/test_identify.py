@@ -112,6 +112,39 @@ def test_the_error_of_navigation_comes_back_from_drones_that_stand():
     assert "stand still" in short.refused["noise"]
 
 
+def differences_loss(q, u, h, noise, damping, scale, white, grain):
+    """Negative log-likelihood of what does not depend on the place: differences of positions, and velocities."""
+    spring = np.sqrt(2.0 * damping * noise) / scale
+    step = np.array([[1.0 - h * h * spring, h * (1.0 - damping * h)], [-h * spring, 1.0 - damping * h]])
+    push = 2.0 * damping * h * noise * np.array([[h * h, h], [h, 1.0]])
+    n, p = len(q), np.diag([scale * np.sqrt(noise / (2.0 * damping)), noise])
+    blocks = np.zeros((n, n, 2, 2))
+    for k in range(n):
+        blocks[k, k], later = p, p
+        for j in range(k + 1, n):
+            later = step @ later
+            blocks[j, k], blocks[k, j] = later, later.T
+        p = step @ p @ step.T + push
+    covariance = blocks.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    covariance += np.diag(np.tile([grain**2, white**2 + 1e-12], n))
+    contrasts = np.zeros((2 * n - 1, 2 * n))
+    for k in range(n - 1):
+        contrasts[k, [2 * k, 2 * k + 2]] = -1.0, 1.0
+    contrasts[np.arange(n - 1, 2 * n - 1), 2 * np.arange(n) + 1] = 1.0
+    y, c = contrasts @ np.stack([q, u], axis=1).ravel(), contrasts @ covariance @ contrasts.T
+    return 0.5 * np.linalg.slogdet(c)[1] + 0.5 * y @ np.linalg.solve(c, y)
+
+
+def test_where_a_drone_stands_says_nothing_of_its_sensor():
+    g = np.random.default_rng(3)
+    q, u = 7.0 + np.cumsum(g.normal(0.0, 0.02, 40)), g.normal(0.0, 0.1, 40)
+    first = np.arange(40) == 0
+    here, there = (0.004, 0.1, 3.0, 0.05), (0.02, 0.2, 2.0, 0.1)
+    ours = [standing._kernel()(q, u, first, 0.2, *numbers, 0.01) for numbers in (here, there)]
+    truth = [differences_loss(q, u, 0.2, *numbers, 0.01) for numbers in (here, there)]
+    assert ours[0] - ours[1] == pytest.approx(truth[0] - truth[1], abs=1e-3)
+
+
 def heard_by(k, count=60_000, delay=0.4, jitter=0.02, seed=2, drones=6):
     """Packets by the reception law itself, with clocks that differ by seconds."""
     g = np.random.default_rng(seed)
