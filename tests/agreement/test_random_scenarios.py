@@ -1,6 +1,7 @@
 """Any valid scenario flies the same by the text of its driver, interpreted, and by the reference.
 
-Forty draws here; `.ci/nightly random-scenarios` flies 5,000 and counts that they hold everything.
+Forty draws here, the same ones whatever else changes; `.ci/nightly random-scenarios` flies 5,000 and counts that they
+hold everything.
 """
 
 import warnings
@@ -8,9 +9,6 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import seed as seeded
-from hypothesis import strategies as st
 
 from against_reference import compared
 from flocks import ISLANDS, interpreted, scenario
@@ -18,11 +16,9 @@ from reference.flight import fly_plainly
 from scenarios_drawn import drawn, missing, notions
 
 
-@seeded(2018)
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), database=None)
-@given(st.randoms(use_true_random=False))
-def test_any_valid_scenario_flies_as_the_reference_does(rng):
-    draw = drawn(rng)
+@pytest.mark.parametrize("number", range(201800, 201840))
+def test_any_valid_scenario_flies_as_the_reference_does(number):
+    draw = drawn(Random(number))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         verdict = compared(draw)

@@ -68,6 +68,19 @@ def test_a_neighbour_at_exactly_the_edge_counts(perception, edges, limit, seed):
             assert flight(found, seed, start).frames[0, 4].tolist() == met
 
 
+@pytest.mark.parametrize("wall", [0.0, 200.0])
+def test_what_stands_between_shades_at_exactly_the_range_too(wall, seed):
+    """Two agents 7 m apart, a block between them: without loss in the walls both are heard, with it neither is."""
+    radio = {"radio.kind": "shadow", "radio.near": 20.0, "radio.far": 21.0, "radio.received_near": 1.0}
+    keys = radio | {"radio.wall": wall, "radio.range": 7.0, "radio.delay": 0.0, "sensors.noise": 0.0}
+    keys |= {"agents": 2, "duration": 0.1, "body.kind": "direct", "world.side": 100.0, "start.separation": 0.0}
+    keys["world.obstacles"] = [[[-1.0, -2.0], [1.0, -2.0], [1.0, 2.0], [-1.0, 2.0]]]
+    start = np.array([[-3.5, 3.5], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    found = make({"model": {"kind": "counting"}}, "test", keys, law=counting(False))
+    for flight in (interpreted, fly_plainly):
+        assert flight(found, seed, start).frames[0, 4].tolist() == ([1.0, 1.0] if wall == 0.0 else [0.0, 0.0])
+
+
 def test_two_equally_near_neighbours_weigh_the_same(seed):
     """A flock that is its own mirror image stays so: no neighbour wins by its number."""
     found = load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 5.0, "sensors.noise": 0.0, "body.noise": 0.0})

@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine.cpu import measure_frames
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import measure_frames
 from airflock.scenarios.files import load
 
 MAX_E = 2.25  # half the diagonal of the pond, m
@@ -18,10 +16,9 @@ def measured(positions, headings, **settings):
     positions, headings = np.asarray(positions, float), np.asarray(headings, float)
     keys = {"metrics.kind": "groups", "metrics.r_cluster": 0.5, "agents": len(positions), **settings}
     found = load("zapotecatl_2016/literal", keys)
-    plan = plan_of(found, precision=64, grid=False)
     frames = np.concatenate([positions.T, headings.T])[None]
     device = "python" if len(positions) <= 40 else "cpu"  # interpreted, but for large flocks
-    return measure_frames(plan, tables(found, plan, 0), frames, device=device)[0]
+    return measure_frames(found, frames, 0.0, device=device)[0]
 
 
 def lattice(side=3, step=0.2):
@@ -189,3 +186,25 @@ def test_volume_and_area_of_a_filled_ellipsoid(seed):
     assert found["volume"] == pytest.approx(4 / 3 * math.pi * 0.8 * 0.4 * 0.3, rel=0.03)
     assert found["area"] == pytest.approx(math.pi * 0.8 * 0.4, rel=0.03)
     assert found["elongation"] == pytest.approx(2.0, rel=0.03)
+
+
+@pytest.mark.parametrize("n", [2, 3, 7])
+def test_agents_on_one_plane_have_no_volume_and_on_one_line_no_area(n, seed):
+    """However they lie in space: rounding gives a plane no depth (its root would be some 1e-8 of the size cubed)."""
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        across, along = rng.normal(size=(2, 3))
+        on_line = 10.0 * rng.normal(size=3) + rng.normal(size=(n, 1)) * along
+        on_plane = on_line + rng.normal(size=(n, 1)) * across
+        assert measured(on_plane, alike(n), **{"metrics.kind": "order"})["volume"] == 0.0
+        found = measured(on_line, alike(n), **{"metrics.kind": "order"})
+        assert found["volume"] == found["area"] == 0.0
+        assert found["elongation"] == pytest.approx(math.sqrt(2e12), rel=1e-6)
+
+
+def test_elongation_of_a_nearly_round_group_is_exact():
+    """Half axes 1 + 1e-9 and 1: a difference of large numbers would lose it."""
+    angle = np.arange(12) * math.pi / 6
+    ring = np.stack([(1.0 + 1e-9) * np.cos(angle), np.sin(angle), 0.0 * angle], 1)
+    found = measured(ring, alike(12), **{"metrics.kind": "order"})
+    assert found["elongation"] - 1.0 == pytest.approx(1e-9, rel=1e-5)

@@ -1,10 +1,14 @@
 """Area and shape of a group: the ellipse, or in space the ellipsoid, whose uniform filling has the same second moments.
 
 A uniform ellipse of half axes a, b has the variances a²/4, b²/4; a uniform ellipsoid a²/5, b²/5, c²/5.
+Agents on one line have no area, agents on one plane no volume, and rounding does not give them one: a determinant of
+moments below `FLAT` of the product of its diagonal, which bounds it (Hadamard), counts as 0.
 """
 
 import math
 from typing import NamedTuple
+
+FLAT = 1e-13  # some hundred times the rounding of a determinant of three rows
 
 REPORTS = {
     "area": ("m²", "area of the ground plan"),
@@ -48,11 +52,14 @@ def sample(agents, n, dimensions):
     d = agents.xy / n
     e = agents.yz / n
     f = agents.zx / n
-    flat = max(a * b - d * d, 0.0)
+    flat = a * b - d * d
+    flat = flat if flat > FLAT * a * b else 0.0
     half = 0.5 * (a + b)
-    spread = math.sqrt(max(half * half - flat, 0.0))
-    elongation = math.sqrt((half + spread) / max(half - spread, 1e-12 * half + 1e-30))
-    full = max(a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f), 0.0)
+    tilt = 0.5 * (a - b)
+    long = half + math.sqrt(tilt * tilt + d * d)
+    elongation = math.sqrt(long / max(flat / max(long, 1e-30), 1e-12 * half + 1e-30))
+    full = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)
+    full = full if full > FLAT * a * b * c else 0.0
     scale = 20.0 / 3.0 * math.sqrt(5.0) * math.pi  # 4/3 pi 5^(3/2)
     area = math.pi * (4.0 if dimensions < 2.5 else 5.0) * math.sqrt(flat)
     return Sample(area, elongation, scale * math.sqrt(full) if dimensions > 2.5 else 0.0)
