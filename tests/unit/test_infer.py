@@ -10,7 +10,7 @@ import xarray as xr
 
 import airflock
 from airflock.errors import AirflockError, RecordingError
-from airflock.infer import bootstrap, candidates, search
+from airflock.infer import bootstrap, candidates, search, select
 from airflock.infer.found import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
@@ -61,7 +61,7 @@ def brief(monkeypatch):
     """Little searching: enough for two laws of a few numbers."""
     for module, name, value in (
         (search, "DRAWN", 5), (search, "RACE", ((4, 3), (2, 5))), (search, "SWEEPS", 0), (bootstrap, "ROUNDS", (2, 5)),
-        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)),
+        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 
