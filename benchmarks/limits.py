@@ -9,6 +9,8 @@ the safest best. Two flights a candidate, as in `airflock tune`; the mean of the
 
 import argparse
 import warnings
+from contextlib import chdir
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from cma.constraints_handler import AugmentedLagrangian
@@ -77,4 +79,5 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    with TemporaryDirectory() as folder, chdir(folder):  # pycma keeps logs of its multipliers where it runs
+        main()
