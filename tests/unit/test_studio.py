@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import airflock
 from airflock.core.contract import model
 from airflock.core.parameters import Quantity, declarations, quantity
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.errors import ParameterError, RuleError, ScenarioError, StudioError
 from airflock.evolve.bounds import studied
 from airflock.evolve.study import load_study
@@ -642,9 +642,9 @@ def test_a_fault_is_an_event_and_back_takes_it_away(interpreted, player):
 
 
 def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):
-    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: flight.device == "python"))
+    monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: flight.device == "python"))
     compiled, go = Flight.compile, threading.Event()
-    monkeypatch.setattr("airflock.engine.flight.Flight.compile", lambda flight: go.wait() and compiled(flight))
+    monkeypatch.setattr("airflock.engine.Flight.compile", lambda flight: go.wait() and compiled(flight))
     player = Player(PRESET, FEW, 3, at_once=True)
     player.start()
     assert player.compiling and "compiling" in player.status and player.flight.device == "python"
@@ -673,8 +673,8 @@ def test_what_the_compiler_refuses_stops_a_flight_that_has_begun(monkeypatch):
     def refuse(flight):
         raise RuleError("model m: a rule does not compile")
 
-    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: False))
-    monkeypatch.setattr("airflock.engine.flight.Flight.compile", refuse)
+    monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: False))
+    monkeypatch.setattr("airflock.engine.Flight.compile", refuse)
     player = Player(PRESET, {"agents": 3}, 3, at_once=True)
     player.start()
     while not player.failure:

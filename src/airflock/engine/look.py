@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from airflock.core import agent as one
@@ -11,43 +11,15 @@ from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.contract import Model
 from airflock.core.maths import norm
-from airflock.core.pilot import carried
+from airflock.core.pilot import carried, lasts
 from airflock.core.topology import met_of
+from airflock.core.view import View
 from airflock.engine.beginnings import NEVER
-from airflock.engine.place import Place
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Place
 from airflock.scenarios.timing import clock
 from airflock.world import edges
-
-
-@dataclass(frozen=True)
-class View:
-    """What one agent perceived at a decision, and what came of it.
-
-    agent, time : its number; time of the decision, s
-    true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
-    heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
-    met         : of each of them, in the same order, whether the topology lets it meet that one
-    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
-    alike       : of each of them what the rule would have made of it, had it flown as the agent does
-    sums, walls : what the law was given of all neighbours, and of all surfaces
-    memory      : the law's memory after the decision
-    command     : in the unit of the law's command
-    """
-
-    agent: int
-    time: float
-    true: Motion
-    own: Motion
-    heard: tuple[Heard, ...]
-    met: tuple[bool, ...]
-    terms: tuple[Any, ...]
-    alike: tuple[Any, ...]
-    sums: Any
-    walls: Any
-    memory: Any
-    command: tuple[float, ...]
 
 
 def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, world: int) -> View:
@@ -149,7 +121,8 @@ def _heard(
             packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
-            if stamp <= NEVER / 10.0 or not (plan.radio.keeps or silence.counts(age, scenario.silent_by())):
+            counts = lasts(plan.radio, k, age) if plan.radio.keeps else silence.counts(age, scenario.silent_by())
+            if stamp <= NEVER / 10.0 or not counts:
                 continue
             sent = Motion(*packet[:axes], *flat, *packet[axes : 2 * axes], *flat)
             yield Heard(j, carried(plan.radio, k, sent, age), age, fade, groups[j])

@@ -59,7 +59,7 @@ class Build:
 class Plan:
     """Compile-time side of a flight: what the scenario says, and how it is built.
 
-    It is made by `engine.simulate.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
+    It is made by `engine.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
 
     build     : how it is built; bits, record, given_start and grid read it
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
@@ -216,8 +216,13 @@ class Plan:
 
     @property
     def told(self) -> bool:
-        """Whether what others hear of an agent is not the truth: it has rows of its own."""
-        return self.late or bool(self.suffers("sense", "tell"))
+        """Whether what others know of an agent is not the truth of this moment: it has rows of its own."""
+        return self.late or self.sees or bool(self.suffers("sense", "tell"))
+
+    @property
+    def sees(self) -> bool:
+        """Whether agents see each other: then nobody is told anything, and what is kept for others is the truth."""
+        return self.radio.see is not None
 
     @property
     def perturbed(self) -> bool:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock import atomic
-from airflock.engine.flight import Flight
-from airflock.engine.moments import Snapshot
+from airflock.engine import Flight, Snapshot
 from airflock.errors import AirflockError, StudioError
 from airflock.recordings.files import save
 from airflock.replays import replay

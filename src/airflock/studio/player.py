@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
-from airflock.engine.moments import Snapshot
+from airflock.engine import Snapshot
 from airflock.errors import AirflockError
 from airflock.studio.asked import Asked
 from airflock.studio.flights import Flights
