@@ -333,6 +333,10 @@ def radio(keys: dict[str, Any], rng: Random, length: float) -> None:
     if kind == "bursts":
         keys |= {"radio.outage_rate": rng.choice((0.0, 3.0)), "radio.outage_time": rng.choice((0.1, 1.0))}
         keys["radio.received_bad"] = rng.choice((0.0, 0.5))
+    if kind == "vision":
+        keys |= {"radio.field": rng.choice((2.0, 6.2)), "radio.field_up": rng.choice((1.0, 3.1))}
+        keys |= {"radio.missed": rng.choice((0.0, 0.4)), "radio.hold": rng.choice((0.0, 0.3))}
+        keys |= {"radio.range_sd": rng.choice((0.0, 0.2)), "radio.smoothing": rng.choice((0.001, 0.3))}
     if kind == "jitter":
         keys |= {"radio.jitter": rng.choice((0.0, 0.05, 0.3)), "radio.longest": rng.choice((0.0, 0.1, 2.0))}
 
@@ -386,7 +390,7 @@ def lattice(keys: dict[str, Any], rng: Random, length: float, speed: float, reac
     keys[f"model.{reach}"] = step * rng.choice((1.0, many))
     three = keys["world.dimensions"] == "3"
     places = [(x, y, z) for x in range(-2, 3) for y in range(-2, 3) for z in (range(3) if three else (0,))]
-    if keys["world.edges"] == "bounce":  # from given places agents start inside
+    if keys["world.edges"] != "open":  # from given places agents start inside
         keys |= {"world.side": 8.0 * step, "world.height": 8.0 * step}
     chosen = np.array(rng.sample(places, keys["agents"]), float).T * step
     along = np.array([[speed], [0.0], [0.0]]) * np.ones(keys["agents"])

@@ -270,6 +270,8 @@ def vocabulary() -> None:
         "missed_few": "of a radio: the same, where few packets are sent in a decision",
         "receive": "of a radio: 1 if a packet arrives, else 0, and its Packet where it has one",
         "late": "of a radio: how much later than the delay a packet comes, s",
+        "see": "of a radio: offset (m) and velocity (m/s) of a neighbour that is seen, after a picture of it",
+        "lasts": "of a radio: 1.0 while the newest packet counts, by its age",
         "carry": "of a radio: where the sender of the newest packet is believed to be now, m",
         "move": "of a body: returns the velocity after a step",
         "pair": "of an order parameter: asked for each pair of agents",

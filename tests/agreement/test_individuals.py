@@ -461,6 +461,7 @@ def test_a_group_measures_by_numbers_of_its_own():
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
+        ([{"agents": float("inf")}], "groups.0..agents = inf is neither a list of agents nor a number of them"),
         ([{"agents": 101}], "is neither a list of agents nor a number of them up to 100"),
         ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
         ([{"agents": [100]}], "there is no agent 100"),
@@ -468,6 +469,10 @@ def test_a_group_measures_by_numbers_of_its_own():
         ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
         ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
         ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
+        (
+            [{"model": {"p_rep": {"spread": {"low": 0.1}}}}],
+            r"p_rep.spread = \{.low.: 0.1\} is not a standard deviation",
+        ),
         ([{"body": {"kind": "direct"}}], "one body carries all; only numbers differ from group to group"),
         ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
         ([{"sensors": {"period": 1.0}}], "all measure and decide at the same times"),

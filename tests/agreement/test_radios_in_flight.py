@@ -23,6 +23,7 @@ NUMBERS = {
     "table": {"radio.spacing": 4.0}, "congestion": {"radio.airtime": 0.02},
     "shadow": {"radio.near": 5.0, "radio.far": 25.0, "world.obstacles": ISLANDS},
     "bursts": {"radio.outage_rate": 1.0, "radio.outage_time": 0.5}, "jitter": {"radio.jitter": 0.2},
+    "vision": {"radio.field": 4.0, "radio.hold": 1.0, "world.obstacles": ISLANDS},
 }  # fmt: skip
 PAGE = Path(__file__).parents[2] / "docs" / "radios.md"
 
@@ -142,9 +143,9 @@ def test_a_radio_that_may_send_once_a_second_is_heard_once_a_second(tmp_path):
 @pytest.mark.parametrize(
     ("rules", "said"),
     [
-        ({}, "radio mine has no rule; give missed or receive, late, carry"),
+        ({}, "radio mine has no rule; give missed or receive, late, see, carry, lasts"),
         ({"missed": waits, "receive": waits}, "asks for 'u1'"),
-        ({"carry": half}, "radio mine has only carry; give missed, receive or late as well"),
+        ({"carry": half}, "radio mine has only carry; give missed, receive, late or see as well"),
         ({"receive": everything}, "that asks for packet and a NamedTuple Packet come together"),
         ({"late": waits, "RATES": ("rate",)}, r"RATES = \('rate',\) are not at most two numbers of Parameters"),
     ],

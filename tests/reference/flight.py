@@ -181,8 +181,9 @@ def states(flock: Sequence[Agent], who: Sequence[int] | None = None) -> list[Sta
 
 
 def told_of(scenario: Scenario, flock: Sequence[Agent]) -> list[State]:
-    """What agents send: the true state, or that with the errors of the last measurement."""
-    return states(flock) if scenario.sensor.measure is None else [plus(agent.state, agent.own) for agent in flock]
+    """What others come to know: the true state, or that with the errors of the last measurement; seen it is true."""
+    plain = scenario.sensor.measure is None or scenario.transceiver.see is not None
+    return states(flock) if plain else [plus(agent.state, agent.own) for agent in flock]
 
 
 def components(flock: Sequence[Agent], dims: int) -> NDArray[np.float64]:
@@ -213,13 +214,15 @@ def decisions(
     times, dt, (place, course) = clock(scenario), scenario.flight.dt, world
     sent = (number * times["decide_every"] - times["delay"]) * dt
     said = [
-        misled(agent, ("sense", "tell"), sent, plus(state, agent.sent), scenario.dimensions)
+        state
+        if scenario.transceiver.see is not None
+        else misled(agent, ("sense", "tell"), sent, plus(state, agent.sent), scenario.dimensions)
         for state, agent in zip(past, flock, strict=True)
     ]
     for i in [k for k, agent in enumerate(flock) if agent.present] if turn is None else turn:
         agent, pilot = flock[i], flock[i].pilot
         own = misled(agent, ("sense",), time, plus(agent.state, agent.own), scenario.dimensions)
-        near = hear(scenario, seed, number, i, flock, said, time, place)
+        near = hear(scenario, seed, number, i, flock, said, time, place, own)
         made = pilot.decide(
             own, time + ahead(agent, time), goal=course.of(i), time=time, only=near,
             shared=shared[i] if shared else None, fades=fading(scenario, seed, number, i, len(flock)),
@@ -279,8 +282,9 @@ def swing(rule: Any, error: State, g: Vector, period: float, s: Any) -> State:
 
 
 def hear(
-    scenario: Scenario, seed: int, number: int, i: int, flock: list[Agent], said: list[State], time: float, place: Place
-) -> set[int]:
+    scenario: Scenario, seed: int, number: int, i: int, flock: list[Agent], said: list[State], time: float,
+    place: Place, own_believed: State,
+) -> set[int]:  # fmt: skip
     """Hand the pilot of agent i the packets that arrive at decision `number`; returns who is in range, truly."""
     k, late, found = scenario.radio, clock(scenario)["delay"] * scenario.flight.dt, set()
     for j, other in enumerate(flock):
@@ -290,20 +294,47 @@ def hear(
         distance = norm(true.x - own.x, true.y - own.y, true.z - own.z)
         in_range = distance <= norm(min(k.range, LIMIT), 0.0, 0.0)  # at exactly the range it is heard
         reach = min(k.range, LIMIT)
-        carries = distance <= norm(min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]), 0.0, 0.0)
-        carries = carries and min(radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]) >= 0.0
+        into, out = radio_of(flock[i], time, reach)[1], radio_of(other, time, reach)[0]
+        far = into if scenario.transceiver.see is not None else min(into, out)  # who is seen need not send
+        carries = distance <= norm(far, 0.0, 0.0) and far >= 0.0
         mine, theirs = ahead(flock[i], time), ahead(other, time)
         if in_range:
             found.add(j)
         link = flock[i].links.setdefault(j, Link())
         if in_range and carries and arrives(scenario, seed, number, place, i, j, flock, link, time + mine):
             wait = lateness(scenario, seed, number, place, i, j, flock)
+            if scenario.transceiver.see is not None:
+                seen = glimpsed(scenario, seed, number, place, i, j, flock, said, own_believed, time + mine - late)
+                link.way = time, seen, time - late + mine
             if link.way is None:  # one packet at a time is under way
                 link.way = time + wait, said[j], time - late + theirs
         if link.way is not None and link.way[0] <= time + 0.5 * scenario.flight.dt:
             flock[i].pilot.hear(j, link.way[1], link.way[2], time + mine)
             link.way = None
     return found
+
+
+def glimpsed(
+    scenario: Scenario, seed: int, number: int, place: Place, i: int, j: int, flock: list[Agent], said: list[State],
+    own: State, taken: float,
+) -> State:  # fmt: skip
+    """Where agent i believes agent j by a picture that was taken so long after the start by its clock, s."""
+    state, kind, pair = flock[i].state, scenario.transceiver, i * len(flock) + j
+    here = place.image(*(a - b for a, b in zip(state[:3], said[i][:3], strict=True)))
+    base = [a - b for a, b in zip(own[:3], here, strict=True)]
+    off = place.image(*(a - b for a, b in zip(said[j][:3], said[i][:3], strict=True)))
+    known = flock[i].pilot.packets.get(j)
+    before, since = (known.state, taken - known.sent_at) if known else (State(*ZERO, *ZERO), taken + 1e9)
+    expected = place.image(*(x + v * since - b for x, v, b in zip(before[:3], before[3:], base, strict=True)))
+    chances = [random.uniform(word) for word in random.words(seed, random.AIR, 0, number, pair)]
+    given = dict(zip(("dx", "dy", "dz", "ex", "ey", "ez"), (*off, *expected), strict=True))
+    given |= dict(zip(("evx", "evy", "evz", "vx", "vy", "vz"), (*before[3:], *own[3:]), strict=True))
+    given |= {f"u{c}": u for c, u in enumerate(chances)}
+    given |= {f"g{c}": g for c, g in enumerate(normals(seed, random.AIR, number, pair, draw=1))}
+    period = clock(scenario)["decide_every"] * scenario.flight.dt
+    found = answer(kind.see, "see", given | {"since": since, "period": period, "k": scenario.radio}, kind.name)
+    flat = {} if scenario.dimensions == 3 else {"z": 0.0, "vz": 0.0}
+    return State(*(a + b for a, b in zip(base, found[:3], strict=True)), *found[3:])._replace(**flat)
 
 
 def asked_of_radio(
@@ -322,7 +353,8 @@ def asked_of_radio(
         for link, rate in zip(("fast", "slow"), scenario.transceiver.rates, strict=False)
     }
     return sent | {
-        "distance": apart[j], "dx": true.x - own.x, "dy": true.y - own.y, "dz": true.z - own.z,
+        "distance": apart[j], "vx": own.vx, "vy": own.vy, "vz": own.vz,
+        "dx": true.x - own.x, "dy": true.y - own.y, "dz": true.z - own.z,
         "talkers": float(sum(apart[k] <= reach for k in there if k != i)),
         "clear": 0.0 if place.blocked(*own[:3], *true[:3]) else 1.0, "step": float(number), "period": period,
         **{f"u{c}": u for c, u in enumerate(chances)},

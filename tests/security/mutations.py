@@ -364,6 +364,7 @@ def commanded(words, folder, tell=False):
     from airflock.cli.main import main
 
     os.chdir(folder)
+    os.environ["AIRFLOCK_CACHE"] = str(folder / "cache")  # `doctor --clear-cache` is a command, too
     no_flights()
     out, err = io.StringIO(), io.StringIO()
     sys.argv = ["airflock", *words]

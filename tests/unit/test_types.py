@@ -104,6 +104,7 @@ def test_every_word_of_the_vocabulary_has_a_type():
         beside = {"limits": ["move"], "exact": ["measure"], "bounds": ["measure"]}
         beside |= dict.fromkeys(("decide", "meet", "move", "sample", "measure", "error", *FAULT), [])
         beside |= {"missed": [], "receive": [], "late": [], "missed_few": ["missed"], "carry": ["late"]}
+        beside |= {"see": [], "lasts": ["see"]}
         text += "".join(f"def {name}(): pass\n" for name in beside.get(kind, ["decide", "sample"]))
         (rule,) = [
             node

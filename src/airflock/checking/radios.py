@@ -19,8 +19,8 @@ from airflock.scenarios import checks
 TRIES = 60  # random pairs that each truth is tried on
 CLOSE = 1e-9
 SHIFT = {"x": 1234.0, "y": -567.0, "z": 89.0}  # m
-LENGTHS, TIMES = ("distance", "dx", "dy", "dz", "x", "y", "z"), ("age", "period")
-SPEEDS = ("vx", "vy", "vz")
+LENGTHS, TIMES = ("distance", "dx", "dy", "dz", "ex", "ey", "ez", "x", "y", "z"), ("age", "since", "period")
+SPEEDS = ("vx", "vy", "vz", "evx", "evy", "evz")
 
 
 def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: int = 0) -> Report:
@@ -85,7 +85,11 @@ def _pairs(found: Radio, seed: int) -> Iterator[dict[str, Any]]:
         given |= dict(zip(("x", "y", "z"), (50.0 * rng.normal(size=3)).tolist(), strict=True))
         given |= {"distance": math.hypot(*offset), "clear": float(number % 2), "talkers": float(rng.integers(1, 50))}
         given |= {"step": float(number), "period": 0.2, "fast": int(rng.integers(0, 4)), "slow": number % 3}
-        given |= {"age": float(rng.uniform(0.0, 5.0)), "packet": found.Packet() if found.Packet is not None else None}
+        given |= {
+            "age": float(rng.uniform(0.0, 5.0)),
+            "since": float(rng.uniform(0.1, 5.0)),
+            "packet": found.Packet() if found.Packet is not None else None,
+        }
         yield given
 
 
@@ -103,10 +107,10 @@ def _kinds(found: Radio, *kinds: str) -> list[str]:
 
 def _chances(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
     for number, given in enumerate(pairs):
-        for kind in _kinds(found, "missed", "missed_few", "receive", "late"):
+        for kind in _kinds(found, "missed", "missed_few", "receive", "late", "lasts"):
             value = _asked(found, kind, given, k)[0]
             most = math.inf if kind == "late" else 1.0 + CLOSE
-            if not -CLOSE <= value <= most or (kind == "receive" and value not in (0.0, 1.0)):
+            if not -CLOSE <= value <= most or (kind in ("receive", "lasts") and value not in (0.0, 1.0)):
                 return f"pair {number} of seed {seed}: {kind} gives {value:.6g} over {given['distance']:.4g} m"
     return ""
 
@@ -138,14 +142,20 @@ def _units(found: Radio, k: Any, pairs: list[dict[str, Any]], seed: int) -> str:
     for units in OTHERS:
         other = rescaled(k, units)
         for number, given in enumerate(pairs):
-            for kind in _kinds(found, "missed", "missed_few", "receive", "late", "carry"):
-                size = {"late": units.second, "carry": units.metre}.get(kind, 1.0)
+            for kind in _kinds(found, *RULES):
+                sizes = {"late": [units.second], "carry": [units.metre] * 3, "see": _of_state(units)}.get(kind, [1.0])
                 one, two = _asked(found, kind, given, k), _asked(found, kind, _scaled(given, units), other)
-                pair = (one, two) if kind in ("late", "carry") else (one[:1], two[:1])
-                if any(abs(b / size - a) > CLOSE * max(abs(a), 1.0) for a, b in zip(*pair, strict=True)):
-                    told = f"pair {number} of seed {seed}: {kind} is {two[0] / size:.6g} instead of {one[0]:.6g}"
+                both = [(a, b / size) for a, b, size in zip(one, two, sizes, strict=False)]
+                off = [(a, b) for a, b in both if abs(b - a) > CLOSE * max(abs(a), 1.0)]
+                if off:
+                    told = f"pair {number} of seed {seed}: {kind} is {off[0][1]:.6g} instead of {off[0][0]:.6g}"
                     return f"{told}: a unit is declared wrong, or a number with a unit stands in the rule"
     return ""
+
+
+def _of_state(units: Units) -> list[float]:
+    """What a position and a velocity are measured in."""
+    return [units.metre] * 3 + [units.metre / units.second] * 3
 
 
 def _scaled(given: Mapping[str, Any], units: Units) -> dict[str, Any]:

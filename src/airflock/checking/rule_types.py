@@ -4,7 +4,7 @@ LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
 MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
 SENSOR = ("measure", "error", "exact", "bounds")
-RADIO = ("missed", "missed_few", "receive", "late", "carry")
+RADIO = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
 FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
 COLUMNS = "MutableSequence[float]"
 
@@ -57,7 +57,7 @@ RESULTS = {
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
     "radio": "tuple[float, float]", "measure": STATE, "error": "tuple[float, float]", "exact": "bool",
     "bounds": "list[str]", "missed": "float", "missed_few": "float", "receive": "float", "late": "float",
-    "carry": VECTOR,
+    "see": STATE, "carry": VECTOR, "lasts": "float",
 }  # fmt: skip
 
 
@@ -74,7 +74,7 @@ def kinds_of(functions: set[str]) -> dict[str, str]:
         kinds |= {"meet": "meet"}
     if not kinds and functions & {"measure", "error"}:
         kinds = {name: name for name in SENSOR}
-    if not kinds and functions & {"missed", "receive", "late"}:
+    if not kinds and functions & {"missed", "receive", "late", "see"}:
         kinds = {name: name for name in RADIO}
     if not kinds:  # elsewhere these are names of helpers
         kinds = {name: name for name in FAULT}

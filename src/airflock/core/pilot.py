@@ -102,6 +102,11 @@ def carried(radio: Radio, k: Any, state: State, age: float) -> State:
     return state._replace(x=x, y=y, z=z)
 
 
+def lasts(radio: Radio, k: Any, age: float) -> bool:
+    """Whether the newest packet, of this age (s), counts by a radio's rule."""
+    return radio.lasts is None or bool(answer(radio.lasts, "lasts", {"age": age, "k": k}, radio.name) > 0.5)
+
+
 class Senses(Percept):
     """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
 
@@ -225,6 +230,8 @@ class Pilot:
             age = now - packet.sent_at
             over = rule.once and (self.silence is not None or packet.came < self.decisions)  # by silence: `counts`
             told = age <= rule.forget and not over
+            if rule.radio is not None and not lasts(rule.radio, rule.k, age):
+                continue
             if told or (self.silence is not None and counts(age, self.silence) > 0.5):
                 state = packet.carried(now) if rule.extrapolate else packet.state
                 state = state if rule.radio is None else carried(rule.radio, rule.k, state, age)

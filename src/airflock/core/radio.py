@@ -18,7 +18,7 @@ from airflock.errors import RuleError
 
 S5 = "Vásárhelyi et al. 2018, Table S5"
 FEW = 3  # packets of each rate in a decision, up to which `missed_few` serves
-RULES = ("missed", "missed_few", "receive", "late", "carry")
+RULES = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
 LINKS = ("fast", "slow")  # how `missed` asks how many packets the first and the second of RATES send in a decision
 
 
@@ -75,13 +75,16 @@ class Radio:
     receive    : 1.0 if a packet arrives, else 0.0, and behind it Packet where there is one. It is asked once for each
                  pair in range and decision
     late       : how much later than `delay` a packet comes, s. While one is under way, those behind it are dropped
+    see        : instead of what is sent, what an agent sees itself: offset (m) and velocity (m/s) at which it believes
+                 another after a picture. Its own errors of position, and what the other one tells, do not matter
     carry      : where the sender of the newest packet is believed to be now, m; without it, where it was then
+    lasts      : 1.0 while the newest packet counts, by its age; without it, until the next one comes
     Packet     : NamedTuple of what `receive` keeps of one pair, each field with its value at the start
     rates      : at most two numbers of Parameters, packets per second; `missed` may ask how many each sends (LINKS)
     violates   : truths of `airflock.check_radio` that do not hold for it, and why (VIOLATES)
 
-    Of a radio with `missed`, `receive` or `late` the newest packet counts until the next one comes, as long as its
-    sender is in range. Without any of them each packet counts at the decision that it comes at.
+    Of a radio with `missed`, `receive`, `late` or `see` the newest packet counts until the next one comes, as long as
+    its sender is in range. Without any of them each packet counts at the decision that it comes at.
     """
 
     name: str
@@ -90,7 +93,9 @@ class Radio:
     missed_few: Callable[..., Any] | None = None
     receive: Callable[..., Any] | None = None
     late: Callable[..., Any] | None = None
+    see: Callable[..., Any] | None = None
     carry: Callable[..., Any] | None = None
+    lasts: Callable[..., Any] | None = None
     Packet: type | None = None
     rates: tuple[str, ...] = ()
     violates: Mapping[str, str] = field(default_factory=dict)
@@ -101,7 +106,7 @@ class Radio:
     @property
     def keeps(self) -> bool:
         """Whether the newest packet counts until the next one comes."""
-        return self.missed is not None or self.receive is not None or self.late is not None
+        return any(rule is not None for rule in (self.missed, self.receive, self.late, self.see))
 
     @property
     def beginnings(self) -> tuple[float, ...]:
@@ -120,8 +125,8 @@ def radio(namespace: Any, name: str = "") -> Radio:
     Parameters
     ----------
     namespace : module, class or mapping
-        Holds at least one of the rules missed, receive, late and carry; if it likes, Parameters, RATES, and Packet (a
-        NamedTuple whose fields have the values of the start), which receive asks for as `packet` and returns.
+        Holds at least one of the rules missed, receive, late and see, and if it likes carry, lasts, Parameters, RATES,
+        and Packet (a NamedTuple whose fields have the values of the start), which receive asks for and returns.
     name : str, optional
         How the radio is called; by default the namespace's.
 
@@ -148,11 +153,13 @@ def radio(namespace: Any, name: str = "") -> Radio:
     rules = {kind: found[kind] for kind in RULES if callable(found.get(kind))}
     asked = {kind: asks(rule, kind, name) for kind, rule in rules.items()}
     if not rules:
-        raise RuleError(f"radio {name} has no rule; give missed or receive, late, carry")
+        raise RuleError(f"radio {name} has no rule; give missed or receive, late, see, carry, lasts")
     if "missed" in rules and "receive" in rules:
         raise RuleError(f"radio {name} has missed and receive; give one of them")
-    if set(rules) <= {"carry", "missed_few"}:
-        raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive or late as well")
+    if {"see", "late"} <= set(rules):
+        raise RuleError(f"radio {name} has see and late; give one of them, as pictures all have the delay of the radio")
+    if set(rules) <= {"carry", "lasts", "missed_few"}:
+        raise RuleError(f"radio {name} has only {' and '.join(rules)}; give missed, receive, late or see as well")
     packet = found.get("Packet")
     if ("packet" in asked.get("receive", ())) is (packet is None):
         raise RuleError(f"radio {name}: a rule receive that asks for packet and a NamedTuple Packet come together")

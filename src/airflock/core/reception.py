@@ -7,7 +7,9 @@ from airflock.core import random
 from airflock.core.agent import answer
 from airflock.core.radio import LINKS, Radio, either, lost, packets
 
-FIRST = {"age": 1e9, "dx": 0.0, "dy": 0.0, "dz": 0.0, "clear": 1.0, "talkers": 1.0}  # before anything is known
+FIRST = {  # before anything is known
+    **dict.fromkeys(("dx", "dy", "dz", "vx", "vy", "vz"), 0.0), "age": 1e9, "clear": 1.0, "talkers": 1.0,
+}  # fmt: skip
 
 
 class Reception:

@@ -164,8 +164,28 @@ RECEIVED = {
     "dx": "true offset from the receiver to the sender, east, m",
     "dy": "the same, north, m",
     "dz": "the same, up, m",
+    "vx": "true velocity of the receiver, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
     "age": "age of the newest packet that the receiver has of the sender, s; 1e9 or more before the first",
     "packet": "the radio's Packet of this pair",
+    **_CHANCES,
+}
+SEEN = {
+    "dx": "true offset to the other one when the picture was taken, radio.delay ago, east, m",
+    "dy": "the same, north, m",
+    "dz": "the same, up, m",
+    "ex": "offset at which the newest estimate, carried forward, expects it in that picture, east, m",
+    "ey": "the same, north, m",
+    "ez": "the same, up, m",
+    "evx": "its velocity by the newest estimate, east, m/s",
+    "evy": "the same, north, m/s",
+    "evz": "the same, up, m/s",
+    "vx": "own velocity as measured, east, m/s",
+    "vy": "the same, north, m/s",
+    "vz": "the same, up, m/s",
+    "since": "time since the last picture in which it was found, s; about 1e9 before the first",
+    "period": "time between two decisions, s",
     **_CHANCES,
 }
 CARRIED = {
@@ -256,7 +276,9 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "missed_few": {**MISSED, "k": "the radio's parameters"},
     "receive": {**RECEIVED, "k": "the radio's parameters"},
     "late": {**_PACKET, **_CHANCES, "k": "the radio's parameters"},
+    "see": {**SEEN, "k": "the radio's parameters"},
     "carry": {**CARRIED, "k": "the radio's parameters"},
+    "lasts": {"age": "age of the newest packet, s", "k": "the radio's parameters"},
     "meet": {**MEET, "t": "the topology's parameters"},
     "fitness": {
         "values": "order parameters of one flight, by name",

@@ -91,7 +91,8 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
         return "faults and agents that come and go fly on device = cpu or python"
     if plan.silent:
         return "silence.rule = 'stop' flies on device = cpu or python"
-    if plan.radio.receive is not None or plan.radio.late is not None or plan.radio.asks("clear", "talkers"):
+    rules = (plan.radio.receive, plan.radio.late, plan.radio.see, plan.radio.lasts)
+    if any(rule is not None for rule in rules) or plan.radio.asks("clear", "talkers"):
         return f"radio.kind = {plan.radio.name!r} flies on device = cpu or python"
     if plan.topology is not None:
         return f"topology.kind = {plan.topology.name!r} flies on device = cpu or python"

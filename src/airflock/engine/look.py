@@ -11,7 +11,7 @@ from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.contract import Model
 from airflock.core.maths import norm
-from airflock.core.pilot import carried
+from airflock.core.pilot import carried, lasts
 from airflock.core.topology import met_of
 from airflock.core.view import View
 from airflock.engine.beginnings import NEVER
@@ -121,7 +121,8 @@ def _heard(
             packet = state.arrays["store"][:, _slot(state, i), _slot(state, j)].tolist()
             axes, stamp = len(plan.axes), packet[2 * len(plan.axes)]
             age, flat = now + clocks[i] - stamp, [0.0] * (3 - axes)
-            if stamp <= NEVER / 10.0 or not (plan.radio.keeps or silence.counts(age, scenario.silent_by())):
+            counts = lasts(plan.radio, k, age) if plan.radio.keeps else silence.counts(age, scenario.silent_by())
+            if stamp <= NEVER / 10.0 or not counts:
                 continue
             sent = Motion(*packet[:axes], *flat, *packet[axes : 2 * axes], *flat)
             yield Heard(j, carried(plan.radio, k, sent, age), age, fade, groups[j])

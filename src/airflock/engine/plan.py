@@ -217,8 +217,13 @@ class Plan:
 
     @property
     def told(self) -> bool:
-        """Whether what others hear of an agent is not the truth: it has rows of its own."""
-        return self.late or bool(self.suffers("sense", "tell"))
+        """Whether what others know of an agent is not the truth of this moment: it has rows of its own."""
+        return self.late or self.sees or bool(self.suffers("sense", "tell"))
+
+    @property
+    def sees(self) -> bool:
+        """Whether agents see each other: then nobody is told anything, and what is kept for others is the truth."""
+        return self.radio.see is not None
 
     @property
     def perturbed(self) -> bool:

@@ -15,7 +15,7 @@ from airflock.engine.state import State
 from airflock.engine.tables import tables
 from airflock.errors import FlightError
 from airflock.scenarios.cells import takes_all_cores
-from airflock.scenarios.places import start_fault
+from airflock.scenarios.places import start_fault, start_in_box
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 from airflock.scenarios.timing import clock
@@ -153,7 +153,7 @@ def opened(
 
 
 def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
-    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s.
+    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s; in a periodic box.
 
     Raises FlightError, one line, where their shape, their kind or their values are wrong.
     """
@@ -175,7 +175,7 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     outside = start_fault(scenario, given)
     if outside:
         raise FlightError(f"{scenario.name}: {outside}")
-    return given
+    return start_in_box(scenario, given)
 
 
 def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> dict[str, float]:

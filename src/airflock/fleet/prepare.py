@@ -46,6 +46,13 @@ def card_document(
     """
     if scenario.world.arena == "none":
         raise CardError([f"{scenario.name}: world.arena = 'none': a card needs walls, and a fence around them"])
+    if scenario.transceiver.see is not None:
+        raise CardError(
+            [
+                f"{scenario.name}: radio.kind = {scenario.transceiver.name!r}: nodes hear each other by radio; "
+                "set radio.kind = 'constant' or another one by which they send"
+            ]
+        )
     strange = [
         law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.models.")
     ]

@@ -7,7 +7,7 @@ from airflock.core.radio import Packets, forward
 
 SETUP = "Vásárhelyi et al. 2018, Drone setup and Fig. 8"
 FIG8 = "our choice in the spirit of Fig. 8"
-KINDS = ("constant", "links", "table", "congestion", "shadow", "bursts", "jitter")
+KINDS = ("constant", "links", "table", "congestion", "shadow", "bursts", "jitter", "vision")
 RATES = ("fast_rate", "slow_rate")
 
 
@@ -21,7 +21,7 @@ class Parameters(Packets):
         source=SETUP,
         meaning="constant: every packet in range arrives after delay; links: two lossy links, data extrapolated; "
         "table: a measured table of reception; congestion: more talkers, more loss; shadow: buildings weaken signals; "
-        "bursts: losses in rows; jitter: delays differ; or a file that ends in .py",
+        "bursts: losses in rows; jitter: delays differ; vision: seen instead of heard; or a file that ends in .py",
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")

@@ -1,7 +1,7 @@
 """The radios that a scenario can name: the key radio.kind."""
 
 from airflock.core.radio import Radio, radio
-from airflock.radios import bursts, congestion, jitter, links, shadow, table
+from airflock.radios import bursts, congestion, jitter, links, shadow, table, vision
 from airflock.radios.constant import CONSTANT
 
 RADIOS: dict[str, Radio] = {
@@ -12,5 +12,6 @@ RADIOS: dict[str, Radio] = {
     "shadow": radio(shadow, "shadow"),
     "bursts": radio(bursts, "bursts"),
     "jitter": radio(jitter, "jitter"),
+    "vision": radio(vision, "vision"),
 }
 USUAL = "constant"  # the radio of a scenario without radio.kind

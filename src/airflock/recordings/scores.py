@@ -17,7 +17,7 @@ from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
 from airflock.doors import from_outside
-from airflock.engine import measure_frames
+from airflock.engine import measure_frames, plan_of
 from airflock.errors import RecordingError
 from airflock.executors.scores import scores
 from airflock.metrics import nearest
@@ -149,6 +149,11 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     (6,)
     """
     return measure(recording, settings)[1]
+
+
+def courses(scenario: Scenario) -> list[str]:
+    """Names of the order parameters that have a value at every instant of a flight: the columns of `over_time`."""
+    return [name for metric in plan_of(scenario.alike()).metrics for name in metric.Sample._fields]  # type: ignore[attr-defined]
 
 
 def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], pd.DataFrame]:

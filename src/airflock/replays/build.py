@@ -34,7 +34,7 @@ from airflock.stage.scene import Stage, stage_of
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
-SCRIPTS = ("data", "colours", "replay")  # in the order in which they need each other
+SCRIPTS = ("data", "colours", "scene", "trails", "charts", "replay")  # in the order in which they need each other
 COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
 
 

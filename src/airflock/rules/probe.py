@@ -105,7 +105,8 @@ def probe_radio(radio: Radio) -> None:
         given["packet"] = radio.Packet() if radio.Packet is not None else None
         answer = _call(rule, kind, given, radio.name)
         receives = "1.0 or 0.0, Packet(...)" if radio.Packet is not None else "1.0 or 0.0"
-        wanted = {"receive": receives, "carry": "x, y, z"}.get(kind, "one number")
+        vectors = {"see": ", ".join(COMPONENTS), "carry": "x, y, z"}
+        wanted = {"receive": receives, **vectors}.get(kind, "one number")
         count = len(wanted.split(", "))
         if (len(answer) if isinstance(answer, tuple) else 1) != count:
             raise RuleError(f"{_place(rule)}: {radio.name}.{kind} must return {wanted}")

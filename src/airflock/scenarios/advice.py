@@ -10,7 +10,7 @@ SEES_WALLS = {"ray", "cast"}
 
 def advice(scenario: Scenario) -> list[str]:
     """What a person should know before flying a scenario."""
-    notes = (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario), _all_met(scenario))
+    notes = (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario), _all_met(scenario), _unsent(scenario))
     return [note for note in notes if note]
 
 
@@ -53,6 +53,19 @@ def _lengths(scenario: Scenario) -> str:
     return (
         f"agents of {model.name} interact within {reach:.3g} m in an arena {2.0 * size:.3g} m across, a factor of "
         f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are hardly meant"
+    )
+
+
+def _unsent(scenario: Scenario) -> str:
+    """Faults of what agents send, where they see each other and send nothing."""
+    if scenario.transceiver.see is None:
+        return ""
+    told = [kind for kind in scenario.fault_kinds if set(kind.rules) <= {"tell"} or kind.name == "radio_silent"]
+    if not told:
+        return ""
+    return (
+        f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults change nothing: "
+        + ", ".join(kind.name for kind in told)
     )
 
 

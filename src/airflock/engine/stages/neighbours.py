@@ -145,6 +145,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     carried2 = carries(i, j, range_ * range_, flock, plan=plan)
                     known = {
                         "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": talkers,
+                        "vx": flock.velocity[X][i], "vy": flock.velocity[Y][i], "vz": flock.velocity[Z][i],
                         "clear": flock.clear[j] if plan.shades else ONE, "step": real(decision),
                         "period": numbers.c.period, "fast": fast, "slow": slow,
                     }  # fmt: skip

@@ -22,10 +22,12 @@ def snapshot(flock: Flock, slot: int, m: int, ring: Any, *, plan: Plan) -> None:
     """Put the state that is sent into the slot of the ring from which it will be heard."""
     for i in range(m):
         for a in range(plan.dimensions):
-            ring[slot, a, i] = flock.position[a][i] + flock.own_error[a][i] if plan.senses else flock.position[a][i]
+            ring[slot, a, i] = (
+                flock.position[a][i] + flock.own_error[a][i] if plan.senses and not plan.sees else flock.position[a][i]
+            )
         for a in range(plan.dimensions):
             ring[slot, a + plan.dimensions, i] = (
-                flock.velocity[a][i] + flock.own_drift[a][i] if plan.senses else flock.velocity[a][i]
+                flock.velocity[a][i] + flock.own_drift[a][i] if plan.senses and not plan.sees else flock.velocity[a][i]
             )
 
 
@@ -94,7 +96,7 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
             for i in range(m):
                 flock.measured_position[a][i] = flock.position[a][i]
                 flock.measured_velocity[a][i] = flock.velocity[a][i]
-    if plan.noisy and not plan.senses:
+    if plan.noisy and not plan.senses and not plan.sees:
         for a in axes:
             for i in range(m):
                 flock.heard_position[a][i] = ring[slot, a, i] + flock.sent_error[a][i]
@@ -114,6 +116,7 @@ def perceive(  # noqa: C901 - tests of the plan leave one way through
     x, v, hx, hv = flock.measured_position, flock.measured_velocity, flock.heard_position, flock.heard_velocity
     for kind in plan.suffers("sense"):
         faults.mislead(range(m), kind, kind.sense, now, x, v, flock, numbers, plan=plan)
-        faults.mislead(range(m), kind, kind.sense, then, hx, hv, flock, numbers, plan=plan)
-    for kind in plan.suffers("tell"):
+        if not plan.sees:
+            faults.mislead(range(m), kind, kind.sense, then, hx, hv, flock, numbers, plan=plan)
+    for kind in plan.suffers("tell") if not plan.sees else ():
         faults.mislead(range(m), kind, kind.tell, then, hx, hv, flock, numbers, plan=plan)

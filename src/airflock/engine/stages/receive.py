@@ -89,8 +89,14 @@ def unheard(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
 
 
 def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
-    """Square of how far packets of agent j carry to agent i, m²."""
-    return least(least(range2, flock.reach_in[i]), flock.reach_out[j]) if plan.suffers("radio") else range2
+    """Square of how far packets of agent j carry to agent i, m²; who is seen need not send."""
+    return (
+        range2
+        if not plan.suffers("radio")
+        else least(range2, flock.reach_in[i])
+        if plan.sees
+        else least(least(range2, flock.reach_in[i]), flock.reach_out[j])
+    )
 
 
 def offset(i: int, j: int, a: int, w: Any, flock: Flock, *, plan: Plan) -> Any:
@@ -175,6 +181,8 @@ def hear(
     if plan.radio.late is not None:
         send(i, j, got, {**about, **rolled}, late, time, flock, numbers, plan=plan)
         deliver(i, j, time, packet, flock, numbers, plan=plan)
+    elif plan.sees:
+        glimpse(i, j, got, rolled, late, time, packet, flock, numbers, plan=plan)
     else:
         for a in range(dims):
             packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
@@ -182,6 +190,40 @@ def hear(
         packet[2 * dims] = choose(got, by_clock(time - late, j, flock, plan=plan), flock.packet[2 * dims][i, j])
     for c in range(2 * dims + 1):
         flock.packet[c][i, j] = packet[c]
+
+
+def glimpse(
+    i: int, j: int, got: Any, rolled: dict[str, Any], late: Any, time: Any, packet: Any, flock: Flock, numbers: Any,
+    *, plan: Plan,
+) -> None:  # fmt: skip
+    """`packet` is then where agent i believes agent j by the newest picture that shows it, taken `late` (s) ago.
+
+    Places are those that agent i believes in, so the error of its own position is in all of them alike.
+    """
+    dims, w = plan.dimensions, numbers.w
+    then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
+    since = by_clock(time - late, i, flock, plan=plan) - flock.packet[2 * dims][i, j]
+    for a in range(dims):
+        moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
+        then[a] = flock.measured_position[a][i] - moved
+        off[a] = apart(flock.heard_position[a][j], flock.heard_position[a][i], a, w, plan=plan)
+        ev[a] = flock.packet[a + dims][i, j]
+        expected[a] = apart(flock.packet[a][i, j] + ev[a] * since, then[a], a, w, plan=plan)
+        v[a] = flock.measured_velocity[a][i]
+    t = ask(
+        plan.radio.see, dx=off[X], dy=off[Y], dz=off[Z], ex=expected[X], ey=expected[Y], ez=expected[Z],
+        evx=ev[X], evy=ev[Y], evz=ev[Z], vx=v[X], vy=v[Y], vz=v[Z], since=since, period=numbers.c.period, **rolled,
+        k=numbers.k,
+    )  # fmt: skip
+    for a in range(dims):
+        packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
+        packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
+    packet[2 * dims] = choose(got, by_clock(time - late, i, flock, plan=plan), flock.packet[2 * dims][i, j])
+
+
+def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
+    """Offset between two coordinates along one axis, to the nearest image, m."""
+    return nearest_image(there - here, getattr(w, SIDES[a])) if plan.periodic else there - here
 
 
 def received(
@@ -249,7 +291,13 @@ def on_record(age: Any, packet: Any, numbers: Any, *, plan: Plan) -> Any:
     Over a radio that keeps it, it does until the next one comes; where lost neighbours stop an agent, until they count
     as lost.
     """
-    return packet[2 * plan.dimensions] > -1e8 if plan.radio.keeps else silence.counts(age, numbers.silence) > HALF
+    return (
+        (packet[2 * plan.dimensions] > -1e8) & (ask(plan.radio.lasts, age=age, k=numbers.k) > HALF)
+        if plan.radio.lasts is not None
+        else packet[2 * plan.dimensions] > -1e8
+        if plan.radio.keeps
+        else silence.counts(age, numbers.silence) > HALF
+    )
 
 
 def newest(i: int, j: int, packet: Any, flock: Flock, *, plan: Plan) -> None:
