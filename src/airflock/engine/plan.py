@@ -286,6 +286,11 @@ class Plan:
         return self.meeting("hidden") and (self.obstacles or self.scene)
 
     @property
+    def placed(self) -> bool:
+        """Whether offsets to all who are heard are kept: the topology asks for one of them, or for what is hidden."""
+        return self.hides or any(self.meeting(name) for name in ("dx", "dy", "dz"))
+
+    @property
     def fades(self) -> bool:
         """Whether the strength of a signal is drawn."""
         return self.meeting("fade") and self.fading
