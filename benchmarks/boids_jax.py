@@ -183,7 +183,7 @@ def random_start(scenario: Scenario, seed: int) -> np.ndarray[Any, Any]:
 
 def difference(settings: Callable[[int], dict[str, Any]], agents: int, steps: int, seed: int = 1) -> float:
     """Largest difference (m, m/s) to Airflock's CPU engine after some steps from one start, in double precision."""
-    from airflock.engine.simulate import fly
+    from airflock.engine import fly
     from airflock.scenarios.files import load
 
     keys = settings(agents)

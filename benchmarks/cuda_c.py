@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from c_reference import PARAMETERS, SCORES, parameters_of
 
-from airflock.engine.cuda import device
+from airflock import gpu as device
 from airflock.scenarios.timing import clock
 
 HERE = Path(__file__).parent

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from airflock.engine.simulate import score_flight, score_flights
+from airflock.engine import score_flight, score_flights
 from airflock.evolve.run import executor_for
 from airflock.evolve.search import search
 from airflock.evolve.space import with_parameters

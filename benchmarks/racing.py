@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.evolve.folder import read
 from airflock.evolve.racing import still_needed
 from airflock.evolve.space import with_parameters

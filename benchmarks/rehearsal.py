@@ -37,7 +37,8 @@ def begin(sizes: Callable[..., Any] = SimpleNamespace) -> Any:
     import cuda_c
     from numba.cuda.simulator.kernel import FakeCUDAKernel
 
-    from airflock.engine.cuda import crowd, device, launch, memory
+    from airflock import gpu as device
+    from airflock.engine.cuda import crowd, launch, memory
 
     device.trouble = lambda: None
     device.describe = lambda: [{"name": "rehearsal"}]

@@ -23,9 +23,8 @@ import numpy as np
 from c_reference import Reference
 from trial import Trial
 
-from airflock.engine import vectors
+from airflock.engine import fly, score_flight, score_flights, vectors
 from airflock.engine.cpu import cores
-from airflock.engine.simulate import fly, score_flight, score_flights
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 

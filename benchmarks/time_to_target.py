@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from airflock import __version__, atomic
-from airflock.engine.simulate import score_flight, score_flights
+from airflock.engine import score_flight, score_flights
 from airflock.evolve.after import interval
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import executor_for, run

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from airflock import atomic
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.evolve.after import interval
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import executor_for, run

@@ -1,12 +1,12 @@
 """One drawn flight by the driver text, interpreted, against the reference; and how much of a difference is chaos."""
 
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
-from airflock.engine import cpu, interpreted
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import plan_of
+from inside import cpu, interpreted, tables
 from reference.flight import fly_plainly
 from scenarios_drawn import Draw
 
@@ -59,12 +59,8 @@ def interpreted_flight(draw: Draw) -> cpu.Flown:
     scenario = draw.scenario.in_flight(draw.seed)
     plan = plan_of(scenario, precision=64, record=True, grid=False).built(given_start=draw.start is not None)
     with_all_lines = interpreted.flight_driver(plan, exact=True)
-    given = cpu.driver_of
-    cpu.driver_of = lambda plan, device="cpu": with_all_lines
-    try:
+    with patch.object(cpu, "driver_of", lambda plan, device="cpu": with_all_lines):
         return cpu.fly(plan, tables(scenario, plan, draw.seed), draw.start, "python")
-    finally:
-        cpu.driver_of = given
 
 
 def reference_flight(draw: Draw) -> cpu.Flown:

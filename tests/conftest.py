@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(config, items):
 @pytest.fixture
 def gpu():
     """Skips a test where no GPU can be used; with AIRFLOCK_NEED_GPU set nothing is skipped, and the test fails."""
-    from airflock.engine.cuda.device import trouble
+    from airflock.gpu import trouble
 
     if trouble() is not None:
         pytest.skip(f"{trouble()}; AIRFLOCK_NEED_GPU makes this a failure")

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airflock.engine import cpu
-from airflock.engine.simulate import fly, plan_of
-from airflock.engine.tables import tables
+from airflock.engine import fly, measure_frames
 from airflock.scenarios.making import make
 
 ISLANDS = [[[-12.0, -10.0], [4.0, -14.0], [2.0, 3.0], [-9.0, 6.0]], [[12.0, 8.0], [20.0, 8.0], [16.0, 17.0]]]
@@ -47,5 +45,4 @@ def measured(found, frames):
     """Order parameters of frames (time, component, agent), by the driver that scores recordings, interpreted."""
     frames = np.asarray(frames, float)
     every = replace(found, flight=replace(found.flight, agents=float(frames.shape[2])))
-    plan = plan_of(every, precision=64, grid=False)
-    return cpu.measure_frames(plan, tables(every, plan, 0), frames, device="python")[0]
+    return measure_frames(every, frames, 0.0, device="python")[0]

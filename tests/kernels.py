@@ -2,11 +2,8 @@
 
 from functools import cache
 
-from airflock.engine.generate import Source
-from airflock.engine.passes.build import JIT
-from airflock.engine.passes.driver import HEAD
-from airflock.engine.primitives import primitives
-from airflock.engine.store import load_driver
+from airflock.rules.generate import Source
+from inside import HEAD, JIT, load_driver, primitives
 
 
 @cache

@@ -419,7 +419,7 @@ def lattice(keys: dict[str, Any], rng: Random, length: float, speed: float, reac
     keys[f"model.{reach}"] = step * rng.choice((1.0, many))
     three = keys["world.dimensions"] == "3"
     places = [(x, y, z) for x in range(-2, 3) for y in range(-2, 3) for z in (range(3) if three else (0,))]
-    if keys["world.edges"] == "bounce":  # from given places agents start inside
+    if keys["world.edges"] != "open":  # from given places agents start inside
         keys |= {"world.side": 8.0 * step, "world.height": 8.0 * step}
     chosen = np.array(rng.sample(places, keys["agents"]), float).T * step
     along = np.array([[speed], [0.0], [0.0]]) * np.ones(keys["agents"])

@@ -12,6 +12,13 @@ recording = airflock.simulate(scenario, seed=7)
 figure = airflock.plot(recording, "trajectories")
 
 # %%
+# Watch it
+# --------
+# A replay plays in place: drag to turn, click a drone, change what the colours stand for. It is one piece of HTML that
+# needs no network, and two frames for each second of flight keep it small.
+airflock.replay(recording, rate=2.0)
+
+# %%
 # What was loaded
 # ---------------
 # A scenario is everything about a flight but the seed. In a notebook it shows all keys that differ from their defaults.

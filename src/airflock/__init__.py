@@ -23,8 +23,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.core.radio import radio as radio
     from airflock.core.sensor import sensor as sensor
     from airflock.display.displays import display as display
-    from airflock.engine.flight import Flight as Flight
-    from airflock.engine.flight import Flight as open  # noqa: F401
+    from airflock.engine import Flight as Flight
+    from airflock.engine import Flight as open  # noqa: F401
     from airflock.errors import AirflockError as AirflockError
     from airflock.evolve.harden import harden as harden
     from airflock.evolve.run import evolve as evolve
@@ -82,7 +82,7 @@ _WHERE = {
     "check_radio": "airflock.checking.radios",
     "check_types": "airflock.checking.types",
     "simulate": "airflock.recordings.flights",
-    "Flight": "airflock.engine.flight",
+    "Flight": "airflock.engine",
     "recording_of": "airflock.recordings.flights",
     "score": "airflock.recordings.scores",
     "over_time": "airflock.recordings.scores",
@@ -109,7 +109,7 @@ _WHERE = {
 # packages; all but plots can be called (decision 0010)
 _MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
 __all__ = [*_WHERE, "__version__"]
-_WHERE["open"] = "airflock.engine.flight"  # not in __all__: `from airflock import *` would hide Python's own
+_WHERE["open"] = "airflock.engine"  # not in __all__: `from airflock import *` would hide Python's own
 
 
 if not TYPE_CHECKING:  # a type checker shall tell names that do not exist

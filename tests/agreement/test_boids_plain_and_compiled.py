@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.scenarios.files import load
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"

@@ -141,7 +141,7 @@ def test_workers_with_different_processors_are_named(cluster, monkeypatch):
 
 
 def test_a_task_flies_the_same_flight_as_this_process():
-    from airflock.engine.simulate import score_flight
+    from airflock.engine import score_flight
     from airflock.evolve.space import with_parameters
     from airflock.evolve.study import load_study
 

@@ -5,19 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.engine import cpu
-from airflock.engine.simulate import plan_of, score_flights
-from airflock.engine.tables import tables
+from airflock.engine import plan_of, score_flights
 from airflock.errors import DeviceError
 from airflock.scenarios.files import load
 from flocks import scenario
+from inside import cpu, tables
 
 pytestmark = pytest.mark.gpu
 
 
 def both(found, seeds, precision=64, **layout):
     """Flights of the CPU and of the GPU."""
-    from airflock.engine.cuda.launch import fly_many, layout_of
+    from inside import fly_many, layout_of
 
     plan = plan_of(found, precision=precision, record=True, grid=False)
     jobs = [tables(found, plan, seed) for seed in seeds]

@@ -10,7 +10,7 @@ from airflock.aero import descent
 from airflock.core.composition import added
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters as Record
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import RuleError, ScenarioError
 from airflock.models import reynolds_1987, vasarhelyi_2018
 from airflock.scenarios.files import load

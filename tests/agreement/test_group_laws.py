@@ -5,12 +5,12 @@ import pytest
 
 import airflock
 from against_reference import compared
-from airflock.engine.devices import no_cuda
-from airflock.engine.simulate import driver_text, fly, plan_of
+from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import ScenarioError
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import find_model
+from inside import no_cuda
 from scenarios_drawn import Draw
 
 PAPER = "vasarhelyi_2018/4ms"

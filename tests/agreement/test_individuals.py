@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import cpu
-from airflock.engine.simulate import driver_text, finish, fly, plan_of
+from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import FlightError, RuleError, ScenarioError
 from airflock.faults.registry import KINDS
 from airflock.recordings.flights import recording_of
 from airflock.recordings.scores import measure
 from airflock.scenarios.files import load, presets
+from inside import course, cpu
 
 SMALL = {"agents": 8, "duration": 6.0, "start.kind": "ball", "start.radius": 40.0}
 OPEN = {"world.arena": "none", "world.walls": "every_edge"}
@@ -264,7 +264,7 @@ def test_a_battery_lands_the_agent_when_it_is_empty():
 
 def test_faults_that_come_at_random_come_as_often_as_they_should():
     scenario = load(PAPER, {"agents": 20, "duration": 3600.0, "faults": [{"kind": "motor", "per_hour": 30.0}]})
-    from airflock.engine.onsets import onsets
+    from airflock.scenarios.onsets import onsets
 
     counts = [onsets(scenario, seed) for seed in range(60)]
     assert np.mean([len(found) for found in counts]) == pytest.approx(30.0, abs=4.0 * np.sqrt(30.0 / 60.0))
@@ -287,7 +287,7 @@ def test_any_cuts_and_any_way_to_say_it_give_the_same_bits():
             flight.advance(steps=steps)
         scores = flight.finish()
         assert flight.frames.tobytes() == closed.frames.tobytes()
-        assert repr(scores) == repr(finish(scenario, closed.values))
+        assert repr(scores) == repr(scenario.judged(closed.values))
     sensed = airflock.open(scenario, 3, record=True, device="python")
     while not sensed.over:
         sensed.sense().advance(steps=20)
@@ -435,7 +435,7 @@ def test_numbers_of_their_own_that_are_the_same_are_the_plain_flight():
     plan = plan_of(scenario, precision=64, record=True, grid=False)
     from dataclasses import replace
 
-    from airflock.engine.tables import tables
+    from inside import tables
 
     numbers = tables(scenario, plan, 3)
     same = replace(numbers, own=np.full_like(numbers.own, base.body.tau))
@@ -461,6 +461,7 @@ def test_a_group_measures_by_numbers_of_its_own():
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
+        ([{"agents": float("inf")}], "groups.0..agents = inf is neither a list of agents nor a number of them"),
         ([{"agents": 101}], "is neither a list of agents nor a number of them up to 100"),
         ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
         ([{"agents": [100]}], "there is no agent 100"),
@@ -468,6 +469,10 @@ def test_a_group_measures_by_numbers_of_its_own():
         ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
         ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
         ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
+        (
+            [{"model": {"p_rep": {"spread": {"low": 0.1}}}}],
+            r"p_rep.spread = \{.low.: 0.1\} is not a standard deviation",
+        ),
         ([{"body": {"kind": "direct"}}], "one body carries all; only numbers differ from group to group"),
         ([{"bodies": {}}], r"groups\[0\].bodies: unknown key"),
         ([{"sensors": {"period": 1.0}}], "all measure and decide at the same times"),
@@ -558,7 +563,7 @@ def test_a_fault_that_has_waited_for_its_compiler_begins_when_it_is_taken_over(m
         waiting.append((Future(), job))
         return waiting[-1][0]
 
-    monkeypatch.setattr("airflock.engine.course.in_background", later)
+    monkeypatch.setattr(course, "in_background", later)
     flight = airflock.open(load(PAPER, SMALL), 1, device="python").advance(1.0)
     flight.fault("motor", [2], wait=False, share=0.0).fault("radio_silent", [1], wait=False).advance(0.5)
     assert flight.waiting and not flight.faults

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import finish, fly, plan_of
+from airflock.engine import fly, plan_of
 from airflock.errors import FlightError, ScenarioError
 from airflock.scenarios.files import load, presets
 
@@ -78,7 +78,7 @@ def cut_and_whole(name, steps):
     scores = flight.finish()
     assert flight.frames.tobytes() == closed.frames.tobytes()
     assert flight.state.tobytes() == closed.state.tobytes()
-    assert repr(scores) == repr(finish(scenario, closed.values))
+    assert repr(scores) == repr(scenario.judged(closed.values))
 
 
 @pytest.mark.parametrize("name", sorted(presets()))
@@ -105,7 +105,7 @@ def test_a_flight_that_ends_at_a_collision_ends_there_in_parts_too():
         flight.advance(steps=37)
     assert flight.scores()["n_coll"] > 0.0 and flight.time < 60.0
     assert flight.frames.tobytes() == closed.frames.tobytes()
-    assert repr(flight.finish()) == repr(finish(scenario, closed.values))
+    assert repr(flight.finish()) == repr(scenario.judged(closed.values))
     with pytest.raises(FlightError, match=r"the flight is over at t = "):
         flight.advance(1.0)
 

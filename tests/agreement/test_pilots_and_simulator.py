@@ -139,7 +139,7 @@ def test_pilots_fly_what_the_simulator_flies(name):
 @given(at=st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-60, 60)), turn=st.floats(0, 6.28))
 @settings(max_examples=60, deadline=None)
 def test_a_place_read_from_a_card_is_the_world_of_the_flight(name, at, turn):
-    from airflock.engine.place import Place as Engine
+    from airflock.scenarios.surroundings import Place as Engine
 
     scenario = build(name)
     ours, theirs = place_of(scenario), Engine(scenario)

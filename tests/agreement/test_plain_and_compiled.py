@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.engine import cpu
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import plan_of
 from flocks import IDEAL, ISLANDS, NOTCHED, flown, scenario
+from inside import cpu, tables
 from reference.flight import fly_plainly
 
 COMMON = {"duration": 10.0, "world.side": 90.0, "world.height": 50.0, "world.radius": 48.0, "start.separation": 5.0}

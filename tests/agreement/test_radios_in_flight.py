@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.devices import no_cuda
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine import fly, plan_of
 from airflock.errors import RuleError, ScenarioError
 from airflock.radios.registry import RADIOS
 from airflock.scenarios.files import load
 from flocks import ISLANDS
+from inside import no_cuda
 from reference.flight import fly_plainly
 
 PAPER = "vasarhelyi_2018/4ms"

@@ -7,11 +7,9 @@ import pytest
 from scipy import stats
 
 from airflock.core import random
-from airflock.engine.generate import Source
-from airflock.engine.passes.driver import HEAD
-from airflock.engine.primitives import primitives
-from airflock.engine.store import load_driver
 from airflock.recordings.perception import packet_uniforms
+from airflock.rules.generate import Source
+from inside import HEAD, load_driver, primitives
 
 # Random123 (Salmon et al. 2011), kat_vectors, philox4x32 with 10 rounds: counter, key, answer
 ONES = 0xFFFFFFFF

@@ -8,18 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.engine import cpu
-from airflock.engine.simulate import fly, plan_of
-from airflock.engine.tables import tables
+from airflock.engine import fly, plan_of
 from airflock.threads import in_threads
 from flocks import flown, interpreted, scenario
+from inside import cpu, tables
 
 PAPER = {
     "agents": 30, "duration": 20.0, "world__side": 120.0, "world__walls": "nearest_per_axis", "start__separation": 6.0,
 }  # fmt: skip
 FRESH = """
 import hashlib
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.scenarios.making import make
 settings = {settings!r}
 found = make({{"model": {{"kind": "vasarhelyi_2018"}}}}, "test", settings)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.files import load
 from airflock.sensors.registry import SENSORS

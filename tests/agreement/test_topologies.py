@@ -11,16 +11,14 @@ import airflock
 from against_reference import interpreted_flight
 from airflock.core.contract import model
 from airflock.core.parameters import Parameters
-from airflock.engine import cpu
-from airflock.engine.devices import no_cuda
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import plan_of
 from airflock.errors import CardError, ScenarioError
 from airflock.evolve.space_table import read_space
 from airflock.onboard.card import card_of, hash_of
 from airflock.scenarios.files import make
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted
+from inside import cpu, no_cuda, tables
 from reference.flight import fly_plainly
 from scenarios_drawn import Draw
 

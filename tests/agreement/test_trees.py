@@ -13,29 +13,26 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.engine.cuda import cells, kernel
-from airflock.engine.cuda.build import CudaBuilder
-from airflock.engine.cuda.shape import shape_of
-from airflock.engine.devices import no_cuda
-from airflock.engine.passes import build as building
-from airflock.engine.passes import driver
-from airflock.engine.simulate import plan_of
-from airflock.engine.specialise import values
-from airflock.engine.stages import (
-    clusters,
-    decide,
-    measure,
-    move,
-    neighbours,
-    noise,
-    perceive,
-    receive,
-    scene,
-    start,
-    surfaces,
-)
+from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from flocks import ISLANDS, NOTCHED, SILENT, scenario
+from inside import CudaBuilder, no_cuda, shape_of
+from inside import cuda_cells as cells
+from inside import cuda_kernel as kernel
+from inside import passes_build as building
+from inside import passes_driver as driver
+from inside import specialise_values as values
+from inside import stages_clusters as clusters
+from inside import stages_decide as decide
+from inside import stages_measure as measure
+from inside import stages_move as move
+from inside import stages_neighbours as neighbours
+from inside import stages_noise as noise
+from inside import stages_perceive as perceive
+from inside import stages_receive as receive
+from inside import stages_scene as scene
+from inside import stages_start as start
+from inside import stages_surfaces as surfaces
 from trees import digests
 
 RECORD = Path(__file__).with_suffix(".json")

@@ -39,6 +39,18 @@ def test_a_replay_plays_from_disk_and_shows_the_recorded_places(recording, tab, 
     assert not tab.faults
 
 
+def test_a_replay_in_a_cell_of_a_notebook_plays_in_place(recording, tab, tmp_path):
+    cell = airflock.replay(recording, rate=2.0)._repr_html_()
+    page = tmp_path / "notebook.html"
+    page.write_text(f"<!DOCTYPE html><meta charset='utf-8'><h1>A notebook</h1><div>{cell}</div>", encoding="utf-8")
+    tab.goto(page.as_uri(), timeout=PATIENCE)
+    frame = tab.locator("iframe").element_handle().content_frame()
+    frame.wait_for_function("window.replay && window.replay.time > 1", timeout=PATIENCE)
+    assert places(coloured(shot(tab)[:, :740])) >= 10 and not tab.faults
+    frame.get_by_role("button", name="play or pause").click()
+    assert frame.evaluate("replay.playing") is False
+
+
 def test_pause_seek_and_space(recording, tab, tmp_path):
     opened(tab, recording, tmp_path)
     tab.get_by_role("button", name="play or pause").click()

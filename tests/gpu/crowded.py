@@ -9,9 +9,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.engine.cuda.crowd import Crowd, cells_of, fly_crowd  # noqa: E402
-from airflock.engine.simulate import plan_of  # noqa: E402
+from airflock.engine import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
+from inside import Crowd, cells_of, fly_crowd  # noqa: E402
 from reference.flight import fly_plainly  # noqa: E402
 
 COMMON = {"update": "synchronous", "metrics.kind": "order", "start.kind": "arena", "start.separation": 0.0,

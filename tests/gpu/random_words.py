@@ -8,10 +8,8 @@ import numpy as np
 from numba import cuda
 
 from airflock.core import random
-from airflock.engine.cuda.primitives import head
-from airflock.engine.cuda.shape import Shape
-from airflock.engine.generate import Source
-from airflock.engine.store import load_driver
+from airflock.rules.generate import Source
+from inside import Shape, head, load_driver
 
 LOOP = """
 @cuda.jit()

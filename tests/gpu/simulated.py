@@ -12,12 +12,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.engine.cuda.launch import fly_many  # noqa: E402
-from airflock.engine.cuda.shape import Shape  # noqa: E402
-from airflock.engine.simulate import plan_of  # noqa: E402
-from airflock.engine.tables import tables  # noqa: E402
+from airflock.engine import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
 from flocks import IDEAL, ISLANDS, NOTCHED, scenario  # noqa: E402
+from inside import (
+    Shape,  # noqa: E402
+    fly_many,  # noqa: E402
+    tables,  # noqa: E402
+)
 from reference.flight import fly_plainly  # noqa: E402
 
 COMMON = {"duration": 0.8, "dt": 0.05, "world.side": 60.0, "world.height": 50.0, "world.radius": 30.0}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 import airflock
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 
 PRESET = "vasarhelyi_2018/faulty"
 FIELDS = ("line", "seed", "n_coll", "r_min")

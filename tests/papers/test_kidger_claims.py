@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.errors import AirflockError
 from airflock.evolve.study import load_study
 from airflock_papers.claims import read_claims

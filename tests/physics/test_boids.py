@@ -9,12 +9,11 @@ import pytest
 from airflock.body.turning import Parameters as Turning
 from airflock.body.turning import move as turn
 from airflock.core.maths import angle_between, arc_cosine
-from airflock.engine import cpu
-from airflock.engine.simulate import plan_of, score_flight
-from airflock.engine.tables import tables
+from airflock.engine import plan_of, score_flight
 from airflock.models import reynolds_1987 as boids
 from airflock.scenarios.files import load
 from airflock.world import edges, rays
+from inside import cpu, tables
 
 
 def test_arc_cosine_is_the_library_s():

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from airflock.body import dryden, wind
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly
 

@@ -7,7 +7,7 @@ import pytest
 
 from airflock.aero.wing import Parameters as Wing
 from airflock.body.fixed_wing import Memory, Parameters, drag_of, move, stall_speed
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
 from reference.flight import fly_plainly

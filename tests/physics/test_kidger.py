@@ -11,7 +11,7 @@ from scipy.spatial import SphericalVoronoi
 import airflock
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own, Percept
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.metrics import fitness_kidger
 from airflock.models import kidger
 from airflock.world import goals

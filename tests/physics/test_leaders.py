@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.models.couzin_2005 import Parameters, neighbour
 from airflock.scenarios.files import load
 

@@ -7,8 +7,8 @@ import pytest
 
 from airflock.body import jostled, motion, wind
 from airflock.core import random
-from airflock.engine.place import Place
 from airflock.scenarios.files import load
+from airflock.scenarios.surroundings import Place
 from airflock.sensors import langevin
 from airflock.world import start
 from flocks import flown, from_start, ideal, scenario

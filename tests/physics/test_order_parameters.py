@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from airflock.core.maths import bell, peak, rising
-from airflock.engine.simulate import finish
 from flocks import IDEAL, ISLANDS, measured, scenario
 
 SIDE = 100.0
@@ -132,7 +131,7 @@ def test_fitness_is_the_product_of_its_parts_and_perfect_for_a_perfect_flock():
     found = flock(agents=100, start__separation=1.0)
     q = found.measured_by()
     perfect = {"phi_vel": q.v_flock, "phi_corr": 1.0, "phi_coll": 0.0, "phi_wall": 0.0, "n_disc": 0.0, "n_min": 100.0}
-    assert finish(found, perfect)["fitness"] == pytest.approx(1.0, abs=1e-9)
+    assert found.judged(perfect)["fitness"] == pytest.approx(1.0, abs=1e-9)
     poor = {
         "phi_vel": 0.9 * q.v_flock,
         "phi_corr": 0.8,
@@ -141,7 +140,7 @@ def test_fitness_is_the_product_of_its_parts_and_perfect_for_a_perfect_flock():
         "n_disc": 3.0,
         "n_min": 15.0,
     }
-    parts = finish(found, poor)
+    parts = found.judged(poor)
     n = found.agents
     expected = {
         "f_speed": rising(poor["phi_vel"], q.v_flock, q.v_tol),
@@ -154,4 +153,4 @@ def test_fitness_is_the_product_of_its_parts_and_perfect_for_a_perfect_flock():
     for key, value in expected.items():
         assert parts[key] == pytest.approx(value) and 0.0 < value < 1.0, key
     assert parts["fitness"] == pytest.approx(math.prod(expected.values()))
-    assert finish(found, {**poor, "phi_corr": -0.2})["fitness"] == 0.0
+    assert found.judged({**poor, "phi_corr": -0.2})["fitness"] == 0.0

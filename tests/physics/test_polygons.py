@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
-from airflock.engine.place import Place as Seen
+from airflock.scenarios.surroundings import Place as Seen
 from airflock.stage.scene import prism as drawn_prism
 from airflock.world import arena, polygon
 from airflock.world.place import Place, edge_rows

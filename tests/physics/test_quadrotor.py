@@ -140,7 +140,7 @@ def move(cx, cy, cz, memory, dt, b):
 
 def test_a_body_of_ones_own_remembers_from_one_file(tmp_path, seed):
     """Nothing inside changes: a lag of half a second, as the reference flies it and by its closed form."""
-    from airflock.engine.simulate import fly
+    from airflock.engine import fly
     from reference.flight import fly_plainly
 
     (tmp_path / "slow.py").write_text(SLOW)

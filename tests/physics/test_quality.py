@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from airflock.engine.cpu import measure_frames
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import measure_frames
 from airflock.scenarios.files import load
 
 MAX_E = 2.25  # half the diagonal of the pond, m
@@ -18,10 +16,9 @@ def measured(positions, headings, **settings):
     positions, headings = np.asarray(positions, float), np.asarray(headings, float)
     keys = {"metrics.kind": "groups", "metrics.r_cluster": 0.5, "agents": len(positions), **settings}
     found = load("zapotecatl_2016/literal", keys)
-    plan = plan_of(found, precision=64, grid=False)
     frames = np.concatenate([positions.T, headings.T])[None]
     device = "python" if len(positions) <= 40 else "cpu"  # interpreted, but for large flocks
-    return measure_frames(plan, tables(found, plan, 0), frames, device=device)[0]
+    return measure_frames(found, frames, 0.0, device=device)[0]
 
 
 def lattice(side=3, step=0.2):

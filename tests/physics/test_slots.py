@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 import airflock.display
-from airflock.engine import cpu
-from airflock.engine.passes.slots import slotted
-from airflock.engine.simulate import plan_of
-from airflock.engine.stages.flight import EVERY
-from airflock.engine.tables import tables
+from airflock.engine import plan_of
 from airflock.scenarios.files import load
+from inside import EVERY, cpu, slotted, tables
 
 DISPLAY = Path(airflock.display.__file__).parent / "display.toml"
 N = 90

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from airflock.core import random
 from airflock.core.agent import State
-from airflock.engine.place import Place
-from airflock.engine.tables import extents
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Place
 from airflock.scenarios.wings import FORMATIONS
 from airflock.world import start as start_rules
+from inside import extents
 
 ATTEMPTS = 20_000  # draws of a place for one agent
 Vector = tuple[float, float, float]

@@ -20,10 +20,10 @@ from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.parameters import choices
 from airflock.core.pilot import Hearing, Pilot
-from airflock.engine.cpu import Flown
-from airflock.engine.place import Course, Place, reach_of_walls
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Course, Place, reach_of_walls
 from airflock.scenarios.timing import clock
+from inside import Flown
 from reference.begin import ZERO, Vector, begin, given, normals
 from reference.individuals import Suffering, ahead, begins, groups_of, law_of, misled, own_parameters, radio_of
 from reference.scores import Scores

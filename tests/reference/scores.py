@@ -8,7 +8,7 @@ from airflock.core.agent import START, State, answer, combined, reduced
 from airflock.core.contract import Metric
 from airflock.core.maths import TINY, norm
 from airflock.core.vocabulary import Mean
-from airflock.engine.place import Place
+from airflock.scenarios.surroundings import Place
 
 Record = Any  # a NamedTuple of floats that a metric declares
 

@@ -28,7 +28,7 @@ class Planted:
 
 def fly(folder):
     """Load the driver with a cache folder as a new process would, and fly it."""
-    from airflock.engine import store
+    from inside import store
 
     os.environ["AIRFLOCK_CACHE"] = str(folder)
     for name in [name for name in sys.modules if name.startswith("airflock_driver_planted")]:

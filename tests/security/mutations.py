@@ -364,6 +364,7 @@ def commanded(words, folder, tell=False):
     from airflock.cli.main import main
 
     os.chdir(folder)
+    os.environ["AIRFLOCK_CACHE"] = str(folder / "cache")  # `doctor --clear-cache` is a command, too
     no_flights()
     out, err = io.StringIO(), io.StringIO()
     sys.argv = ["airflock", *words]
@@ -388,13 +389,13 @@ def commanded(words, folder, tell=False):
 def no_flights():
     """Whatever would compile or fly in this process ends there."""
     from airflock.display import show
-    from airflock.engine import cpu, interpreted, simulate, store
     from airflock.fleet import lockstep
+    from inside import drivers, interpreted, measuring, simulate, store
 
     def flown(*_, **__):
         raise Flown
 
-    store.load_driver = cpu.load_driver = flown
+    store.load_driver = drivers.load_driver = measuring.load_driver = flown
     lockstep.Fleet.advance = flown
     interpreted.flight_driver = flown
     simulate.compile_for = show.fly_show = flown

@@ -1,13 +1,17 @@
 """Files that version 0.1 wrote are read, and mean what they meant."""
 
 import json
+import tomllib
 
 import pytest
 from mutations import GOLDEN
 
 import airflock
-from airflock.errors import RecordingError
+from airflock.certify.certificate import seal
+from airflock.certify.check import check
+from airflock.errors import CardError, RecordingError, StudyError
 from airflock.evolve.study import load_study
+from airflock.onboard.card import read_card
 from airflock.recordings.files import fly_again
 
 SCORES = json.loads((GOLDEN / "scores.json").read_text())
@@ -34,6 +38,38 @@ def test_a_scenario_and_a_study_of_0_1_are_read():
     assert study.space.keys == ("model.p_rep", "model.r0_rep") and study.space.fixed == {"model.v_frict": 0.6}
     assert [o.name for o in study.objectives] == ["phi_vel", "r_min"] and study.search.algorithm == "nsga2"
     assert study.scenario.flight.duration == 2.0
+
+
+def test_a_flight_card_of_0_1_is_read_and_flies_the_scenario_that_it_was_made_of():
+    card, scenario = read_card(GOLDEN / "card.json"), airflock.load(GOLDEN / "scenario.toml")
+    assert card.members == (1, 2, 3, 4, 5, 6) and card.model.name == "vasarhelyi_2018"
+    assert card.parameters == scenario.parameters and card.delay == scenario.radio.delay
+    assert tuple(card.site.origin) == (47.5, 19.04, 120.0)
+    assert card.place.excursion(0.0, -15.0, 0.0) > 0.0 > card.place.excursion(0.0, 40.0, 0.0)  # in the obstacle; free
+
+
+def test_a_flight_card_of_an_older_version_is_one_line(tmp_path):
+    older = json.loads((GOLDEN / "card.json").read_text()) | {"airflock_card": 1}
+    (tmp_path / "older.json").write_text(json.dumps(older))
+    with pytest.raises(CardError, match=r"older.json: is not a flight card of version 2$"):
+        read_card(tmp_path / "older.json")
+
+
+def test_a_certificate_of_0_1_is_whole_and_its_bound_is_that_of_the_count(tmp_path):
+    """None of 100 flights: the chance of an event is at most 1 - 0.05^(1/100) with 95 % (Clopper and Pearson)."""
+    text = (GOLDEN / "certificate.toml").read_text()
+    document = tomllib.loads(text)
+    assert document["seal"] == seal(document)
+    assert document["limit"][0]["high"] == pytest.approx(1.0 - 0.05**0.01, rel=1e-12)
+    try:
+        found = check(GOLDEN / "certificate.toml")
+    except StudyError as fault:  # the law's text has changed since
+        assert "its flights followed other rules" in str(fault)
+    else:
+        assert found.flown and not [line for line in found.faults if "bits" not in line]
+    (tmp_path / "newer.toml").write_text(text.replace("format = 1", "format = 9", 1))
+    with pytest.raises(StudyError, match="is of format 9; this Airflock reads format 1"):
+        check(tmp_path / "newer.toml")
 
 
 def test_what_is_saved_today_carries_its_format(tmp_path):

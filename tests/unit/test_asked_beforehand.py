@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from airflock.cli.main import app
-from airflock.engine import cpu, simulate
 from airflock.errors import AirflockError
+from inside import cpu, simulate
 
 BEST = "zapotecatl_2016/best"
 OVER = ["--over", "model.r_s=0.1,0.2", "--duration", "1", "--seeds", "1"]
@@ -20,7 +20,7 @@ def grounded(monkeypatch):
     def flown(*_, **__):
         raise AssertionError("something was flown")
 
-    for name in ("flight_driver", "fly", "advance"):
+    for name in ("driver_of", "fly", "advance"):
         monkeypatch.setattr(cpu, name, flown)
     monkeypatch.setattr(simulate, "in_threads", flown)
 

@@ -8,7 +8,7 @@ import pytest
 from numba import njit
 from numba.core.errors import NumbaError
 
-from airflock.engine.compiler import CALLED, INNER
+from inside import CALLED, INNER
 
 OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
 

@@ -5,14 +5,14 @@ import sys
 
 import pytest
 
-from airflock.engine import needs
-from airflock.engine.cuda import device as gpu
-from airflock.engine.cuda.shape import MOST_THREADS, shape_of
-from airflock.engine.simulate import picked, plan_of, score_flights
+from airflock import gpu as gpu
+from airflock.engine import picked, plan_of, score_flights
 from airflock.errors import DeviceError, ScenarioError
+from airflock.scenarios import cost
 from airflock.scenarios.files import load
 from flocks import scenario
 from gpus import runtime
+from inside import MOST_THREADS, shape_of
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
 
@@ -51,9 +51,9 @@ def test_auto_leaves_small_work_to_the_cpu_and_large_to_a_gpu(present):
 
 
 def test_work_grows_with_flights_agents_and_time():
-    base = needs.seconds_of(scenario(agents=100, duration=100.0))
-    assert needs.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
-    assert needs.seconds_of(scenario(agents=200, duration=100.0)) > 2.5 * base
+    base = cost.seconds_of(scenario(agents=100, duration=100.0))
+    assert cost.seconds_of(scenario(agents=100, duration=200.0)) == pytest.approx(2.0 * base, rel=0.02)
+    assert cost.seconds_of(scenario(agents=200, duration=100.0)) > 2.5 * base
 
 
 def test_the_cpu_is_never_asked_about_a_gpu(monkeypatch):
@@ -83,8 +83,8 @@ def test_every_flock_fits_on_the_threads_of_its_block(agents, flocks):
 @pytest.mark.parametrize("name", ["vasarhelyi_2018/4ms", "kidger/city", "zapotecatl_2016/best", "dimock_2003/physical"])
 def test_all_rules_of_a_kernel_are_the_rules_of_the_cpu(name):
     """No rule is written twice: every rule and record of a CPU driver stands in the kernel with the same text."""
-    from airflock.engine.cuda.kernel import flight as kernel
-    from airflock.engine.passes.driver import stages
+    from inside import driver_stages as stages
+    from inside import kernel_text as kernel
 
     plan = plan_of(load(name), grid=False)
     rules = [block for block in stages(plan).source.blocks if "def " in block]
@@ -95,7 +95,7 @@ def test_all_rules_of_a_kernel_are_the_rules_of_the_cpu(name):
 
 def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():
     code = "import sys; sys.argv = ['airflock', 'run', 'vasarhelyi_2018/4ms', '--device', 'cuda']\n"
-    code += "from airflock.engine.cuda import device\ndevice.trouble = lambda: 'no driver'\n"
+    code += "from airflock import gpu as device\ndevice.trouble = lambda: 'no driver'\n"
     code += "from airflock.cli import main\nmain()\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2

@@ -3,10 +3,9 @@
 import random
 import threading
 
-from airflock.engine import cpu
-from airflock.engine.simulate import compile_for, plan_of, score_flight
-from airflock.engine.store import load_driver
+from airflock.engine import compile_for, plan_of, score_flight
 from airflock.scenarios.files import load
+from inside import flight_driver, load_driver
 
 
 def test_no_thread_gets_a_driver_that_another_is_still_executing(tmp_path, monkeypatch):
@@ -29,7 +28,7 @@ def test_no_thread_gets_a_driver_that_another_is_still_executing(tmp_path, monke
 def test_what_has_been_compiled_for_a_scenario_is_what_flies_it():
     scenario = load("vicsek_1995/ordered", {"agents": 5, "duration": 1.0})
     compile_for(scenario)
-    driver = cpu.flight_driver(plan_of(scenario))
+    driver = flight_driver(plan_of(scenario))
     compiled = list(driver.advance.signatures)
     assert len(compiled) == 1
     score_flight(scenario)

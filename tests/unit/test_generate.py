@@ -4,8 +4,8 @@ import ast
 
 import pytest
 
-from airflock.engine.generate import Source
 from airflock.errors import RuleError
+from airflock.rules.generate import Source
 
 
 def shape(form, x):

@@ -5,14 +5,14 @@ import sys
 
 import pytest
 
+from airflock import gpu as gpu
 from airflock.cli import main
-from airflock.engine.cuda import device as gpu
-from airflock.engine.devices import no_room
-from airflock.engine.simulate import picked, plan_of
+from airflock.engine import picked, plan_of
 from airflock.errors import DeviceError
 from airflock.scenarios.files import load
 from flocks import scenario
 from gpus import runtime
+from inside import no_room
 from needed import needed
 
 needed("numba_cuda")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import toys
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import again, harden
 from airflock.evolve.sensitivity import sensitivity
@@ -14,6 +14,7 @@ from airflock.evolve.study import load_study
 from airflock.executors.here import Here
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
+from inside import simulate
 
 
 def test_recipe_moves_the_way_of_table_s4_and_stays_inside_ranges():
@@ -38,7 +39,7 @@ def flown_by(monkeypatch, score):
         chance = {seed: np.random.default_rng(seed).normal() for seed in seeds}
         return [score(s.parameters, chance[seed]) for s, seed in zip(scenarios, seeds, strict=True)]
 
-    monkeypatch.setattr("airflock.engine.simulate.score_flights", score_flights)
+    monkeypatch.setattr(simulate, "score_flights", score_flights)
 
 
 def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):

@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from airflock.engine import interpreted
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.models import viragh_2014
 from airflock.scenarios.files import load
 from flocks import interpreted as flown
 from flocks import scenario
+from inside import interpreted
 
 KEYS = {"agents": 3, "duration": 0.4, "world.side": 60.0, "start.separation": 5.0}
 

@@ -11,9 +11,9 @@ from airflock.body.registry import BODIES
 from airflock.core import maths
 from airflock.core.contract import model
 from airflock.core.vocabulary import VOCABULARY, asks
-from airflock.engine import law
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
+from airflock.rules import law
 from airflock.scenarios.laws import MODELS
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
@@ -187,7 +187,7 @@ def test_rules_of_a_model_are_plain_python():
 
 
 def test_what_the_compiler_refuses_is_one_line():
-    from airflock.engine.simulate import score_flight
+    from airflock.engine import score_flight
     from airflock.models import viragh_2014
     from airflock.scenarios.files import load
 

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine import needs
-from airflock.engine.cpu import driver_of
-from airflock.engine.simulate import plan_of
-from airflock.engine.state import State
-from airflock.engine.tables import tables
+from airflock.engine import State, plan_of
 from airflock.errors import FlightError, ParameterError, ScenarioError
+from airflock.scenarios import cost
+from inside import driver_of, needs, tables
 
 
 @pytest.mark.parametrize("agents", [50, 400])
@@ -68,16 +66,16 @@ def test_a_flight_that_nobody_can_wait_for_is_refused_with_what_fits():
     agents = int(re.search(r"about (\d+) agents fit", str(told.value))[1])
     duration = float(re.search(r"a duration of about (\S+) s", str(told.value))[1])
     for change in ({"agents": agents}, {"duration": 0.99 * duration}):
-        assert needs.seconds_of(airflock.load("vasarhelyi_2018/real_4ms", settings | change)) <= needs.LONGEST
+        assert cost.seconds_of(airflock.load("vasarhelyi_2018/real_4ms", settings | change)) <= cost.LONGEST
     more = airflock.load("vasarhelyi_2018/real_4ms", settings | {"agents": agents + 1})
-    assert needs.seconds_of(more) > needs.LONGEST
+    assert cost.seconds_of(more) > cost.LONGEST
 
 
 def test_the_time_of_flights_is_told_once_it_is_worth_telling():
     scenario = airflock.load("vasarhelyi_2018/4ms")
-    count = round(2 * 3 * 3600.0 / needs.seconds_of(scenario))
-    assert needs.time_note([scenario] * 3, 1) == ""
-    assert needs.time_note([scenario] * count, 2) == f"{count} flights will take about 3 h"
+    count = round(2 * 3 * 3600.0 / cost.seconds_of(scenario))
+    assert cost.time_note([scenario] * 3, 1) == ""
+    assert cost.time_note([scenario] * count, 2) == f"{count} flights will take about 3 h"
 
 
 def test_what_loads_has_all_the_numbers_that_follow_from_it():

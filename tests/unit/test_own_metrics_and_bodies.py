@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import finish, fly
+from airflock.engine import fly
 from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import SETS, metric_set, reports
 from airflock.recordings.flights import flown_document
@@ -90,12 +90,12 @@ def test_a_metric_of_ones_own_measures_what_its_rule_says(files):
     flown = fly(found, 1, record=True, device="python")
     x = flown.frames[:, 0]
     truth = np.abs(x - x.mean(axis=1, keepdims=True)).mean()
-    values = finish(found, flown.values)
+    values = found.judged(flown.values)
     assert values["spread"] == pytest.approx(truth, rel=1e-12)
     assert values["fitness"] == pytest.approx(10.0 / (10.0 + truth), rel=1e-12)
     assert found.measures.best == "fitness" and "phi_vel" in values  # METRICS: one of ours beside it
     narrow = load("vasarhelyi_2018/4ms", {**SMALL, "metrics.width": 1.0}, metrics=files / "spread.py")
-    assert finish(narrow, flown.values)["fitness"] == pytest.approx(1.0 / (1.0 + truth), rel=1e-12)
+    assert narrow.judged(flown.values)["fitness"] == pytest.approx(1.0 / (1.0 + truth), rel=1e-12)
     assert reports(found.measures)["spread"] == ("m", "mean distance to the centre, east")
 
 
@@ -113,7 +113,7 @@ def test_a_file_and_the_same_names_given_directly_are_one(files):
     direct = load(
         "vasarhelyi_2018/4ms", {**SMALL, **keys}, metrics=namespace(METRIC), body=airflock.body(namespace(BODY))
     )
-    a, b = (finish(found, fly(found, 2, record=True, device="python").values) for found in (from_file, direct))
+    a, b = (found.judged(fly(found, 2, record=True, device="python").values) for found in (from_file, direct))
     assert a == b
     listed = load("vasarhelyi_2018/4ms", SMALL, metrics=["speed", airflock.metric(namespace(METRIC), "spread")])
     assert listed.numbers["q"] == load("vasarhelyi_2018/4ms").numbers["q"]

@@ -32,6 +32,7 @@ from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
 from airflock.recordings.layout import dataset
+from airflock.recordings.scores import courses, scenario_of
 from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors
 
@@ -551,6 +552,16 @@ def test_a_chart_beside_a_video_moves_with_it():
     assert stage.cursor.get_xdata() == [18.0, 18.0]
     with pytest.raises(RecordingError, match="this recording has"):
         Stage(recording, None, None, tail=0.0, height=160, speed=1.0, chart="mood")
+    assert courses(scenario_of(recording)) == list(airflock.over_time(recording).columns)
+
+
+@pytest.mark.parametrize(("chart", "said"), [("phi_velo", "did you mean phi_vel?"), ("mood", "phi_vel, ")])
+def test_a_chart_of_what_a_flight_does_not_have_is_refused_before_it_is_flown(tmp_path, monkeypatch, chart, said):
+    monkeypatch.setattr("airflock.plots.picture.flight_of", lambda *_, **__: pytest.fail("flew"))
+    path = tmp_path / "a.mp4"
+    told = CliRunner().invoke(app, ["video", "vasarhelyi_2018/4ms", "--chart", chart, "--out", str(path)])
+    assert isinstance(told.exception, RecordingError) and said in str(told.exception) and not path.exists()
+    assert str(told.exception).startswith(f"chart = '{chart}' is none that vasarhelyi_2018/4ms has: ")
 
 
 def test_terms_are_drawn_in_the_words_of_the_law():

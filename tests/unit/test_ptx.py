@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from needed import needed
 
@@ -26,7 +26,8 @@ KERNELS = {
 
 
 def driver_of(name, bits=32, **layout):
-    from airflock.engine.cuda.launch import flight_driver, layout_of
+    from inside import kernel_driver as flight_driver
+    from inside import layout_of
 
     found = load(name)
     plan = plan_of(found, precision=bits)
@@ -40,7 +41,7 @@ def doubles(text):
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_ptx_of_every_model(name):
-    from airflock.engine.cuda.compiled import ptx, signature
+    from inside import ptx, signature
 
     driver, plan = driver_of(name, **KERNELS[name])
     for (major, minor), text in ptx(driver, signature(plan.bits), CAPABILITIES).items():
@@ -53,7 +54,7 @@ def test_ptx_of_every_model(name):
 
 
 def test_every_shipped_model_has_a_kernel_here():
-    from airflock.engine.devices import no_cuda
+    from inside import no_cuda
 
     flown = [found for found in map(load, presets()) if len(found.laws) == 1]  # groups with laws fly on a CPU
     shipped = {found.model.name: found for found in flown}
@@ -62,9 +63,7 @@ def test_every_shipped_model_has_a_kernel_here():
 
 
 def test_ptx_of_one_big_flock():
-    from airflock.engine.cuda.cells import signatures
-    from airflock.engine.cuda.compiled import ptx
-    from airflock.engine.cuda.crowd import crowd_driver
+    from inside import crowd_driver, ptx, signatures
 
     keys = {"agents": 100_000, "world.edges": "periodic", "world.arena": "square", "metrics.kind": "order"}
     plan = plan_of(load("zapotecatl_2016/literal", keys))

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from airflock.core import maths
-from airflock.engine.cuda import kernel
-from airflock.engine.cuda.reciprocals import Forms, spelled, with_reciprocals
-from airflock.engine.cuda.shape import shape_of
-from airflock.engine.generate import Source
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.models import vasarhelyi_2018
+from airflock.rules.generate import Source
 from airflock.scenarios.files import load
+from inside import Forms, shape_of, spelled, with_reciprocals
+from inside import cuda_kernel as kernel
 
 NAMES = {
     "math": math, "real": float, "least": min, "most": max, "ONE": 1.0, "inverse_root": lambda a: 1.0 / math.sqrt(a),

@@ -2,12 +2,12 @@
 
 import pytest
 
-from airflock.engine.cuda import cells
-from airflock.engine.cuda.build import CudaBuilder
-from airflock.engine.passes import driver, grid
-from airflock.engine.replace import ReplacementError, must_replace
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.scenarios.files import load
+from inside import CudaBuilder, ReplacementError, must_replace
+from inside import cuda_cells as cells
+from inside import passes_driver as driver
+from inside import passes_grid as grid
 
 LARGE = "couzin_2002/swarm"  # flown by cells where it is large
 

@@ -7,16 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.engine.cuda import cells, kernel
-from airflock.engine.cuda.shape import shape_of
-from airflock.engine.passes import driver
-from airflock.engine.passes.build import columns
-from airflock.engine.passes.measure import measured
-from airflock.engine.schedule import ORDER, in_turn, order
-from airflock.engine.simulate import plan_of
-from airflock.engine.stages import flight
-from airflock.engine.stages.words import Itself
+from airflock.engine import plan_of
 from airflock.scenarios.files import load
+from inside import ORDER, Itself, columns, in_turn, measured, order, shape_of
+from inside import cuda_cells as cells
+from inside import cuda_kernel as kernel
+from inside import passes_driver as driver
+from inside import stages_flight as flight
 
 IN_TURNS = "zapotecatl_2016/best"
 PRESETS = (

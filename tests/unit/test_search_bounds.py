@@ -3,7 +3,7 @@
 import pytest
 
 import toys
-from airflock.engine.simulate import score_flight
+from airflock.engine import score_flight
 from airflock.errors import StudyError
 from airflock.evolve.after import conclude
 from airflock.evolve.bounds import unread, usual_space

@@ -6,13 +6,13 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from airflock.engine import tables as engine_tables
-from airflock.engine.passes.build import Builder
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.scenarios import scenario as scenarios
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, SECTIONS
+from inside import Builder
+from inside import tables_module as engine_tables
 
 
 def read_by_text(plan, row):

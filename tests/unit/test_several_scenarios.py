@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import airflock
 import toys
 from airflock.cli.harden import _optima
-from airflock.engine.simulate import score_flight, score_flights
+from airflock.engine import score_flight, score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
 from airflock.evolve.folder import open_folder
@@ -29,6 +29,7 @@ from airflock.executors.cluster import rebuild
 from airflock.executors.here import Here
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
+from inside import simulate
 
 FAR = {"radio.delay": 0.8}
 
@@ -205,7 +206,7 @@ def test_a_step_of_hardening_that_breaks_what_held_in_one_of_two_scenarios_is_un
             for s in scenarios
         ]  # fmt: skip
 
-    monkeypatch.setattr("airflock.engine.simulate.score_flights", score_flights)
+    monkeypatch.setattr(simulate, "score_flights", score_flights)
     alone = harden.harden(first, range(5))
     assert alone[-1].verdict == "kept: p_rep up"
     both = harden.harden([first, late], range(5))

@@ -2,13 +2,10 @@
 
 import pytest
 
-from airflock.engine.passes.build import Builder
-from airflock.engine.simulate import plan_of
-from airflock.engine.specialise.stage import specialise
-from airflock.engine.specialise.values import StageError, argument
-from airflock.engine.stages import start
-from airflock.engine.stages.words import ZERO, ask, most, repeat, vector
+from airflock.engine import plan_of
 from airflock.scenarios.files import load
+from inside import ZERO, Builder, StageError, argument, ask, most, repeat, specialise, vector
+from inside import stages_start as start
 
 
 def made(stage, name="vasarhelyi_2018/4ms", **known):

@@ -11,20 +11,25 @@ import numpy as np
 import pytest
 
 from airflock.core import random
-from airflock.engine import stages
-from airflock.engine.passes import decide, driver, measure, perceive
-from airflock.engine.plan import WHOLE
-from airflock.engine.simulate import plan_of
-from airflock.engine.stages import decide as deciding
-from airflock.engine.stages import gusts, meet, neighbours, noise, receive, start, surfaces, words
-from airflock.engine.stages import measure as judging
-from airflock.engine.stages import move as motion
-from airflock.engine.stages import perceive as measuring
-from airflock.engine.stages.clusters import clusters_of
-from airflock.engine.stages.state import Flock
-from airflock.engine.stages.words import Itself
-from airflock.engine.tables import tables
+from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
+from inside import WHOLE, Flock, Itself, clusters_of, stages, tables
+from inside import passes_decide as decide
+from inside import passes_driver as driver
+from inside import passes_measure as measure
+from inside import passes_perceive as perceive
+from inside import stages_decide as deciding
+from inside import stages_gusts as gusts
+from inside import stages_measure as judging
+from inside import stages_meet as meet
+from inside import stages_move as motion
+from inside import stages_neighbours as neighbours
+from inside import stages_noise as noise
+from inside import stages_perceive as measuring
+from inside import stages_receive as receive
+from inside import stages_start as start
+from inside import stages_surfaces as surfaces
+from inside import stages_words as words
 
 FILES = sorted(Path(stages.__file__).parent.glob("*.py"))
 

@@ -1,9 +1,9 @@
-"""Starts outside a bouncing arena are refused: its faces would move an agent farther than it can have flown."""
+"""Starts outside a box: refused where its faces would move an agent farther than it can have flown."""
 
 import numpy as np
 import pytest
 
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import FlightError, ScenarioError
 from flocks import scenario
 
@@ -11,7 +11,7 @@ BOUNCE = {"world__edges": "bounce", "world__side": 20.0, "duration": 0.2}
 VEE = {"start__kind": "echelon", "start__spacing_x": 1.0, "start__spacing_y": 3.0}
 
 
-@pytest.mark.parametrize("edges", ["bounce", "open"])
+@pytest.mark.parametrize("edges", ["bounce", "open", "periodic"])
 def test_a_formation_that_reaches_outside_is_refused(edges):
     """Its extent counts, not start.side, which no formation has."""
     keys = BOUNCE | VEE | {"world__edges": edges}
@@ -30,3 +30,24 @@ def test_a_given_start_outside_is_one_line():
     start = np.array([[0.0, 3.0], [0.0, -12.5], [0.0, 0.0], [0.0, 0.0]])
     with pytest.raises(FlightError, match="agent 1 lies 2.5 m outside the arena, from whose faces agents bounce"):
         fly(scenario(**BOUNCE, agents=2), 0, start=start, device="python")
+
+
+PERIODIC = {"world__edges": "periodic", "world__side": 4.0, "start__separation": 0.0}
+
+
+def test_a_given_start_beyond_a_periodic_box_is_the_place_inside(seed):
+    """Positions from 0 to the side, as many programs keep them, or any number of sides away, fly the same."""
+    found = scenario("vicsek_1995", **PERIODIC, agents=8, duration=2.0)
+    rng = np.random.default_rng(seed)
+    inside = np.concatenate([rng.integers(-31, 32, (2, 8)) / 16, 0.03 * rng.normal(size=(2, 8))])  # no rounding
+    away = inside + np.concatenate([4.0 * rng.integers(-3, 4, (2, 8)), np.zeros((2, 8))])
+    known, moved = (fly(found, seed, record=True, start=start, device="python") for start in (inside, away))
+    np.testing.assert_array_equal(moved.frames, known.frames)
+    assert moved.values == known.values
+
+
+def test_a_collision_over_the_face_of_a_periodic_box_is_seen_from_the_first_step(seed):
+    """Found by a draw: two agents two sides apart, so at one place, were not looked at until they could have flown."""
+    found = scenario("vicsek_1995", **PERIODIC, agents=2, duration=1.0, metrics__kind="vasarhelyi", metrics__r_coll=0.5)
+    start = np.array([[0.0, 8.05], [0.0, 0.0], [0.01, 0.01], [0.0, 0.0]])
+    assert fly(found, seed, start=start, device="python").values["n_coll"] == 1.0

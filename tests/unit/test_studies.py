@@ -307,8 +307,8 @@ def test_the_study_of_dimock_2003_searches_the_bounds_of_the_paper_with_cohesion
 
 
 def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monkeypatch):
-    from airflock.engine import simulate
     from airflock.errors import FlightError
+    from inside import simulate
 
     study = load_study("vasarhelyi_2018/4ms", settings={"duration": 2.0, "agents": 10})
     space, flights = study.space, []

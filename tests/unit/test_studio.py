@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import airflock
 from airflock.core.contract import model
 from airflock.core.parameters import Quantity, declarations, quantity
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.errors import ParameterError, RuleError, ScenarioError, StudioError
 from airflock.evolve.bounds import studied
 from airflock.evolve.study import load_study
@@ -27,6 +27,7 @@ from airflock.stage.scene import dart, stage_of, turned
 from airflock.stage.shades import Shade
 from airflock.studio import door, measures
 from airflock.studio.background import Study, around, summary, varied
+from airflock.studio.collisions import BOTH, Collisions
 from airflock.studio.controls import controls_of, span
 from airflock.studio.drawing import Flock, arrival
 from airflock.studio.moments import Moments
@@ -641,9 +642,9 @@ def test_a_fault_is_an_event_and_back_takes_it_away(interpreted, player):
 
 
 def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):
-    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: flight.device == "python"))
+    monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: flight.device == "python"))
     compiled, go = Flight.compile, threading.Event()
-    monkeypatch.setattr("airflock.engine.flight.Flight.compile", lambda flight: go.wait() and compiled(flight))
+    monkeypatch.setattr("airflock.engine.Flight.compile", lambda flight: go.wait() and compiled(flight))
     player = Player(PRESET, FEW, 3, at_once=True)
     player.start()
     assert player.compiling and "compiling" in player.status and player.flight.device == "python"
@@ -672,10 +673,45 @@ def test_what_the_compiler_refuses_stops_a_flight_that_has_begun(monkeypatch):
     def refuse(flight):
         raise RuleError("model m: a rule does not compile")
 
-    monkeypatch.setattr("airflock.engine.flight.Flight.ready", property(lambda flight: False))
-    monkeypatch.setattr("airflock.engine.flight.Flight.compile", refuse)
+    monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: False))
+    monkeypatch.setattr("airflock.engine.Flight.compile", refuse)
     player = Player(PRESET, {"agents": 3}, 3, at_once=True)
     player.start()
     while not player.failure:
         player.tick(0.01)
     assert player.status == "stopped: model m: a rule does not compile"
+
+
+def test_a_collision_is_listed_once_while_it_lasts_and_again_when_the_pair_touches_again():
+    found = Collisions()
+    for at in (1.0, 1.1, 1.2, 2.0):
+        found.see(at, 0, [(3, 5)] if at != 1.2 else [])
+    assert found.listed == [(2.0, 0, 3, 5), (1.0, 0, 3, 5)]
+
+
+def test_going_back_forgets_collisions_that_lie_ahead_and_lists_them_again_when_they_come():
+    found = Collisions()
+    for at in (1.0, 1.5, 2.0, 2.5):  # 1 and 2 touch all the time, 3 and 5 from 2 s on
+        found.see(at, 0, [(1, 2)] + [(3, 5)] * (at >= 2.0))
+    found.back(1.5, 1)
+    assert found.listed == [(1.0, 0, 1, 2)]
+    found.see(1.5, 0, [(1, 2)])
+    assert len(found.listed) == 1, "a collision that went on is a new one"
+    found.see(2.0, 0, [(3, 5)])
+    assert found.listed == [(2.0, 0, 3, 5), (1.0, 0, 1, 2)]
+    found.back(0.0, 1)
+    found.see(0.0, 0, [(3, 5)])
+    assert found.listed == [(0.0, 0, 3, 5)]
+
+
+def test_the_past_of_a_fork_is_that_of_both_sides_and_each_has_its_own_future():
+    found = Collisions()
+    found.see(1.0, 0, [(0, 1)])
+    found.fork()
+    for side, pairs in enumerate(([(0, 1)], [(0, 1), (2, 3)])):
+        found.see(2.0, side, pairs)
+    assert found.listed == [(2.0, 1, 2, 3), (1.0, BOTH, 0, 1)]
+    found.join(1)
+    assert found.listed == [(2.0, 0, 2, 3), (1.0, 0, 0, 1)]
+    found.see(2.1, 0, [(0, 1), (2, 3)])
+    assert len(found.listed) == 2

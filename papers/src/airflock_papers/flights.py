@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.recordings.flights import simulate
 from airflock.recordings.scores import over_time
 from airflock.scenarios.change import remade

@@ -13,10 +13,10 @@ from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Count
 from airflock.certify.seeds import COUNT, SPLIT, seed
 from airflock.certify.splitting import Estimate, Falls, Lineage, Particle, estimate, repetition
-from airflock.engine.events import Event
 from airflock.errors import ScenarioError
 from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight, Landed
+from airflock.scenarios.events import Event
 from airflock.scenarios.scenario import Scenario
 
 REPETITIONS = 5
@@ -136,7 +136,7 @@ class Flyer:
 
 def falls(scenario: Scenario, lineage: Lineage, precision: int = 32, device: str = "cpu") -> list[list[float]]:
     """Sample and smallest distance of two agents (m), each time that it fell below all before."""
-    from airflock.engine.flight import Flight as Open
+    from airflock.engine import Flight as Open
 
     flight = Open(
         scenario, lineage.seed, precision=precision, record=True, device=device, events=events(scenario, lineage)

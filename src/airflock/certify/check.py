@@ -177,7 +177,7 @@ def _sums(document: Mapping[str, Any], campaign: Campaign) -> list[str]:
 def _flown_again(
     document: Mapping[str, Any], campaign: Campaign, threads: int | None, done: Callable[[], None] | None
 ) -> list[str]:
-    from airflock.engine.simulate import compile_for
+    from airflock.engine import compile_for
     from airflock.threads import in_threads
 
     wanted, every = document["check"]["digests"], int(document["check"]["every"])

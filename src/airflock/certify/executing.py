@@ -38,7 +38,8 @@ def executor_for(
     if scheduler is not None:
         task = CampaignTask(campaign.scenario, campaign.limits, campaign.precision)
         return Cluster([task], scheduler, timeout=timeout)
-    from airflock.engine.simulate import compile_for, takes_all_cores
+    from airflock.engine import compile_for
+    from airflock.scenarios.cells import takes_all_cores
     from airflock.threads import cores
 
     score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)

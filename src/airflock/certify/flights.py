@@ -42,7 +42,7 @@ def score_of(scenario: Scenario, limits: Sequence[Limit], precision: int, device
 
     scenario : as `measured` gives it
     """
-    from airflock.engine.simulate import finish, fly, score_flight
+    from airflock.engine import fly, score_flight
 
     watched = [limit for limit in limits if limit.timed]
     radius = max((limit.value for limit in limits if limit.score == "r_min"), default=0.0)
@@ -52,7 +52,7 @@ def score_of(scenario: Scenario, limits: Sequence[Limit], precision: int, device
         if device == "cpu":
             values = score_flight(flown, seed, precision=precision)
         else:
-            values = finish(flown, fly(flown, seed, precision=precision, device=device).values)
+            values = flown.judged(fly(flown, seed, precision=precision, device=device).values)
         found = {name: value for name, value in values.items() if isinstance(value, (int, float))}
         near = radius > 0.0 and (found["r_min"] <= radius or found.get("n_coll", 0.0) > 0.0)
         if near or any(limit.happened(found) for limit in watched):
@@ -66,7 +66,7 @@ def story(
     scenario: Scenario, seed: int, limits: Sequence[Limit], precision: int, device: str = "cpu"
 ) -> dict[str, Any]:
     """Smallest distance at any motion step (`closest`, m) and when each event had happened (`first`, s or None)."""
-    from airflock.engine.flight import Flight
+    from airflock.engine import Flight
 
     flight = Flight(every_step(scenario), seed, precision=precision, device=device)
     part = max(1, round(scenario.flight.duration / scenario.flight.dt / PARTS))

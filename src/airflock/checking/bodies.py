@@ -15,7 +15,7 @@ from airflock.core.agent import answer
 from airflock.core.contract import Body, body
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
-from airflock.engine import law
+from airflock.rules import law
 from airflock.scenarios import checks
 
 MOTIONS = 40  # random motions that each truth is tried on

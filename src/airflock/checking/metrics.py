@@ -12,11 +12,9 @@ from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.units import OTHERS, Units, factor, rescaled, rescaled_scenario
 from airflock.core.contract import Metric, MetricSet
-from airflock.engine import law
-from airflock.engine.cpu import measure_frames
-from airflock.engine.simulate import plan_of
-from airflock.engine.tables import tables
+from airflock.engine import measure_frames
 from airflock.metrics.registry import as_set
+from airflock.rules import law
 from airflock.scenarios import checks
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -113,10 +111,8 @@ def _measured(scenario: Scenario, flock: Flock, q: Any = None, second: float = 1
     """Order parameters of some instants, 0.2 s apart (or `second` as many), by the stages of a driver, uncompiled."""
     scenario = scenario if q is None else replace(scenario, metrics=q)
     period, dims = 0.2 * second, scenario.dimensions
-    plan = plan_of(scenario, precision=64).built(grid=False)
-    numbers = tables(scenario, plan, 0).changed(agents=flock.shape[1], sample_every=1, collide_every=1)
     frames = np.concatenate([flock[:, :, :dims], flock[:, :, 3 : 3 + dims]], axis=2).transpose(0, 2, 1)
-    values, _ = measure_frames(plan, numbers, frames, period, device="python")
+    values, _ = measure_frames(scenario, frames, period, device="python")
     return scenario.measures.judged(values, flock.shape[1], period * len(flock), scenario.measured_by())
 
 

@@ -27,7 +27,7 @@ from airflock.core.agent import Heard, State, first_memory, meet_neighbours, mee
 from airflock.core.contract import Model, model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine import fly, plan_of
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario
 

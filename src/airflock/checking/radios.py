@@ -13,7 +13,7 @@ from airflock.core.agent import answer
 from airflock.core.parameters import choices
 from airflock.core.radio import RULES, Radio, radio
 from airflock.core.vocabulary import VOCABULARY, asks
-from airflock.engine import law
+from airflock.rules import law
 from airflock.scenarios import checks
 
 TRIES = 60  # random pairs that each truth is tried on

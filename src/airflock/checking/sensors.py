@@ -13,7 +13,7 @@ from airflock.core.agent import State, answer
 from airflock.core.parameters import Quantity, choices, declarations
 from airflock.core.sensor import COMPONENTS, Sensor, sensor
 from airflock.core.vocabulary import asks
-from airflock.engine import law
+from airflock.rules import law
 from airflock.scenarios import checks
 
 TRACKS, MEASUREMENTS = 8, 60  # random tracks that each truth is tried on, and how often each is measured

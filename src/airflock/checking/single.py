@@ -11,8 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from airflock.core.parameters import choices, number_names
-from airflock.engine.generate import Source
 from airflock.errors import RuleError
+from airflock.rules.generate import Source
 
 
 class Single(float):

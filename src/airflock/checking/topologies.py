@@ -12,7 +12,7 @@ from airflock.checking.units import OTHERS, rescaled
 from airflock.core.maths import FAR, TINY
 from airflock.core.topology import Topology, topology
 from airflock.core.vocabulary import asks
-from airflock.engine import law
+from airflock.rules import law
 from airflock.scenarios import checks
 from airflock.topology.parameters import Parameters as Usual
 from airflock.topology.registry import TOPOLOGIES

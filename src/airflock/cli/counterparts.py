@@ -109,7 +109,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.watch("vasarhelyi_2018/4ms")', "watch",
         {
             "scenario": "scenario", "changes": "settings", "agents": 'settings["agents"]', "seed": "seed",
-            "host": "host", "port": "port", "against": "against", **CODE,
+            "host": "host", "port": "port", "against": "against", "radio": "radios", "key": "key", **CODE,
         },
     ),
     "replay": Counterpart(
@@ -172,6 +172,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
             **dict.fromkeys(("vehicle", "silence"), "airflock.fleet.compare.software_card"),
             "against": "airflock.fleet.compare.both", "save": "airflock.fleet.compare.recording",
             "body": "airflock.load", **dict.fromkeys(("mode", "join"), "airflock.fleet.realtime.fly"),
+            "card_file": "airflock.fleet.starting.write_for_watching",
         },
     ),
     "fly": Counterpart("airflock.core.pilot.Pilot", "airflock.core.pilot.Pilot", {}),

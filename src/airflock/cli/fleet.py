@@ -61,6 +61,14 @@ def fleet(
     ground: Annotated[
         bool, typer.Option("--ground", help="Take off, gather, flock, return and land, instead of starting in the air.")
     ] = False,
+    card_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--card",
+            metavar="FILE.json",
+            help="On the real clock: write the flight card and its key here; airflock watch FILE.json shows the fleet.",
+        ),
+    ] = None,
     save: options.SaveFile = None,
     as_json: options.Json = False,
 ) -> None:
@@ -69,15 +77,19 @@ def fleet(
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 10 --duration 60 --seeds 5 --against simulator
 
     Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 60 --mode processes --vehicle ardupilot
+
+    Example: airflock fleet vasarhelyi_2018/real_4ms --agents 5 --duration 300 --mode processes --card fleet.json,
+    and beside it airflock watch fleet.json
     """
     from airflock.fleet import compare, individuals, realtime
     from airflock.fleet.faults import read_faults
+    from airflock.fleet.teller import WATCHED
     from airflock.recordings.scores import measure
     from airflock.scenarios.files import load
 
     wrong: list[str] = []
     with options.gathering(wrong):
-        options.writable((save, RECORDINGS))
+        options.writable((save, RECORDINGS), (card_file, (".json",)))
     with options.gathering(wrong):
         given = options.settings(changes, agents, duration)
         found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
@@ -89,6 +101,8 @@ def fleet(
         wrong.append(f"--body {body} is none of {', '.join(FLOWN)}")
     if mode not in realtime.MODES:
         wrong.append(f"--mode {mode} is none of {', '.join(realtime.MODES)}")
+    if card_file is not None and mode == realtime.MODES[0]:
+        wrong.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
     if against not in (None, "simulator"):
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
@@ -100,6 +114,8 @@ def fleet(
     card = compare.software_card(found, **given, seed=first_seed)
     broken = read_faults(faults, card.members) if faults else ()
     options.refuse(realtime.refused(found, broken) if live else [])
+    if card_file is not None:
+        _write_card(card_file, card, found, seeds)
     rows: list[dict[str, Any]] = []
     beside: list[dict[str, Any]] = []
     runs, departed = [], None
@@ -109,8 +125,9 @@ def fleet(
             card = compare.software_card(found, **given, seed=seed) if found.varied else card
             orders: dict[str, Any] = {"faults": broken, "operator": operator[0], "done": done}
             if live:
+                watcher = WATCHED if card_file else None
                 start, at = None if ground else compare.first_states(found, seed), (realtime.JOIN[0], join)
-                flown: Any = realtime.fly(found, card, seed, mode, start=start, join=at, **orders)
+                flown: Any = realtime.fly(found, card, seed, mode, start=start, join=at, watcher=watcher, **orders)
             else:
                 flown = compare.fly(found, card, seed, ground=ground, **orders)
             if against:
@@ -134,6 +151,16 @@ def _operator(ground: bool) -> tuple[bytes, bytes]:
     from airflock.mavlink.orders import new_keys
 
     return new_keys()
+
+
+def _write_card(path: Path, card: Any, found: Any, seeds: int) -> None:
+    """Write the card of the fleet for `airflock watch`; one card must do for all seeds."""
+    from airflock.fleet.starting import write_for_watching
+
+    if found.varied and seeds > 1:
+        options.refuse([f"--card {path}: tolerances give each seed a card of its own; add --seeds 1"])
+    write_for_watching(path, card)
+    tables.say(f"wrote {path} and its key; airflock watch {path} shows the fleet")
 
 
 def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:

@@ -91,13 +91,22 @@ def video(
     Example: airflock video kidger/city --duration 60 --speed 2 --space --chart flocked --out flight.mp4
     """
     options.writable((out, VIDEOS))
+    from airflock.plots.film_stage import check_chart
     from airflock.plots.picture import flight_of
     from airflock.plots.video import ffmpeg, frame_count
     from airflock.plots.video import video as make_video
+    from airflock.recordings.scores import courses
+    from airflock.scenarios.files import load
 
-    ffmpeg()  # before anything flies
+    settings = options.settings(changes, agents, duration)
+    ffmpeg()  # before anything flies, as all that can be refused
     with options.compiling_told():
-        recording = flight_of(what, seed, options.settings(changes, agents, duration), law, trust=trust)
+        if what.lower().endswith(".nc"):
+            recording = flight_of(what, seed, settings, law, trust=trust)
+        else:
+            scenario = load(what, settings, law, trust=trust)
+            check_chart(chart, courses(scenario) if chart else [], scenario.name)
+            recording = flight_of(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
     with options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)

@@ -105,7 +105,7 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
 def tell_time(scenarios: Sequence[Any], threads: int | None, device: str) -> None:
     """Tell beforehand about how long flights on the processor will take, where that is more than a minute."""
     from airflock.cli.tables import say
-    from airflock.engine.needs import time_note
+    from airflock.scenarios.cost import time_note
     from airflock.threads import cores
 
     note = time_note(scenarios, threads or cores()) if device == "cpu" else ""
@@ -122,7 +122,7 @@ def compile_aloud(scenario: Any, precision: int, device: str) -> None:
         return
 
     from airflock.cli.tables import say
-    from airflock.engine.simulate import compile_for
+    from airflock.engine import compile_for
 
     told = Timer(1.0, say, [COMPILING])
     told.daemon = True
@@ -144,7 +144,7 @@ def compiling_told() -> Iterator[None]:
     from numba.core.event import install_listener
 
     from airflock.cli.tables import say
-    from airflock.engine.heeding import Telling
+    from airflock.heeding import Telling
 
     with install_listener("numba:run_pass", Telling(lambda: say(COMPILING))):
         yield

@@ -30,7 +30,7 @@ def run(
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
-    from airflock.engine.simulate import picked
+    from airflock.engine import picked
     from airflock.executors.scores import scores
     from airflock.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound

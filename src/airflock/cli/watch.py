@@ -1,5 +1,6 @@
-"""Verb watch: a page in the browser that shows a flight and lets it be played, tuned and measured."""
+"""Verb watch: a page in the browser that shows a flight and lets it be played, tuned and measured; or a fleet."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -10,7 +11,11 @@ from airflock.errors import StudioError
 
 def watch(
     scenario: Annotated[
-        str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file or a recording (.nc), flown again.")
+        str,
+        typer.Argument(
+            metavar="PRESET|FILE",
+            help="A preset, a scenario file or a recording (.nc), flown again; or a flight card (.json): its fleet.",
+        ),
     ],
     changes: options.Set = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the flight.")] = 0,
@@ -23,18 +28,33 @@ def watch(
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes any free one.")] = 8080,
+    radio: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PORT",
+            help="Of a fleet: where its packets are heard; repeatable.",
+            show_default="udp:127.0.0.1:14600, as of airflock fleet --card",
+        ),
+    ] = None,
+    key: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Of a fleet: the mission's key.", show_default="beside the card, .key"),
+    ] = None,
 ) -> None:
     """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what was found.
 
-    Two laws or sets of parameters fly side by side with --against.
+    Two laws or sets of parameters fly side by side with --against. Of a flight card it shows the fleet that carries
+    it, in software or in the air, by the packets that a radio hears; it sends nothing.
 
     Example: airflock watch vasarhelyi_2018/4ms --agents 50 --against radio.delay=3
+
+    Example: airflock watch mission.json --radio udp:0.0.0.0:14600
     """
     from airflock.studio.watch import watch as open_page
 
     open_page(
         scenario, options.settings(changes, agents), seed, law=law, trust=trust, host=host, port=port,
-        against=_rival(against or []), say=tables.say,
+        against=_rival(against or []), radios=radio or [], key=key, say=tables.say,
     )  # fmt: skip
 
 

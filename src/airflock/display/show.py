@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airflock.core import random
 from airflock.display.assignment import assign, better
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import AirflockError
 from airflock.recordings.flights import plain
 from airflock.recordings.layout import dataset

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from airflock import __version__
 from airflock.engine import cpu, failure
 from airflock.engine.carry import carry
-from airflock.engine.events import Event
+from airflock.engine.drivers import flying, is_compiled
 from airflock.engine.moments import Snapshot, Window
-from airflock.engine.onsets import onsets
-from airflock.engine.simulate import finish, opened
+from airflock.engine.simulate import opened
 from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.change import begun
+from airflock.scenarios.events import Event
+from airflock.scenarios.onsets import onsets
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_background
 
@@ -63,17 +64,17 @@ class Course:
 
     def call(self, first: int, last: int, half: int = 0) -> None:
         """One call of the driver, for what is not a part of the flight itself."""
-        with cpu.flying(self.state):
+        with flying(self.state.driver, self.scenario.model.name):
             self._placed(self.state.advance(first, last, half))
 
     @property
     def ready(self) -> bool:
         """Whether the driver in force flies at once."""
-        return cpu.is_compiled(self.state.driver)
+        return is_compiled(self.state.driver)
 
     def compile(self) -> None:
         """Have it compiled."""
-        _compiled(self.state)
+        self.state.compile()
 
     def advance(self, last: int) -> None:
         """Fly all steps before `last`, and keep their samples."""
@@ -85,7 +86,7 @@ class Course:
         if self.record:
             count = -(-last // every) - -(-first // every)
             frames = np.full((count, 3 * state.plan.dimensions, state.agents), np.nan, state.tables.row.dtype)
-        with cpu.flying(state):
+        with flying(state.driver, self.scenario.model.name):
             done = self._placed(cpu.advance(state, first, last, frames, 1 if self.sensed else 0))
         self.step, self.sensed = done, False
         if frames is not None:
@@ -133,7 +134,7 @@ class Course:
             self._coming = None
             self._take(new, said, state)
         else:
-            self._coming = (new, said, in_background(lambda: _compiled(state)))
+            self._coming = (new, said, in_background(state.compile))
 
     def take_over(self) -> None:
         """Take the change over that has been compiled meanwhile."""
@@ -152,7 +153,7 @@ class Course:
             state = self._opened(scenario, absence=True)
         if self.step > self.since:
             begin = self.since * self.scenario.flight.dt
-            scores = finish(self.scenario, self.state.values())
+            scores = self.scenario.judged(self.state.values())
             self.windows.append(Window(self.scenario, begin, self.time, scores))
         carry(self.state, state, self.step)
         for event in events:
@@ -246,10 +247,3 @@ def _faults_at_the_end(events: Sequence[Event]) -> int:
         elif event.kind == "change" and "faults" in event.data:
             count = 0
     return count
-
-
-def _compiled(state: State) -> State:
-    """A state whose driver has been compiled; nothing is flown."""
-    with cpu.flying(state):
-        state.compile()
-    return state

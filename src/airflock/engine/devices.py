@@ -8,10 +8,10 @@ import numpy as np
 
 from airflock.engine import cpu
 from airflock.engine.cpu import Flown
-from airflock.engine.needs import total_seconds
 from airflock.engine.plan import Plan
 from airflock.engine.tables import tables
 from airflock.errors import DeviceError, ScenarioError
+from airflock.scenarios.cost import total_seconds
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
 
@@ -42,7 +42,7 @@ def choose(device: str, scenarios: Sequence[Scenario], plans: Sequence[Plan]) ->
         raise ScenarioError([f"device = {device!r} is none of {', '.join(DEVICES)}"])
     if device != "cuda" and device != "auto":
         return Choice(device)
-    from airflock.engine.cuda.device import required, trouble
+    from airflock.gpu import required, trouble
 
     largest: dict[Plan, Scenario] = {}
     for scenario, plan in zip(scenarios, plans, strict=True):

@@ -6,23 +6,22 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.core.view import View
 from airflock.engine import failure
 from airflock.engine.beginnings import NEVER
 from airflock.engine.course import Course
-from airflock.engine.events import Event, agent_number, events_of, vector
-from airflock.engine.look import View, view
+from airflock.engine.look import view
 from airflock.engine.moments import Snapshot, Window
-from airflock.engine.onsets import told
 from airflock.engine.presence import join, leave
-from airflock.engine.simulate import finish
 from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
+from airflock.scenarios.events import Event, agent_number, events_of, vector
 from airflock.scenarios.files import loaded
+from airflock.scenarios.onsets import told
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 
-DEVICES = ("cpu", "python")
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
 
 
@@ -51,6 +50,8 @@ class Flight:
     1.0
     """
 
+    DEVICES = ("cpu", "python")
+
     def __init__(
         self,
         scenario: Any,
@@ -63,8 +64,8 @@ class Flight:
         device: str = "cpu",
         events: Sequence[Event | Mapping[str, Any]] = (),
     ):
-        if device not in DEVICES:
-            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(DEVICES)}")
+        if device not in self.DEVICES:
+            raise FlightError(f"device = {device!r}: an open flight flies on {' or '.join(self.DEVICES)}")
         seed = sound_seed(seed)
         self._course = Course(loaded(scenario).in_flight(seed), seed, precision, record, start, device)
         self._planned = events_of(events)
@@ -240,7 +241,7 @@ class Flight:
 
     def scores(self) -> dict[str, Any]:
         """Order parameters and fitness of the window since the last change, up to now."""
-        return finish(self.scenario, self._state.values())
+        return self.scenario.judged(self._state.values())
 
     @property
     def frame_times(self) -> NDArray[Any]:

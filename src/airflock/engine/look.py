@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from airflock.core import agent as one
@@ -13,41 +13,13 @@ from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.pilot import carried, lasts
 from airflock.core.topology import met_of
+from airflock.core.view import View
 from airflock.engine.beginnings import NEVER
-from airflock.engine.place import Place
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Place
 from airflock.scenarios.timing import clock
 from airflock.world import edges
-
-
-@dataclass(frozen=True)
-class View:
-    """What one agent perceived at a decision, and what came of it.
-
-    agent, time : its number; time of the decision, s
-    true, own   : its state, and its state as it measured it: position (m) and velocity (m/s)
-    heard       : neighbours in range whose packets it has: who, state as heard (m, m/s), age (s)
-    met         : of each of them, in the same order, whether the topology lets it meet that one
-    terms       : of each of them what the neighbour rule made of it; 0 of whom it does not meet or beyond its reach
-    alike       : of each of them what the rule would have made of it, had it flown as the agent does
-    sums, walls : what the law was given of all neighbours, and of all surfaces
-    memory      : the law's memory after the decision
-    command     : in the unit of the law's command
-    """
-
-    agent: int
-    time: float
-    true: Motion
-    own: Motion
-    heard: tuple[Heard, ...]
-    met: tuple[bool, ...]
-    terms: tuple[Any, ...]
-    alike: tuple[Any, ...]
-    sums: Any
-    walls: Any
-    memory: Any
-    command: tuple[float, ...]
 
 
 def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, world: int) -> View:

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.events import Event
-from airflock.engine.onsets import Onset
 from airflock.engine.state import State
+from airflock.scenarios.events import Event
+from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
 
 

@@ -59,7 +59,7 @@ class Build:
 class Plan:
     """Compile-time side of a flight: what the scenario says, and how it is built.
 
-    It is made by `engine.simulate.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
+    It is made by `engine.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
 
     build     : how it is built; bits, record, given_start and grid read it
     numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order

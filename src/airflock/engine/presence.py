@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.beginnings import first_memories, memories, of_pairs
-from airflock.engine.tables import AWAY
+from airflock.scenes.tree import AWAY
 
 if TYPE_CHECKING:
     from airflock.engine.state import State

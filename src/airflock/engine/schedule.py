@@ -7,9 +7,9 @@ every so-manieth. `stages.flight` is the same as a function; kernels and cells t
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from airflock.engine.generate import law_mark
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
+from airflock.rules.generate import law_mark
 
 
 @dataclass(frozen=True)

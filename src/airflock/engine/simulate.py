@@ -1,142 +1,30 @@
-"""Simulate: scenarios in, recordings or order parameters out. The only public door of the engine."""
+"""Simulate: scenarios in, recordings or order parameters out, on all devices."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 from numpy.typing import NDArray
 
-from airflock.core.contract import Metric, Model
-from airflock.core.parameters import choices
-from airflock.core.radio import FEW
-from airflock.core.vocabulary import asks
 from airflock.engine import cpu, devices, failure, needs
+from airflock.engine.drivers import flight_driver, is_loaded
 from airflock.engine.passes.driver import flight as flight_text
-from airflock.engine.plan import Build, OwnLaw, Plan
-from airflock.engine.planning import constants_of, make_plan
-from airflock.engine.probe import probe, probe_fault, probe_radio, probe_sensor, probe_topology
+from airflock.engine.plan import Plan
+from airflock.engine.planning import plan_of
 from airflock.engine.state import State
 from airflock.engine.tables import tables
-from airflock.errors import FlightError, ScenarioError
-from airflock.scenarios.places import start_fault
+from airflock.errors import FlightError
+from airflock.scenarios.cells import takes_all_cores
+from airflock.scenarios.places import start_fault, start_in_box
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seed
 from airflock.scenarios.timing import clock
 from airflock.threads import in_threads
-from airflock.world.place import half_sizes
 
 
-def plan_of(
-    scenario: Scenario,
-    *,
-    precision: int = 32,
-    record: bool = False,
-    metrics: tuple[Metric, ...] | None = None,
-    grid: bool | None = None,
-    given_start: bool = False,
-    absence: bool = False,
-) -> Plan:
-    """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
-
-    grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
-    given_start : the start is handed over with each flight
-    absence     : agents may be absent; where a fault takes agents out they may in any case
-    """
-    if precision not in (32, 64):
-        raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
-    laws = scenario.laws
-    for law in laws:
-        _probed(law.model, tuple(choices(law.parameters).items()))
-    wind, kinds = scenario.wind, scenario.fault_kinds
-    for kind in kinds:
-        probe_fault(kind)
-    if scenario.errs:
-        probe_sensor(scenario.sensor)
-    probe_radio(scenario.transceiver)
-    if scenario.own_topology is not None:
-        probe_topology(scenario.own_topology)
-    return make_plan(
-        scenario.model,
-        scenario.parameters,
-        scenario.order_parameters if metrics is None else metrics,
-        scenario.world,
-        scenario.numbers,
-        build=Build(
-            bits=precision,
-            record=record,
-            given_start=given_start,
-            grid=(_pays(scenario) if grid is None else grid) and _has_room(scenario) and _by_cells(scenario),
-            absence=absence or any(kind.leaves is not None for kind in kinds),
-        ),
-        body=scenario.vehicle,
-        body_choices=tuple(sorted(choices(scenario.body).items())),
-        **_sensing(scenario),
-        start=scenario.start.kind,
-        scene=scenario.scene.draw == "flight" or bool(len(scenario.stands().shapes)),
-        meshed=scenario.scene.kind == "mesh",
-        goals=scenario.goals.kind in ("points", "scene"),
-        herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
-        own=scenario.goals.kind == "own",
-        sequential=scenario.flight.update == "sequential",
-        delayed=clock(scenario)["delay"] > 0,
-        lossy=scenario.radio.loss > 0.0,
-        stop=scenario.metrics.stop == "collision",
-        wing_choices=_wing_choices(scenario, metrics),
-        aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
-        radio=scenario.transceiver,
-        radio_choices=_radio_choices(scenario),
-        few=_few_packets(scenario),
-        silent=scenario.silence.rule == "stop",
-        faults=kinds,
-        varied=scenario.varied,
-        topology=scenario.meets if any(law.model.neighbour is not None for law in laws) else None,
-        laws=tuple(OwnLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
-        grouped=bool(scenario.groups) and any(law.asks_for_groups for law in laws),
-        fading=scenario.own_topology is not None or scenario.topology.fading > 0.0,
-        windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
-        dryden=wind.kind == "dryden",
-    )
-
-
-def _sensing(scenario: Scenario) -> dict[str, Any]:
-    """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
-    if not scenario.errs:
-        return {"noisy": False}
-    chosen = tuple(sorted(choices(scenario.sensors).items()))
-    return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": chosen}
-
-
-def _few_packets(scenario: Scenario) -> bool:
-    """Whether each rate of the radio sends at most FEW packets between two decisions; True where it has none."""
-    rates = [getattr(scenario.radio, name) for name in scenario.transceiver.rates]
-    period = clock(scenario)["decide_every"] * scenario.flight.dt
-    return max(rates, default=0.0) * period <= FEW - 0.1  # rounding may make it one packet more
-
-
-def _radio_choices(scenario: Scenario) -> tuple[tuple[str, str], ...]:
-    """Choices of the radio that its rules can read: the kind of those that share a record is none of them."""
-    return tuple(sorted((k, v) for k, v in choices(scenario.radio).items() if k != "kind"))
-
-
-def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
-    """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
-    found = scenario.order_parameters if metrics is None else metrics
-    used = scenario.model.flock is not None or any(
-        "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
-    )
-    return tuple(sorted(choices(scenario.wing).items())) if used else ()
-
-
-def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
+def driver_text(scenario: Scenario, *, precision: int = 32, record: bool = False) -> str:
     """Text of the driver that flies a scenario: all rules are inside, so equal texts are equal physics."""
-    return flight_text(plan_of(scenario, precision=precision))
-
-
-@lru_cache
-def _probed(model: Model, chosen: tuple[tuple[str, str], ...]) -> None:
-    """Probe a model once per set of choices; its numbers decide nothing about the rules' text."""
-    probe(model, model.Parameters(**dict(chosen)))
+    return flight_text(plan_of(scenario, precision=precision, record=record))
 
 
 def fly(
@@ -261,11 +149,11 @@ def opened(
     if start is not None:
         given = sound_start(scenario, plan, start)
     plan = plan.built(given_start=given_start or start is not None)
-    return State(plan, tables(scenario, plan, seed, world), cpu.driver_of(plan, device), given)
+    return State.of(plan, scenario, seed, world, given, device)
 
 
 def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
-    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s.
+    """Positions and velocities to start from, as a driver reads them: (component, agent), m and m/s; in a periodic box.
 
     Raises FlightError, one line, where their shape, their kind or their values are wrong.
     """
@@ -287,25 +175,18 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     outside = start_fault(scenario, given)
     if outside:
         raise FlightError(f"{scenario.name}: {outside}")
-    return given
+    return start_in_box(scenario, given)
 
 
 def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> dict[str, float]:
     """Order parameters and fitness of one flight, from running sums: no trajectory is kept."""
-    return finish(scenario, fly(scenario, seed, precision=precision).values)
+    return scenario.judged(fly(scenario, seed, precision=precision).values)
 
 
-def finish(scenario: Scenario, values: dict[str, Any]) -> dict[str, Any]:
-    """Order parameters with what the scenario's metric set makes of them: partial fitnesses and fitness."""
-    return scenario.measures.judged(values, scenario.agents, scenario.flight.duration, scenario.measured_by())
-
-
-def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
+def compile_for(scenario: Scenario, *, precision: int = 32, record: bool = False) -> None:
     """Compile what flies a scenario, if that has not been done; scenarios that differ by numbers share it."""
-    driver = cpu.flight_driver(plan_of(scenario, precision=precision))
-    if not cpu.is_loaded(driver):
-        with cpu.compiling(scenario.model.name):
-            opened(scenario, 0, precision).compile()
+    if not is_loaded(flight_driver(plan_of(scenario, precision=precision, record=record))):
+        opened(scenario, 0, precision, record).compile()
 
 
 def score_flights(
@@ -329,7 +210,7 @@ def score_flights(
         if device == "cuda":
             flown = devices.fly_on_gpu(scenarios, plans, seeds, None, done)
             together = zip(scenarios, seeds, flown, strict=True)
-            return [finish(s, checked(s, seed, f, device, precision).values) for s, seed, f in together]
+            return [s.judged(checked(s, seed, f, device, precision).values) for s, seed, f in together]
     if device == "python":
         return list(in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
     for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
@@ -339,54 +220,11 @@ def score_flights(
         return lambda: score_flight(scenario, seed, precision=precision)
 
     jobs = [job(scenario, seed) for scenario, seed in zip(scenarios, seeds, strict=True)]
-    if any(_pays(scenario) for scenario in scenarios):
+    if any(takes_all_cores(scenario) for scenario in scenarios):
         threads = 1  # each flight takes all cores by itself
     return list(in_threads(jobs, threads, done))
 
 
 def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
     """A flight in plain Python, yet to be flown."""
-    return lambda: finish(scenario, fly(scenario, seed, precision=64, device="python").values)
-
-
-def takes_all_cores(scenario: Scenario) -> bool:
-    """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing."""
-    return _pays(scenario)
-
-
-GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
-
-
-def _pays(scenario: Scenario) -> bool:
-    """Whether neighbours are found by cells: many agents, a model of finite reach, perception as things are."""
-    perfect = not scenario.errs and clock(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
-    return (
-        scenario.agents >= GRID_FROM
-        and scenario.model.reach is not None
-        and scenario.model.neighbour is not None
-        and perfect
-        and _by_cells(scenario)
-        and not scenario.transceiver.keeps
-        and scenario.silence.rule == "fly_on"
-        and scenario.flight.update == "synchronous"
-        and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
-        and not any(letter == "p" for letter, _ in scenario.varied)
-        and _has_room(scenario)
-    )
-
-
-def _by_cells(scenario: Scenario) -> bool:
-    """Whether cells as wide as the law's reach hold all who decide whom an agent meets."""
-    if len(scenario.laws) > 1 or (scenario.groups and scenario.laws[0].asks_for_groups):
-        return False
-    kind = scenario.meets
-    walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
-    return kind is None or (kind.near and not (walls and kind.asks("hidden")))
-
-
-def _has_room(scenario: Scenario) -> bool:
-    """Whether a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
-    if scenario.world.edges != "periodic" or scenario.model.reach is None:
-        return True
-    halves = half_sizes(scenario.world)[: scenario.dimensions]
-    return min(halves) >= float(scenario.model.reach(scenario.parameters))
+    return lambda: scenario.judged(fly(scenario, seed, precision=64, device="python").values)

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.beginnings import first_memories, memories, of_pairs
-from airflock.engine.onsets import Onset, strike
+from airflock.engine.drivers import driver_of, flying
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
 from airflock.engine.stages.decide import NEAR
 from airflock.engine.stages.state import own_row
-from airflock.engine.tables import Tables
+from airflock.engine.striking import strike
+from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined, goals_reached, samples, sums_of
+from airflock.scenarios.onsets import Onset
+from airflock.scenarios.scenario import Scenario
 
 LANES = 16  # rows are padded to whole vectors of the widest machine
 LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
@@ -195,12 +198,25 @@ class State:
         """Whether the positions and velocities of all agents are finite."""
         return math.isfinite(self.arrays["work"][self._motion].sum())
 
-    def compile(self) -> None:
-        """Have the driver compiled; nothing is flown, and agents get no places."""
+    def compile(self) -> "State":
+        """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
         marks = self.arrays["held"]
         begun, marks[BEGUN] = marks[BEGUN], 1.0
-        self.advance(0, 0)
+        with flying(self.driver, self.plan.model.name):
+            self.advance(0, 0)
         marks[BEGUN] = begun
+        return self
+
+    @classmethod
+    def of(
+        cls, plan: Plan, scenario: Scenario, seed: int = 0, world: int = 0, start: Any = None, device: str = "cpu"
+    ) -> "State":
+        """State before the first step of a scenario by its plan.
+
+        start  : positions and velocities, (component, agent) in m and m/s, where the plan asks for them
+        device : cpu, or python, uncompiled
+        """
+        return cls(plan, tables(scenario, plan, seed, world), driver_of(plan, device), start)
 
     def twin(self) -> "State":
         """The same state in memory of its own."""

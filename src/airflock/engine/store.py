@@ -7,35 +7,14 @@ processor. What runs is always the text that was generated, never a file's; comp
 
 import hashlib
 import os
-import platform
 import sys
-from functools import cache
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
 
 from airflock import atomic
 from airflock.cache import DRIVERS, cache_folder, shrink, spare
-
-
-@cache
-def toolchain() -> str:
-    """Versions and processor that compiled code depends on."""
-    import llvmlite
-    import llvmlite.binding as llvm
-    import numba
-    import numpy
-
-    return "|".join(
-        (
-            platform.python_version(),
-            numba.__version__,
-            llvmlite.__version__,
-            numpy.__version__,
-            llvm.get_host_cpu_name(),
-        )
-    )
-
+from airflock.machine import toolchain
 
 _loading = Lock()
 

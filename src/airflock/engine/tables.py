@@ -7,18 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.body import dryden, wind
-from airflock.engine.onsets import Onset, onsets, row_values
 from airflock.engine.plan import WHOLE, Plan
+from airflock.scenarios.onsets import Onset, onsets
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import ORDER, Clock, Geometry
 from airflock.scenarios.timing import clock
-from airflock.scenes.tree import Scene
 from airflock.scenes.tree import scene as make_scene
+from airflock.scenes.tree import unbuilt
 from airflock.world.arena import heights_of
-from airflock.world.place import edge_rows, half_sizes, inward
-from airflock.world.shapes import APPEARS
+from airflock.world.place import edge_rows, half_sizes
+from airflock.world.surfaces import faces
 
-AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
 EMPTY = make_scene([])
 
 
@@ -70,34 +69,6 @@ def extents(scenario: Scenario) -> tuple[float, float, float]:
     return x, y, max(map(abs, heights_of(world))) if scenario.dimensions == 3 else 0.0
 
 
-def faces(scenario: Scenario) -> tuple[list[list[float]], list[int]]:
-    """Rows of the surface functions of `planning.arena_surfaces`, and how many belong to each family."""
-    world, three = scenario.world, scenario.dimensions == 3
-    h, z = 0.5 * world.side, 0.5 * world.height
-    low, high = heights_of(world)
-    caps = [[0.0, 0.0, 1.0, -low], [0.0, 0.0, -1.0, high]] if three else []
-    if world.arena == "none" or world.edges == "periodic":
-        return [], []
-    if world.arena == "circle":
-        return [[0.0, 0.0, 0.0, world.radius], *caps], [1, len(caps)]
-    if world.arena == "square" and world.walls == "nearest_per_axis":
-        rows = [[1.0, 0.0, 0.0, h], [0.0, 1.0, 0.0, h]] + ([[0.0, 0.0, 1.0, z]] if three else [])
-        return rows, [len(rows)]
-    corners = ((-h, -h), (h, -h), (h, h), (-h, h)) if world.arena == "square" else ()  # a polygon's edges are no planes
-    rows = [list(inward(a, b)) for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True)]
-    return rows + caps, [len(rows) + len(caps)]
-
-
-def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Shapes as they stand at the start, and what appears later: its bounds (m), time (s) and number."""
-    if not len(scene.later):
-        return scene.shapes, np.zeros((0, 8))
-    shapes, k = scene.shapes.copy(), scene.later
-    later = np.column_stack([shapes[k, :6], shapes[k, APPEARS], k])
-    shapes[k, :6] = AWAY
-    return shapes, later
-
-
 def read_by_drivers(scenario: Scenario, period: float) -> dict[str, Any]:
     """Record behind each letter of a driver's row; period: time between two decisions, s."""
     a, records = scenario.wind, scenario.records | {"metrics": scenario.measured_by()}
@@ -135,7 +106,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     scenario = scenario.in_flight(seed)
     real = np.float32 if plan.bits == 32 else np.float64
     dt, times = scenario.flight.dt, clock(scenario)
-    surfaces, families = faces(scenario)
+    surfaces, families = faces(scenario.world)
     edges, corners, spans = edge_rows(scenario.world)
     scene = scenario.stands() if plan.scene else EMPTY
     shapes, later = unbuilt(scene)
@@ -168,3 +139,12 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
         own=row_values(scenario, plan, seed).astype(real),
         due=onsets(scenario, seed, world) if plan.faults else (),
     )
+
+
+def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
+    """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
+    made = np.zeros((len(plan.columns), scenario.agents))
+    known = {"law": scenario.law_numbers, "group": scenario.group_numbers}
+    for c, (letter, name) in enumerate(plan.columns):
+        made[c] = scenario.own_numbers(letter, name, seed) if letter else known[name]
+    return made

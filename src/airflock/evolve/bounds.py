@@ -56,7 +56,7 @@ def studied(scenario: Scenario) -> dict[str, tuple[float, float]]:
 
 def unread(scenario: Scenario) -> set[str]:
     """Keys of the model's numbers that no rule reads under the scenario's choices."""
-    from airflock.engine.simulate import driver_text
+    from airflock.engine import driver_text
 
     text = driver_text(scenario)
     read = set(re.findall(r"\bp\.(\w+)", text)) | set(scenario.model.usual)

@@ -164,7 +164,7 @@ def _text_of(code: Any) -> str:
 
 def score_of(study: Study, place: int = 0) -> Score:
     """Parameters and a seed → order parameters, for one of the study's scenarios."""
-    from airflock.engine.simulate import score_flight
+    from airflock.engine import score_flight
 
     precision = int(study.search.precision)
 
@@ -187,7 +187,7 @@ def on_device(study: Study, device: str, scheduler: str | None = None) -> Study:
     fly_on_their_cpu(scheduler, device)
     if device not in ("cuda", "auto"):
         raise StudyError(f"device = {device!r} is none of cpu, cuda, auto")
-    from airflock.engine.simulate import picked
+    from airflock.engine import picked
 
     generation = [study.scenario] * study.population(0) * study.whole("seeds")
     return replace(study, device=picked(generation, device, precision=int(study.search.precision)))
@@ -205,7 +205,8 @@ def executor_for(
         from airflock.evolve.task import tasks_of
 
         return Cluster(tasks_of(study), scheduler, timeout=timeout)
-    from airflock.engine.simulate import compile_for, takes_all_cores
+    from airflock.engine import compile_for
+    from airflock.scenarios.cells import takes_all_cores
     from airflock.threads import cores
 
     # compiled once, before threads ask for it; a second processor has nothing to do until then

@@ -142,7 +142,7 @@ def flown(
     done: Callable[[], None] | None,
 ) -> list[dict[str, NDArray[np.float64]]]:
     """Scores (seed,) of each set of parameters on the same seeds."""
-    from airflock.engine.simulate import score_flights
+    from airflock.engine import score_flights
 
     varied = [with_parameters(scenario, each) for each in parameters]
     rows = score_flights(

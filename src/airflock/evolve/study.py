@@ -105,7 +105,7 @@ def _unpublished(scenario: Scenario) -> dict[str, Any]:
 
 def fingerprint(scenario: Scenario, precision: int) -> str:
     """Hash of everything that is compiled for a scenario: equal physics gives equal fingerprints."""
-    from airflock.engine.simulate import driver_text
+    from airflock.engine import driver_text
 
     return hashlib.sha256(driver_text(scenario, precision=precision).encode()).hexdigest()[:12]
 

@@ -1,6 +1,6 @@
 """Tasks of a study: what workers of a scheduler are sent, one for each of its scenarios."""
 
-from airflock.engine.simulate import score_flight
+from airflock.engine import score_flight
 from airflock.evolve.space import with_parameters
 from airflock.evolve.study import Study
 from airflock.executors import Score

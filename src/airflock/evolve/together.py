@@ -13,7 +13,7 @@ class Together:
     """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
 
     def __init__(self, study: Study, device: str):
-        """`device` as `airflock.engine.simulate.score_flights` takes it."""
+        """`device` as `airflock.engine.score_flights` takes it."""
         self.study, self.device = study, device
 
     def fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
@@ -22,7 +22,7 @@ class Together:
             yield from self._fly([flight for flight in flights if flight.place == place])
 
     def _fly(self, flights: Sequence[Flight]) -> Iterator[Landed]:
-        from airflock.engine.simulate import score_flights
+        from airflock.engine import score_flights
 
         begin = time.perf_counter()
         try:

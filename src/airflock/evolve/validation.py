@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from airflock.engine.simulate import plan_of
+from airflock.engine import plan_of
 from airflock.errors import AirflockError
 from airflock.evolve.study import is_study, load_study
 from airflock.recordings.files import fly_again, load_recording

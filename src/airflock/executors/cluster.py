@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from airflock.engine.simulate import compile_for, score_flight
+from airflock.engine import compile_for, score_flight
 from airflock.errors import AirflockError, StudyError
 from airflock.executors import Flight, Landed, Score
 from airflock.executors.here import land

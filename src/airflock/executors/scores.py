@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from airflock.engine.simulate import picked, score_flights
+from airflock.engine import picked, score_flights
 from airflock.errors import FlightError
 from airflock.executors import Flight
 from airflock.scenarios.scenario import Scenario

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from airflock.core.agent import State, answer
 from airflock.core.fault import Fault
-from airflock.engine.onsets import onsets
 from airflock.errors import ScenarioError
+from airflock.scenarios.onsets import onsets
 from airflock.scenarios.scenario import Scenario
 
 FLOWN = ("sense", "radio", "overrule", "motion")  # rules of faults that act on a vehicle or on the ether

@@ -21,6 +21,7 @@ from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import records_of
 from airflock.fleet.starting import KEY, in_the_air, vehicle_of
 from airflock.fleet.telemetry import MESSAGES
+from airflock.fleet.teller import Teller
 from airflock.onboard.card import Card
 from airflock.onboard.mission import Phase
 from airflock.onboard.node import Node
@@ -81,6 +82,7 @@ class Plan:
     clock : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
             vehicle; shared by all
     epoch : Unix time at which time.monotonic was 0, µs
+    watcher : address at which somebody hears all packets, and what the ether tells; None: nobody does
     """
 
     scenario: Scenario
@@ -91,6 +93,7 @@ class Plan:
     ports: Ports
     clock: MutableSequence[float]
     epoch: int
+    watcher: tuple[str, int] | None = None
 
     @property
     def now(self) -> float:
@@ -237,6 +240,12 @@ async def ether_life(plan: Plan) -> Life:
     at: list[tuple[float, float, float]] = [(0.0, 0.0, 0.0)] * len(card.members)
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
+    teller = Teller(card.members, plan.faults) if plan.watcher else None
+
+    def watched(data: bytes) -> None:
+        if plan.watcher is not None:
+            ports.ether.send(data, plan.watcher)
+
     while not plan.over:
         for data in ports.places.read():
             i, x, y, z, _ = WHERE.unpack(data)
@@ -245,11 +254,17 @@ async def ether_life(plan: Plan) -> Life:
         for data, sender in ports.ether.read_from():
             if sender in who:
                 ether.send(now, who[sender], data, at)
+                watched(data)
             elif sender == ports.watch.here:
                 for radio in radios:
                     ports.ether.send(data, radio)
+                watched(data)
         for to, data in ether.deliver(now, at):
             ports.ether.send(data, radios[to])
+            if teller is not None:
+                teller.arrived(to, data, now)
+        for data in () if teller is None else teller.report(now, plan.utc(time.monotonic())):
+            watched(data)
         await asyncio.sleep(HOP)
     return Life([], [], Ticks(0, 0, 0.0), Phase.DONE, time.process_time() - began)
 

@@ -125,13 +125,14 @@ def refused(scenario: Scenario, faults: Sequence[Fault]) -> list[str]:
 def fly(
     scenario: Scenario, card: Card, seed: int, mode: str, *, start: Sequence[State] | None,
     faults: Sequence[Fault] = (), operator: bytes = b"", join: tuple[str, int] = JOIN,
-    done: Callable[[], None] | None = None,
+    done: Callable[[], None] | None = None, watcher: tuple[str, int] | None = None,
 ) -> Flown:  # fmt: skip
     """Fly one fleet for the scenario's duration on the real clock, in the mode "tasks" or "processes".
 
     start : states in the air; None: from the ground by orders of the operator, and back
     join  : where vehicle 1 calls for a client that joins; vehicle 2 calls at the next port
     done  : called once for each second flown
+    watcher : address that gets every packet, and what the ether tells (`fleet.teller`)
 
     Raises ScenarioError for what flies in lock-step only, LinkError where a process ends before its time.
     """
@@ -148,7 +149,7 @@ def fly(
         ]  # the watch sets the clock when all are there
         clock: Any = first if mode == "tasks" else multiprocessing.RawArray("d", first)
         epoch = time.time_ns() // 1000 - round(now * 1e6)
-        plan = Plan(scenario, card, seed, start, tuple(faults), ports, clock, epoch)
+        plan = Plan(scenario, card, seed, start, tuple(faults), ports, clock, epoch, watcher)
         lives: list[Callable[[], Coroutine[Any, Any, Life]]] = [partial(ether_life, plan)]
         lives += [partial(node_life, plan, i) for i in range(len(card.members))]
         lives += [partial(craft_life, plan, i) for i in range(len(card.members))]

@@ -2,18 +2,21 @@
 
 import hashlib
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from airflock.core.agent import State
 from airflock.core.parameters import number_names
+from airflock.errors import CardError
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.modes import OURS
 from airflock.fleet.vehicle import Vehicle
 from airflock.mavlink import orders
 from airflock.mavlink.coordinates import Geodetic
+from airflock.mavlink.keys import read_key, write_key
 from airflock.mavlink.orders import Do, Order
 from airflock.mavlink.signing import Signer
-from airflock.onboard.card import Card
+from airflock.onboard.card import Card, write_card
 from airflock.scenarios.scenario import Scenario
 
 KEY = hashlib.sha256(b"a fleet in software has no secret").digest()
@@ -32,6 +35,21 @@ def vehicle_of(scenario: Scenario, card: Card, place: int, body: Any, noise: Out
     made = Vehicle(card.autopilot.name, card.members[place], card.site, at, scenario.vehicle, body, draw, started)
     made.place = place
     return made
+
+
+def write_for_watching(path: Path, card: Card) -> None:
+    """Write the card of a fleet in software, and its key beside it, so that `airflock watch` shows the fleet.
+
+    Over such files of an earlier fleet in software only: raises CardError where a mission's own would be lost.
+    """
+    key = path.with_suffix(".key")
+    if key.exists() and read_key(key) != KEY:
+        raise CardError([f"{key}: exists and is of a real mission; give another name with --card"])
+    if path.exists() and not key.exists():
+        raise CardError([f"{path}: exists without a key of a fleet in software; give another name with --card"])
+    write_card(path, card.document)
+    if not key.exists():
+        write_key(key, KEY)
 
 
 def lift_of(card: Card) -> float:

@@ -11,11 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.parameters import Quantity, declarations
-from airflock.engine import cpu
-from airflock.engine.plan import Plan
-from airflock.engine.simulate import plan_of
-from airflock.engine.state import State
-from airflock.engine.tables import tables
+from airflock.engine import Plan, State, plan_of
 from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
 from airflock.scenarios.files import load, presets
@@ -91,7 +87,7 @@ class Candidate:
         """Memory of a flight of as many agents as there are individuals."""
         flown = replace(self.scenario, flight=replace(self.scenario.flight, agents=float(tracks.individuals)))
         start = np.zeros((2 * self.plan.dimensions, tracks.individuals))
-        return State(self.plan, tables(flown, self.plan, 0), cpu.driver_of(self.plan), start)
+        return State.of(self.plan, flown, start=start)
 
 
 def candidate(base: Scenario, scale: Scale, axes: int) -> Candidate:
@@ -239,17 +235,17 @@ def _noises(scenario: Scenario, plan: Plan, numbers: tuple[Number, ...]) -> tupl
             generator.normal(size=(plan.dimensions, agents)),
         ]
     )
-    rows = tables(flown, plan, 0).row
+    rows = State.of(plan, flown, start=start).tables.row
 
     def differ(changed: Mapping[int, float]) -> bool:
         commands: list[NDArray[Any]] = []
         for world in (0, 1):
-            state = State(plan, tables(flown, plan, 0, world), cpu.driver_of(plan), start)
+            state = State.of(plan, flown, world=world, start=start)
             state.arrays["row"][:] = rows
             for column, value in changed.items():
                 state.arrays["row"][column] = value
-            with cpu.compiling(plan.model.name):
-                state.advance(0, 1, 2)
+            state.compile()
+            state.advance(0, 1, 2)
             commands.append(state.rows([f"c{axis}" for axis in plan.axes]))
         return not np.array_equal(commands[0], commands[1], equal_nan=True)
 

@@ -1,5 +1,7 @@
 """Stage of a video: everything that stands still, drawn once, and a picture of what moves at any instant."""
 
+from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -172,11 +174,18 @@ class Stage:
         self.tails.set_color(colors[kept])  # type: ignore[arg-type]
 
 
+def check_chart(chart: str, known: Sequence[str], whose: str) -> None:
+    """Raise RecordingError for a chart of an order parameter that a flight does not have: also before it is flown."""
+    if chart and chart not in known:
+        near = get_close_matches(chart, known, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise RecordingError(f"chart = {chart!r} is none that {whose} has: {', '.join(known)}{hint}")
+
+
 def _chart(figure: Any, recording: xr.Dataset, name: str, share: float, first: Paths) -> Any:
     """An order parameter over time beside the picture; returns the line that moves."""
     course = over_time(recording)
-    if name not in course:
-        raise RecordingError(f"chart = {name}: this recording has {', '.join(map(str, course.columns))}")
+    check_chart(name, list(course.columns), "this recording")
     values = course[name].dropna()
     values = values.loc[first.times[0] - 1e-9 : first.times[-1] + 1e-9]
     axes = figure.add_axes((share + 0.3 * (1.0 - share), 0.14, 0.62 * (1.0 - share), 0.7))

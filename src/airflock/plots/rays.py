@@ -7,11 +7,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from airflock.core.agent import Heard, State
-from airflock.engine.place import Course, Place
 from airflock.errors import RecordingError
 from airflock.plots import style
 from airflock.plots.scene import details_of, flown_with, name_of, paths_of
 from airflock.plots.through import ground_plans, nearby
+from airflock.scenarios.surroundings import Course, Place
 from airflock.stage.rays import Ray, cast_rays
 
 

@@ -12,16 +12,13 @@ import numpy as np
 import xarray as xr
 
 from airflock import __version__
-from airflock.engine.events import Event
-from airflock.engine.flight import DEVICES, Flight
-from airflock.engine.passes.driver import flight
-from airflock.engine.simulate import fly, picked, plan_of
-from airflock.engine.store import toolchain
+from airflock.engine import Flight, driver_text, fly, picked
 from airflock.errors import FlightError
-from airflock.machine import processor
+from airflock.machine import processor, toolchain
 from airflock.recordings.attributes import FAULTS
 from airflock.recordings.layout import dataset
 from airflock.recordings.perception import finish_keeping, sound
+from airflock.scenarios.events import Event
 from airflock.scenarios.files import loaded
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.own_code import law_hash
@@ -91,7 +88,7 @@ def simulate(
     scenario = loaded(scenario).in_flight(seed)
     sound(keep, events, scenario)
     device = picked([scenario], device, precision=precision, record=True, say=say)
-    if device in DEVICES:
+    if device in Flight.DEVICES:
         flight = Flight(scenario, seed, precision=precision, record=True, start=start, events=events, device=device)
         perceived = finish_keeping(flight, keep) if keep else {}
         flight.finish()
@@ -141,7 +138,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
-    text = flight(plan_of(scenario, precision=precision, record=True))
+    text = driver_text(scenario, precision=precision, record=True)
     own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
         "airflock_scenario": json.dumps(flown_document(scenario)),

@@ -7,9 +7,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from airflock import __version__
+from airflock import gpu as gpu
 from airflock.cache import cache_folder, cache_trouble, drivers, usual_folder
-from airflock.engine.cuda import device as gpu
-from airflock.engine.simulate import score_flight, score_flights
+from airflock.engine import score_flight, score_flights
 from airflock.machine import processor
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario

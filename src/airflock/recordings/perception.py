@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.core import radio, random
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.errors import FlightError
 from airflock.recordings.layout import DIMENSIONS, UNITS
 from airflock.scenarios.scenario import Scenario

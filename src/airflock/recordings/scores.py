@@ -17,11 +17,7 @@ from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
 from airflock.doors import from_outside
-from airflock.engine import cpu
-from airflock.engine.passes.build import columns
-from airflock.engine.plan import Plan
-from airflock.engine.simulate import finish, plan_of
-from airflock.engine.tables import tables
+from airflock.engine import measure_frames, plan_of
 from airflock.errors import RecordingError
 from airflock.executors.scores import scores
 from airflock.metrics import nearest
@@ -156,6 +152,11 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     return measure(recording, settings)[1]
 
 
+def courses(scenario: Scenario) -> list[str]:
+    """Names of the order parameters that have a value at every instant of a flight: the columns of `over_time`."""
+    return [name for metric in plan_of(scenario.alike()).metrics for name in metric.Sample._fields]  # type: ignore[attr-defined]
+
+
 def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
     """Order parameters of a recording, and their course over time.
 
@@ -167,26 +168,23 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
     precision = 64 if frames.dtype == np.float64 else 32
-    plan = plan_of(scenario.alike(), precision=precision)
     q = scenario.measured_by()
-    every = {"sample_every": q.period, "collide_every": q.collision_period or period}
-    steps = {name: max(1, round(seconds / period)) for name, seconds in every.items()}
-    numbers = tables(scenario.alike(), plan, 0).changed(agents=frames.shape[2], **steps)
-    _refuse_gaps(plan, present)
-    values, series = cpu.measure_frames(plan, numbers, frames, period, present=present)
-    names = [name for name, _, _ in columns(plan.metrics)]
+    every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
+    _refuse_gaps(scenario.alike(), present)
+    values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
-    course = pd.DataFrame(series, index=times, columns=names)
+    course = pd.DataFrame(series, index=times)
     if frames.shape[2] == 1:  # no pair, no distance
-        course[[name for name in nearest.PAIRED if name in names]] = np.nan
-    scores = finish(replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])), values)
+        course[[name for name in nearest.PAIRED if name in series]] = np.nan
+    scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     return scores | ({} if present.all() else {"present": float(present.mean())}), course
 
 
-def _refuse_gaps(plan: Plan, present: NDArray[np.bool_]) -> None:
+def _refuse_gaps(scenario: Scenario, present: NDArray[np.bool_]) -> None:
     """Contacts with the scene are found on the way from frame to frame, which a gap cuts."""
-    sweeps = any(metric.agent is not None and "touches" in asks(metric.agent, "agent") for metric in plan.metrics)
-    if plan.scene and sweeps and not present.all():
+    metrics = scenario.order_parameters
+    sweeps = any(metric.agent is not None and "touches" in asks(metric.agent, "agent") for metric in metrics)
+    if scenario.scenic and sweeps and not present.all():
         raise RecordingError(
             f"recording: {1.0 - present.mean():.1%} of the positions are missing, and contacts with the scene are found"
             " on the way from frame to frame; score it with --set metrics.kind=vasarhelyi, or fill the gaps"

@@ -20,7 +20,6 @@ from scipy.spatial import cKDTree
 
 from airflock import atomic
 from airflock.endings import PAGES, ending_fault
-from airflock.engine.events import Event, events_of
 from airflock.errors import RecordingError
 from airflock.metrics.registry import numbers_of
 from airflock.recordings import attributes
@@ -28,13 +27,14 @@ from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
 from airflock.replays.layers import flown_layers, layers
 from airflock.replays.pack import pack
+from airflock.scenarios.events import Event, events_of
 from airflock.scenarios.scenario import Scenario
 from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
-SCRIPTS = ("data", "colours", "replay")  # in the order in which they need each other
+SCRIPTS = ("data", "colours", "scene", "trails", "charts", "replay")  # in the order in which they need each other
 COUNTED = {"n_coll", "phi_coll", "collisions"}  # order parameters of flocks that can collide
 
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from difflib import get_close_matches
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -43,8 +44,14 @@ def presets() -> dict[str, Path]:
     >>> "vicsek_1995/ordered" in airflock.presets()
     True
     """
+    return dict(_shipped())
+
+
+@cache
+def _shipped() -> tuple[tuple[str, Path], ...]:
+    """Name and file of every preset: what is installed does not change while a process runs."""
     root = Path(str(resources.files("airflock"))) / "presets"
-    return {str(path.relative_to(root).with_suffix("")): path for path in sorted(root.rglob("*.toml"))}
+    return tuple((str(path.relative_to(root).with_suffix("")), path) for path in sorted(root.rglob("*.toml")))
 
 
 def load(

@@ -78,9 +78,9 @@ def diameter(points: Sequence[tuple[float, float]]) -> float:
 def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
     """Why a formation does not fit into the arena. Of straight lines in a convex arena the ends decide."""
     plan = ground_plan(world)
-    if plan is None or world.edges == "periodic":
+    if plan is None:
         return []
-    margin = MOST_JITTER * begin.jitter if world.edges == "bounce" else 0.0  # it puts whoever is outside onto a face
+    margin = 0.0 if world.edges == "open" else MOST_JITTER * begin.jitter  # a face would move whoever is outside
     ends = (0, max(agents - 2, 0), agents - 1)
     for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
         x, y, z = FORMATIONS[begin.kind](agent, begin.spacing_x, begin.spacing_y, begin.spacing_z)

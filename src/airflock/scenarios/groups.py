@@ -111,7 +111,7 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
         if count is None:
             rest.append(number)
         elif not isinstance(count, (list, tuple)):
-            whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count == int(count)
+            whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count % 1 == 0
             if not whole or not 1 <= count <= len(left):
                 faults.append(
                     f"groups[{number}].agents = {count!r} is neither a list of agents nor a number of them up to "
@@ -162,7 +162,7 @@ def _spreads(where: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> 
     """Standard deviations in declared units."""
     found, faults = {}, []
     for key, entry in given.items():
-        value = entry["value"] if isinstance(entry, Mapping) else entry
+        value = entry.get("value", entry) if isinstance(entry, Mapping) else entry
         declared = known.get(key)
         if not isinstance(declared, Quantity):
             faults.append(f"{where}.{key}: unknown number")

@@ -68,6 +68,17 @@ def place_notes(scenario: Scenario) -> list[str]:
     return notes
 
 
+def start_in_box(scenario: Scenario, given: NDArray[Any]) -> NDArray[Any]:
+    """A given start (component, agent), its places (m) put back into a periodic box: they are the same places there."""
+    if scenario.world.edges != "periodic":
+        return given
+    put = given.copy()
+    for axis, half in enumerate(half_sizes(scenario.world)[: scenario.dimensions]):
+        beyond = np.abs(given[axis]) > half
+        put[axis, beyond] -= 2.0 * half * np.floor((given[axis, beyond] + half) / (2.0 * half))
+    return put
+
+
 def start_fault(scenario: Scenario, given: NDArray[Any]) -> str:
     """What is wrong with a given start (component, agent), as a sentence; empty if nothing is."""
     dims = scenario.dimensions

@@ -194,6 +194,11 @@ class Scenario:
         document = {**self.document, "scene": {**self.document.get("scene", {}), **own}}
         return replace(self, scene=replace(self.scene, **own), document=document)
 
+    @property
+    def scenic(self) -> bool:
+        """Whether something stands in the world that agents see with rays, feel, or must not touch."""
+        return self.scene.draw == "flight" or bool(len(self.stands().shapes))
+
     def stands(self) -> Scene:
         """What stands in the world; for a model that casts, polygons are walls of it too."""
         polygons = self.world.obstacles
@@ -210,6 +215,10 @@ class Scenario:
     def measured_by(self) -> metric_parameters.Parameters:
         """Metric parameters with everything that was left to the scenario filled in."""
         return self._measured
+
+    def judged(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Order parameters of a flight with what the metric set makes of them: partial fitnesses and fitness."""
+        return self.measures.judged(values, self.agents, self.flight.duration, self.measured_by())
 
     @cached_property
     def _measured(self) -> metric_parameters.Parameters:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.world.shapes import APPEARS, BOX, CLOSED, COLUMNS, CYLINDER, GROUND, SEGMENT, TRIANGLE
 
+AWAY = 1e9  # m; where the bounds of a shape lie that is not there yet
 LEAF = 4  # shapes of a leaf
 TALL = 1e6  # m; half height of what has no end in height
 
@@ -129,3 +130,13 @@ def _tree(shapes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.fl
         pending.append((members[sides[half:]], -1))
         pending.append((members[sides[:half]], -1))
     return np.array(order), np.array(nodes), np.array(links, np.int64)
+
+
+def unbuilt(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shapes as they stand at the start, and what appears later: its bounds (m), time (s) and number."""
+    if not len(scene.later):
+        return scene.shapes, np.zeros((0, 8))
+    shapes, k = scene.shapes.copy(), scene.later
+    later = np.column_stack([shapes[k, :6], shapes[k, APPEARS], k])
+    shapes[k, :6] = AWAY
+    return shapes, later

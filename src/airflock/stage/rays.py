@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 from airflock.core.agent import Heard, State, decide
 from airflock.core.pilot import Senses
-from airflock.engine.place import Course, Place
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Course, Place
 from airflock.scenarios.timing import clock
 
 

@@ -61,7 +61,7 @@ def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
     plan = ground_plan(world)
     if plan is not None:
         corners = np.array(plan.exterior.coords)
-        lines.append(Lines("arena", _frame(corners, 0.0, 0.0) if flat else _frame(corners, bottom, top), ARENA))
+        lines.append(Lines("arena", frame(corners, 0.0, 0.0) if flat else frame(corners, bottom, top), ARENA))
     shapes = _shapes(scenario)
     points = [np.array(plan.exterior.coords)] if plan is not None else []
     points += [rows[:, c : c + 2] for rows in shapes.values() for c in (0, 3) if len(rows)]
@@ -74,7 +74,7 @@ def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
         ends = world.heights[number] if world.heights else (bottom, top)
         flatly = (0.0, tall) if flat else (ends[0], ends[1])
         solids.append(prism(f"obstacle_{number}", np.array(outline)[:, :2], *flatly, OBSTACLE))
-    solids += _scenery(shapes, tall if flat else None)
+    solids += scenery(shapes, tall if flat else None)
     goals = scenario.waypoints()
     if len(goals):
         size = 0.015 * span
@@ -87,13 +87,17 @@ def stage_of(scenario: Scenario, position: NDArray[Any]) -> Stage:
 
 
 def _shapes(scenario: Scenario) -> dict[float, NDArray[Any]]:
-    """Rows of the drawn shapes of a scene by their kind; without those that have no end."""
-    rows = scenario.stands().shapes
+    """Rows of the drawn shapes of a scene by their kind."""
+    return drawn(scenario.stands().shapes)
+
+
+def drawn(rows: NDArray[Any]) -> dict[float, NDArray[Any]]:
+    """Rows of shapes by their kind; without those that have no end."""
     small = np.abs(rows[:, [0, 1, 3, 4]]).max(axis=1, initial=0.0) < BROAD if len(rows) else np.zeros(0, bool)
     return {kind: rows[small & (rows[:, 6] == kind)] for kind in (BOX, CYLINDER, TRIANGLE, SEGMENT)}
 
 
-def _scenery(shapes: dict[float, NDArray[Any]], tall: float | None) -> list[Solid]:
+def scenery(shapes: dict[float, NDArray[Any]], tall: float | None) -> list[Solid]:
     """Boxes, trees, triangles and walls; in a plane everything is `tall` m high."""
     found = []
     boxes = [_box(*_heights(row, tall)) for row in shapes[BOX]]
@@ -155,7 +159,7 @@ def _together(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> tuple[NDArray[A
     return np.vstack([part[0] for part in parts]), faces.astype(np.uint32)
 
 
-def _frame(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
+def frame(corners: NDArray[Any], low: float, high: float) -> NDArray[Any]:
     """Edges of an upright prism over a closed outline (corner, 2), as segments."""
     found = []
     for z in {low, high}:

@@ -27,11 +27,16 @@ class Comparing(Room):
         self._menu: Any = None
 
     def _fork(self) -> None:
+        collisions, hand = self.drawing.collisions, self.player.hand
         self.player.fork()
+        collisions.join(hand)
+        collisions.fork()
         self.page.stand()
 
     def _join(self) -> None:
+        hand = self.player.hand
         self.player.join()
+        self.drawing.collisions.join(hand)
         self.page.stand()
 
     def _take(self, name: str) -> None:

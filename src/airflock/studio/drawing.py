@@ -1,8 +1,7 @@
 """Drawing: what stands, and the flocks of all sides frame by frame: darts, trails, links, collisions."""
 
-from collections import deque
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from airflock.metrics.registry import numbers_of
 from airflock.stage import colours
 from airflock.stage.scene import Lines, Solid, Stage, stage_of, turned
 from airflock.studio import measures
+from airflock.studio.collisions import Collisions
 from airflock.studio.player import Player
 from airflock.studio.shading import Shading
 from airflock.studio.side import BELOW, Side
@@ -23,22 +23,11 @@ PIECE = 6  # frames of one piece of a trail
 MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
 BROAD = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
 APART = 2.3  # half widths between the middles of two sides
-LISTED = 40  # collisions that are kept
 FOLLOWED = ("nothing", "the flock", "the selected agent")
 LINKS = ("none", "three nearest", "radio")
 NAMES = "AB"
 FLASH = 15  # frames for which a collision is shown
-SAME = 0.5  # s; two collisions of a pair within it are one
 PALE = 240.0  # of a link on which no packet arrives
-
-
-class Collision(NamedTuple):
-    """Two agents nearer than a collision: when, s, on which side, and who."""
-
-    time: float
-    side: int
-    first: int
-    second: int
 
 
 class Flock:
@@ -46,7 +35,6 @@ class Flock:
 
     def __init__(self, side: Side, offset: NDArray[Any]):
         self.side, self.offset = side, offset
-        self.touching: set[tuple[int, int]] = set()
         measured, scenario = side.scenario.measured_by(), side.scenario
         counts = {"n_coll", "phi_coll", "collisions"} & set(numbers_of(scenario.measures, measured))
         self.near = float(measured.r_coll) if counts else 0.0  # fish have no collisions
@@ -91,7 +79,7 @@ class Drawing:
     def __init__(self, player: Player, view: View):
         self.player, self.view = player, view
         self.shading, self.trails, self.links, self.follow = Shading(), True, LINKS[0], FOLLOWED[0]
-        self.collisions: deque[Collision] = deque(maxlen=LISTED)
+        self.collisions = Collisions()
         self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
         self.stand()
 
@@ -121,7 +109,7 @@ class Drawing:
         share = 1.0 if len(sides) == 1 else BROAD
         view.look_at(middle + 0.5 * step * (len(sides) - 1) + beside, share * wide, self.flat)
         self._before: NDArray[Any] | None = None
-        self._pieces, self._done = 0, 0
+        self._pieces = 0
         self._alert = np.zeros(count, int)
         self._shown = list(sides)
 
@@ -162,9 +150,10 @@ class Drawing:
                 self._build()
 
     def forget(self) -> None:
-        """Forget trails: the flight went elsewhere."""
+        """Forget trails, and collisions that lie ahead: the flight went elsewhere."""
         self.view.no_trails()
         self._before = None
+        self.collisions.back(self.player.time, len(self.player.sides))
 
     # -------------------------------------------------------------------------------------------------- frames
 
@@ -214,26 +203,14 @@ class Drawing:
 
     def _flash(self, tone: NDArray[np.uint8]) -> None:
         """Colour who collides, for half a second at least, and list new collisions."""
-        done, first = sum(len(flock.side.flight.events) for flock in self.flocks), 0
-        if done > self._done:  # what lay ahead of an earlier moment will not come again
-            now = self.player.time
-            self.collisions = deque((c for c in self.collisions if c.time <= now), LISTED)
-        self._done = done
+        first = 0
         self._alert = np.maximum(self._alert - 1, 0)
         for number, flock in enumerate(self.flocks):
             touching = flock.pairs.within(flock.near)
             self._alert[first + touching.ravel()] = FLASH
-            pairs = {(int(i), int(j)) for i, j in touching}
-            for i, j in sorted(pairs - flock.touching):
-                self._note(Collision(flock.side.flight.time, number, i, j))
-            flock.touching = pairs
+            self.collisions.see(flock.side.flight.time, number, map(tuple, np.sort(touching, axis=1).tolist()))
             first += len(flock.position)
         tone[self._alert > 0] = colours.ALERT
-
-    def _note(self, new: Collision) -> None:
-        """List a collision; one that was listed before the flight went back is the same."""
-        if not any(c[1:] == new[1:] and abs(c.time - new.time) < SAME for c in self.collisions):
-            self.collisions = deque(sorted([new, *self.collisions], reverse=True)[:LISTED], LISTED)
 
     def whose(self, chosen: int) -> tuple[int, int]:
         """Side and number of an agent counted through all sides."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 
 KEPT = 600  # points of a chart
 MOST_LINKS = 2500

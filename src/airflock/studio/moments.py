@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 
-from airflock.engine.moments import Snapshot
+from airflock.engine import Snapshot
 
 MOST = 256 * 2**20  # bytes of all moments together
 COUNT = 400  # moments at most

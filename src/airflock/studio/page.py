@@ -87,10 +87,10 @@ class Page:
         self.frame(True)
 
     def elsewhere(self) -> None:
-        """The flights are at another time: forget trails and charts."""
+        """The flights are at another time: forget trails, charts, and the collisions that lie ahead."""
+        self.drawing.forget()
         if len(self.player.sides) != len(self.drawing.flocks):
             self.stand()
-        self.drawing.forget()
         self.measuring.clear()
         self.tuning.refresh()
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.contract import Model
+from airflock.core.view import View as Seen
 from airflock.core.vocabulary import asks
-from airflock.engine.look import View as Seen
-from airflock.engine.place import Course, Place
-from airflock.engine.state import State as Memory
+from airflock.engine import State as Memory
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Course, Place
 from airflock.stage import colours
 from airflock.stage.arrows import arrow, values, word_of
 from airflock.stage.rays import cast_rays

@@ -4,7 +4,8 @@ import math
 from typing import TYPE_CHECKING
 
 from airflock.errors import StudioError
-from airflock.studio.drawing import FOLLOWED, LINKS, NAMES, Collision
+from airflock.studio.collisions import BOTH, Collision
+from airflock.studio.drawing import FOLLOWED, LINKS, NAMES
 from airflock.studio.room import Room, note
 from airflock.studio.shading import ways
 
@@ -103,7 +104,7 @@ class Playing(Room):
             self.player.ask(lambda: self.back(max(when - BEFORE, 0.0)))
 
     def _name(self, c: Collision) -> str:
-        side = f", {NAMES[c.side]}" if len(self.player.sides) > 1 else ""
+        side = f", {NAMES[c.side]}" if len(self.player.sides) > 1 and c.side != BOTH else ""
         return f"t = {c.time:.1f} s: {c.first} and {c.second}{side}"
 
     def chart(self) -> None:
@@ -115,7 +116,7 @@ class Playing(Room):
         self.key.content = drawing.shading.shown.key
         if self.way.value != drawing.shading.way:
             self.way.value = drawing.shading.way
-        found = list(drawing.collisions)
+        found = drawing.collisions.listed
         if found != self._told:
             self._told = found
             self.jump.options = (JUMP, *dict.fromkeys(map(self._name, found)))

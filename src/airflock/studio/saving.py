@@ -9,7 +9,7 @@ import numpy as np
 import tomlkit
 import xarray as xr
 
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.errors import FlightError
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import presets

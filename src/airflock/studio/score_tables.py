@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from airflock.engine.flight import Flight
+from airflock.engine import Flight
 from airflock.metrics.registry import reports
 from airflock.scenarios.scenario import Scenario
 

@@ -9,13 +9,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.engine.events import Event
-from airflock.engine.flight import Flight
-from airflock.engine.moments import Snapshot
+from airflock.engine import Flight, Snapshot
 from airflock.errors import RecordingError, StudioError
 from airflock.recordings import attributes
 from airflock.recordings.files import load_recording
 from airflock.recordings.scores import scenario_of
+from airflock.scenarios.events import Event
 from airflock.scenarios.files import load
 from airflock.scenarios.group_keys import is_group_key, value_in_group
 from airflock.scenarios.scenario import Scenario

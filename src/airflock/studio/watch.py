@@ -1,9 +1,10 @@
-"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured."""
+"""Watch: a page in the browser that shows a flight and lets it be played, tuned and measured; or a fleet that flies."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from airflock.errors import StudioError
 from airflock.studio.player import Player
 
 
@@ -17,11 +18,16 @@ def watch(
     host: str = "127.0.0.1",
     port: int = 8080,
     against: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    radios: Sequence[str] = (),
+    key: str | os.PathLike[str] | None = None,
     say: Callable[[str], None] = print,
 ) -> None:
     """Open a page that flies a scenario live, until Ctrl-C: play it, turn its sliders, save what is found.
 
-    scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again
+    Of a flight card (.json) it shows the fleet that carries it instead, by the packets that its radios hear: where the
+    drones are, their phases, links and faults. It listens only, and can do nothing to them.
+
+    scenario : name of a preset, of a scenario file, or of a recording (.nc), which is flown again; or of a flight card
     settings : keys like "model.p_rep" with the values that replace the file's
     seed     : seed of the flight
     law      : a law of your own that flies instead of the file's, as for `airflock.load`
@@ -30,9 +36,13 @@ def watch(
     port     : port to listen at; 0 takes any free one
     against  : what flies beside it on the same clock, with the same seed and noise: another preset or file, or keys
                with values, such as {"model.p_rep": 0.2}
+    radios   : of a fleet: where its packets are heard, such as "udp:0.0.0.0:14600" or "serial:/dev/ttyUSB0:57600";
+               by default where a fleet in software is heard, udp:127.0.0.1:14600
+    key      : of a fleet: file of the mission's key; by default beside the card
     say      : is told each line: notes, the address of the page, faults
 
-    Raises ScenarioError for a scenario that cannot be flown, and StudioError for a port in use, one line each.
+    Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of a fleet, and
+    StudioError for a port in use, one line each.
 
     Returns
     -------
@@ -42,7 +52,16 @@ def watch(
     --------
     >>> import airflock
     >>> airflock.watch("vasarhelyi_2018/4ms", {"agents": 30})  # doctest: +SKIP
+    >>> airflock.watch("mission.json", radios=["udp:0.0.0.0:14600"])  # doctest: +SKIP
     """
+    if str(scenario).lower().endswith(".json"):
+        idle = {"settings": settings, "seed": seed, "law": law, "trust": trust, "against": against}
+        _refuse(f"{scenario}: is a flight card, whose fleet is watched as it flies", idle, "a scenario")
+        from airflock.studio.fleet_watch import watch_fleet
+
+        watch_fleet(scenario, key, radios, host, port, say)
+        return
+    _refuse(f"{scenario}: is flown here", {"radios": radios, "key": key}, "the flight card of a fleet (.json)")
     rival = against if against is None or isinstance(against, Mapping) else str(against)
     player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust, against=rival, at_once=True)
     for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
@@ -66,3 +85,10 @@ def watch(
             page.evolving.stop()
     finally:
         view.stop()
+
+
+def _refuse(what: str, idle: Mapping[str, Any], wanted: str) -> None:
+    """Raise StudioError for what was given and would do nothing."""
+    given = [name for name, value in idle.items() if value]
+    if given:
+        raise StudioError(f"{what}; {' and '.join(given)} need{'s' * (len(given) == 1)} {wanted}")

@@ -260,7 +260,7 @@ def _document(scenario: Scenario) -> dict[str, Any]:
 
 def _rate(scenario: Scenario, threads: int | None) -> float:
     """Flights per second, from a few of them."""
-    from airflock.engine.simulate import compile_for, score_flights
+    from airflock.engine import compile_for, score_flights
     from airflock.threads import cores
 
     compile_for(scenario)

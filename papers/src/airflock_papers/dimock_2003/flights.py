@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine import cpu
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine import compile_for, fly
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
@@ -72,7 +71,7 @@ class Birds:
         chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
-            cpu.flight_driver(plan_of(base, record=True))  # compiled once, before threads ask for it
+            compile_for(base, record=True)  # compiled once, before threads ask for it
         count = 0
 
         def done() -> None:

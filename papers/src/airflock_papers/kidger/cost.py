@@ -3,7 +3,7 @@
 import time
 from typing import NamedTuple
 
-from airflock.engine.simulate import score_flight
+from airflock.engine import score_flight
 from airflock.scenarios.files import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured

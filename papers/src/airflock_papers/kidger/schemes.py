@@ -10,11 +10,11 @@ from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.maths import norm
 from airflock.core.pilot import Senses
 from airflock.core.vocabulary import Own
-from airflock.engine.place import Course, Place
 from airflock.models import kidger
 from airflock.recordings.flights import simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.surroundings import Course, Place
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights

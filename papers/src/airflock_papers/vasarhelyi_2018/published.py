@@ -6,7 +6,6 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.engine.simulate import finish
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -44,5 +43,5 @@ def program_runs(speed: int, variants: tuple[str, ...] = ("stock_abs",)) -> pd.D
     scenario = optimum(speed)
     # all runs of the program were one connected flock at every sample: nobody disconnected, smallest cluster everybody
     whole = {"n_disc": 0.0, "n_min": float(scenario.agents)}
-    rows = [finish(scenario, {**row, **whole}) for row in runs.to_dict("records")]
+    rows = [scenario.judged({**row, **whole}) for row in runs.to_dict("records")]
     return pd.DataFrame(rows)

@@ -15,7 +15,7 @@ from xarray import Dataset
 
 from airflock import atomic
 from airflock.cache import cache_folder
-from airflock.engine.simulate import score_flights
+from airflock.engine import score_flights
 from airflock.recordings.flights import provenance, simulate
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario

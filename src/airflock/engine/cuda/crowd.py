@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine import cpu
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
-from airflock.engine.cuda.device import free_memory, required, runtime, simulating
 from airflock.engine.cuda.memory import SHARE, unfit
+from airflock.engine.measuring import measured
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners
 from airflock.engine.plan import Plan
@@ -20,6 +19,7 @@ from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined
 from airflock.errors import DeviceError
+from airflock.gpu import free_memory, required, runtime, simulating
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.scenarios.wings import FORMATIONS
@@ -193,7 +193,7 @@ def fly_crowd(scenario: Scenario, plan: Plan, seed: int, start: Any = None) -> F
     for step in range(0, steps + 1, every):
         flock.advance(step - flock.step)
         places = flock.state()[0]
-        series.append(cpu.measure_frames(once, table, places[None])[1][0])
+        series.append(measured(once, table, places[None])[1][0])
         if plan.record:  # the command of this instant is decided by the step that follows
             flock.advance()
             frames.append(np.concatenate([places, flock.state()[1]]))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.cpu import Flown
-from airflock.engine.cuda.device import free_memory, multiprocessors, required, runtime
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
 from airflock.engine.cuda.shape import Shape
@@ -20,6 +19,7 @@ from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached
 from airflock.errors import DeviceError
+from airflock.gpu import free_memory, multiprocessors, required, runtime
 
 AT_ONCE = 16_384  # flocks per launch at most: enough to fill a GPU many times over, few enough to show progress
 

@@ -10,6 +10,7 @@ from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners, scratch_sizes
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.tables import Tables
+from airflock.scenarios.cost import most_below
 
 SHARE = 0.9  # of the free memory that may be used
 
@@ -85,12 +86,3 @@ def unfit(agents: int, bytes_: int, room: int, fit: int) -> str:
         f"a flock of {agents} agents needs {bytes_ / 1e9:.3g} GB of the GPU's memory and {room / 1e9:.3g} GB are free; "
         f"about {fit} agents fit"
     )
-
-
-def most_below(high: int, fits: Any) -> int:
-    """The largest number up to `high` that fits, 0 if not even one does."""
-    low = 0
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low

@@ -9,11 +9,11 @@ from typing import Any
 from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
 from airflock.engine import vectors
-from airflock.engine.generate import Source, law_mark
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.replace import ReplacementError, must_replace
 from airflock.engine.specialise.values import Function
 from airflock.engine.stages.state import SCENE
+from airflock.rules.generate import Source, law_mark
 
 JIT = "@njit(**JIT)"
 

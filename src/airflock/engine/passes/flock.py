@@ -1,7 +1,6 @@
 """Flock: rules that see all agents at once, a model's `flock` and a metric's `survey`, and the scratch they work in."""
 
-from collections.abc import Callable, Mapping
-from inspect import signature
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -11,6 +10,7 @@ from airflock.core.contract import Metric
 from airflock.core.vocabulary import asks
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
+from airflock.rules.probe import shapes_of
 
 
 class Owner(NamedTuple):
@@ -73,12 +73,6 @@ def _call(build: Builder, owner: Owner) -> list[str]:
     lines += [f"shared_{owner.name} = {build.source.name(owner.Shared)}({', '.join(columns)})"]
     build.source.solver(owner.rule)
     return [*lines, *build.once([build.call(owner.rule, owner.kind, given, owner.name)])]
-
-
-def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:
-    """Shapes of the scratch for so many agents: what `workspace` returns for those of n and the records it asks for."""
-    given = {**records, "n": agents}
-    return workspace(*(given[name] for name in signature(workspace).parameters))
 
 
 def _record(owner: Owner, plan: Plan) -> Any:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from airflock.engine.specialise.apart import Owners
 from airflock.engine.specialise.values import (
     LOAD,
     STORE,
@@ -77,6 +78,8 @@ def settled(value: object) -> bool:
 class Expressions:
     """Values of expressions, by the type of their node."""
 
+    owners: Owners
+
     def value(self, node: ast.expr, scope: Scope) -> Any:
         """A known Python object, or syntax of the driver."""
         method = getattr(self, f"_{type(node).__name__}", None)
@@ -118,7 +121,7 @@ class Expressions:
         if node.id in scope.known:
             return scope.known[node.id]
         if node.id in scope.text.local:
-            return ast.Name(node.id, LOAD)
+            return ast.Name(self.owners.spelled(node.id, scope.text), LOAD)
         value = scope.text.names.get(node.id, getattr(builtins, node.id, MISSING))
         if value is MISSING:
             raise scope.fault(node, f"{node.id} is not defined")
@@ -284,10 +287,10 @@ class Expressions:
         return ast.Call(given(rule.__name__, "rule", rule), handed, [])
 
     def helper(self, called: Callable[..., Any], node: ast.Call, arguments: list[Any], scope: Scope) -> object:
-        """Value of a helper that consists of a docstring and an expression, in place of its call."""
+        """Value of a helper that consists of one expression, in place of its call."""
         inner = self.entered(called, node, arguments, scope)
-        last = inner.text.node.body[-1]
-        if len(inner.text.node.body) > 2 or not isinstance(last, ast.Return) or last.value is None:
+        last = inner.text.body[-1]
+        if len(inner.text.body) > 1 or not isinstance(last, ast.Return) or last.value is None:
             raise scope.fault(node, f"{called.__name__} is more than one expression")
         return self.value(last.value, inner)
 
@@ -312,7 +315,7 @@ class Expressions:
         """Syntax of the driver for what is assigned to."""
         if isinstance(node, ast.Name):
             scope.known.pop(node.id, None)
-            return ast.Name(node.id, STORE)
+            return ast.Name(self.owners.spelled(node.id, scope.text), STORE)
         if isinstance(node, ast.Tuple):
             return ast.Tuple([self.target(part, scope) for part in node.elts], STORE)
         if isinstance(node, ast.Subscript):

@@ -9,12 +9,13 @@ from typing import Any
 
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
+from airflock.engine.specialise.apart import Owners, renamed, shares
 from airflock.engine.specialise.dead import read, without_dead
 from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
-from airflock.engine.specialise.values import LOAD, Bundle, Components, Loop, given, kind_of, text_of
+from airflock.engine.specialise.values import LOAD, Bundle, Components, Loop, StageError, given, kind_of, text_of
 from airflock.engine.stages import words
 from airflock.engine.stages.state import SCENE, Flock, own_row
-from airflock.engine.stages.words import Itself
+from airflock.engine.stages.words import Itself, Named
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
 UNROLLED = (range, tuple, list, enumerate, zip)
@@ -58,6 +59,8 @@ def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Sp
     """
     made = _Statements(build)
     once, body, answer = made.run(stage, known)
+    where = made.owners.texts[0].where
+    made.owners.part([*once, *body], answer, lambda told: StageError(f"{where}: {stage.__name__}: {told}"))
     kept = read([answer]) if answer is not None else set()
     kept |= {name for value in known.values() if isinstance(value, Components) for name in value.set.values()}
     whole = without_dead([*once, *body], kept)
@@ -128,6 +131,7 @@ class _Statements(Expressions):
             "others": Loop("m", agents=False),
         }
         text = text_of(stage)
+        self.owners = Owners(text)
         names = [a.arg for a in (*text.node.args.args, *text.node.args.kwonlyargs)]
         scope = Scope(text, {name: value for name, value in standing.items() if name in names} | known)
         done: list[ast.stmt] = []
@@ -198,14 +202,25 @@ class _Statements(Expressions):
     ) -> tuple[list[ast.stmt], tuple[ast.expr, Scope] | None]:
         """Statements of a helper in place of its call, and the expression that it returns, as the helper knows it."""
         inner = self.entered(called, node, self._items(node.args, scope), scope)
-        *body, last = inner.text.node.body
+        *body, last = inner.text.body
+        done = self.copied(inner)
         if isinstance(last, ast.Return) and last.value is not None:
-            done, answer = self.block(body, inner), (last.value, inner)
+            done, answer = done + self.block(body, inner), (last.value, inner)
         else:
-            done, answer = self.block([*body, last], inner), None
+            done, answer = done + self.block([*body, last], inner), None
         if any(isinstance(item, ast.Return) for statement in done for item in ast.walk(statement)):
             raise scope.fault(node, f"{called.__name__} returns from within")
         return done, answer
+
+    def copied(self, inner: Scope) -> list[ast.stmt]:
+        """Variables of a helper for what it is handed and binds anew."""
+        done: list[ast.stmt] = []
+        for name in sorted(inner.text.again & inner.known.keys()):
+            value = inner.known[name]
+            if residual(value) or isinstance(value, (Named, float)):
+                made = self.printed(value, inner.text.node, inner)
+                done.append(ast.Assign([self.target(ast.Name(name), inner)], made, lineno=0))
+        return done
 
     def loop(self, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """A loop: unrolled where it is known, over agents, or as it stands."""
@@ -251,23 +266,30 @@ class _Statements(Expressions):
         names = [_name(part) for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
         parts = value if isinstance(target, ast.Tuple) and isinstance(value, (tuple, list)) else [value]
         once = all(name in scope.text.once for name in names)
+        if helper is not None and isinstance(value, Components):
+            self._once(helper, value, self.owners.spelled(names[0], scope.text), node, scope)
         if isinstance(value, Components) or (once and all(map(settled, parts))):
             self.bind(target, value, scope)
             return before
         made, stored = self.printed(value, node, scope), self.target(target, scope)
-        if helper is not None and ast.unparse(made) == ast.unparse(stored):
-            return before  # the helper calls it what its caller does
+        if helper is not None and isinstance(stored, ast.Name) and shares(before, made, stored.id):
+            return renamed(before, made.id, stored.id)  # type: ignore[attr-defined]
         sum_ = made if isinstance(made, ast.BinOp) and isinstance(made.op, ast.Add) else None
         if sum_ is not None and isinstance(stored, ast.Name) and _name(sum_.left) == stored.id:
             return [*before, ast.AugAssign(stored, sum_.op, sum_.right)]
         return [*before, ast.Assign([stored], made, lineno=0)]
+
+    def _once(self, helper: Any, vector: Components, target: str, node: ast.Assign, scope: Scope) -> None:
+        """Refuse a vector that a helper returns twice: the names of its components would be overwritten."""
+        if self.owners.taken(vector.name, target):
+            raise scope.fault(node, f"{helper.__name__} returns its vector to {target} and to another name")
 
     def helped(self, node: ast.expr, scope: Scope) -> Callable[..., Any] | None:
         """The helper of several statements that an expression calls, if it is such a call."""
         called = self.value(node.func, scope) if isinstance(node, ast.Call) else None
         if not isinstance(called, types.FunctionType) or not called.__module__.startswith(STAGES):
             return None
-        if called.__module__ == words.__name__ or len(text_of(called).node.body) <= 2:
+        if called.__module__ == words.__name__ or len(text_of(called).body) == 1:
             return None
         return called
 
@@ -276,7 +298,9 @@ class _Statements(Expressions):
         if isinstance(target, ast.Tuple) and isinstance(node, ast.Tuple):
             return tuple(self.made(*pair, scope) for pair in zip(target.elts, node.elts, strict=True))
         kind = LOCALS.get(self.value(node.func, scope)) if isinstance(node, ast.Call) and not node.args else None
-        return self.value(node, scope) if kind is None else Components(_name(target), kind)
+        if kind is None:
+            return self.value(node, scope)
+        return Components(self.owners.spelled(_name(target), scope.text), kind)
 
 
 def _ends(statements: list[ast.stmt]) -> bool:

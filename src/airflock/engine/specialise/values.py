@@ -97,13 +97,20 @@ class Text:
 
     local : names that it binds, parameters among them
     once  : those that it binds in one place only
+    again : parameters that it binds anew
     """
 
     node: ast.FunctionDef
     local: frozenset[str]
     once: frozenset[str]
+    again: frozenset[str]
     names: dict[str, Any]
     where: str
+
+    @property
+    def body(self) -> list[ast.stmt]:
+        """Its statements, without a docstring."""
+        return self.node.body[1:] if ast.get_docstring(self.node) is not None else self.node.body
 
 
 @cache
@@ -127,4 +134,5 @@ def text_of(function: Callable[..., Any]) -> Text:
     )
     parameters = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)}
     once = frozenset(name for name, count in bound.items() if count == 1 and name not in parameters)
-    return Text(node, frozenset(bound) | parameters, once, function.__globals__, function.__code__.co_filename)
+    again = frozenset(bound) & parameters
+    return Text(node, frozenset(bound) | parameters, once, again, function.__globals__, function.__code__.co_filename)

@@ -2,8 +2,9 @@
 
 import math
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
+from inspect import signature
 from typing import Any
 
 from airflock.aero import descent
@@ -15,9 +16,8 @@ from airflock.core.radio import Radio
 from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.topology import Topology
 from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
-from airflock.engine import law
-from airflock.engine.passes.flock import shapes_of
 from airflock.errors import RuleError
+from airflock.rules import law
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
     3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 0.0, 1.0,
@@ -141,6 +141,12 @@ def _shared(model: Model, given: dict[str, Any]) -> Any:
     return model.Shared(*[column[0] for column in shared])
 
 
+def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, Any]) -> Any:
+    """Shapes of the scratch for so many agents: what `workspace` returns for those of n and the records it asks for."""
+    given = {**records, "n": agents}
+    return workspace(*(given[name] for name in signature(workspace).parameters))
+
+
 def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str) -> Any:
     names = asks(rule, kind, owner)
     missing = [name for name in names if name not in given]
@@ -149,7 +155,7 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
     try:
         answer = rule(*(given[name] for name in names))
     except Exception as fault:  # a user's rule may fail in any way; show where
-        frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/engine/probe" not in f.filename]
+        frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/rules/probe" not in f.filename]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
         raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {type(fault).__name__}: {fault}") from fault
     numbers = answer if isinstance(answer, tuple) else (answer,)

@@ -16,9 +16,9 @@ from copy import copy
 from typing import Any
 
 from airflock.core import random as random_streams
-from airflock.engine import law
-from airflock.engine.integers import tree_of
 from airflock.errors import RuleError
+from airflock.rules import law
+from airflock.rules.integers import tree_of
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'

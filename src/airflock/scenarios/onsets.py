@@ -4,18 +4,14 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from airflock.core import random
 from airflock.core.fault import Fault
 from airflock.core.vocabulary import asks
-from airflock.engine.plan import Plan
-from airflock.engine.stages.state import fault_row
 from airflock.scenarios.faulty import Entry
 from airflock.scenarios.scenario import Scenario
 
 if TYPE_CHECKING:
-    from airflock.engine.state import State
+    pass
 
 ENDLESS = 1e9  # s; how long a fault lasts that does not end
 HOUR = 3600.0  # s
@@ -96,26 +92,6 @@ def _leaves(kind: Fault, entry: Entry) -> float:
     return float(kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))))
 
 
-def strike(state: "State", onset: Onset) -> None:
-    """Write the columns of a fault that begins. An agent that is absent is hit by nothing."""
-    slot = onset.agent if state.slots is None else int(state.slots[onset.agent])
-    if slot >= state.here:
-        return
-    plan: Plan = state.plan
-    kind = next((kind for kind in plan.faults if kind.name == onset.kind), None)
-    if kind is None:
-        return
-    work, rows = state.arrays["work"], state.driver.ROWS
-    real, dt = work.dtype.type, state.dt
-    values: dict[str, Any] = {"onset": real(onset.step) * real(dt), "lasts": onset.lasts}
-    values |= dict(zip(kind.fields, onset.numbers, strict=True))
-    values |= {name: work[rows[name[3:]], slot] for name in kind.onset if name[3:] in rows}
-    for name, value in values.items():
-        row = rows.get(fault_row(kind.name, name))
-        if row is not None:
-            work[row, slot] = value
-
-
 def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
     """Faults that have begun before a step, as plain values: kind, agent, when they begin and end (s; None: never)."""
     return [
@@ -128,12 +104,3 @@ def told(due: tuple[Onset, ...], step: int, dt: float) -> list[dict[str, Any]]:
         for onset in due
         if onset.step < step and not onset.leaves
     ]
-
-
-def row_values(scenario: Scenario, plan: Plan, seed: int) -> Any:
-    """What differs among agents, (number, agent): numbers with the tolerances of manufacture, law, group."""
-    made = np.zeros((len(plan.columns), scenario.agents))
-    known = {"law": scenario.law_numbers, "group": scenario.group_numbers}
-    for c, (letter, name) in enumerate(plan.columns):
-        made[c] = scenario.own_numbers(letter, name, seed) if letter else known[name]
-    return made

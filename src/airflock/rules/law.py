@@ -5,8 +5,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from airflock.engine.integers import BITWISE, integers_of, is_integer, tree_of
 from airflock.errors import RuleError
+from airflock.rules.integers import BITWISE, integers_of, is_integer, tree_of
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
 RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it

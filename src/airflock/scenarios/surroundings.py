@@ -6,13 +6,13 @@ from typing import Any
 from airflock.core.agent import State, answer
 from airflock.core.contract import Model
 from airflock.core.maths import FAR
-from airflock.engine.planning import EDGES
-from airflock.engine.tables import unbuilt
 from airflock.scenarios.scenario import Scenario
+from airflock.scenes.tree import unbuilt
 from airflock.world import bvh, goals
 from airflock.world.inside import inside
 from airflock.world.place import Place as Map
 from airflock.world.place import Shapes
+from airflock.world.surfaces import EDGES
 
 
 class Place(Map):

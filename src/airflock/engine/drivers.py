@@ -1,0 +1,59 @@
+"""Drivers: what flies a plan, compiled or interpreted; what is heard and said while it compiles."""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from airflock.engine import interpreted
+from airflock.engine.passes.driver import flight
+from airflock.engine.plan import Plan
+from airflock.engine.store import load_driver
+from airflock.errors import RuleError
+
+
+@cache
+def flight_driver(plan: Plan) -> ModuleType:
+    """Compiled driver of a plan."""
+    return load_driver(flight(plan), plan.model.name)
+
+
+def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
+    """Driver of a plan: compiled, or with device = python its text as plain Python."""
+    return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
+
+
+def is_loaded(driver: ModuleType) -> bool:
+    """Whether a driver flies at once: it has been compiled or read in this process, or is interpreted."""
+    return bool(getattr(driver.advance, "overloads", True))
+
+
+def is_compiled(driver: ModuleType) -> bool:
+    """Whether a driver flies without being compiled first: in this process, or from what an earlier one has kept."""
+    return is_loaded(driver) or any(Path(driver.advance.stats.cache_path).glob("*.nbi"))
+
+
+def flying(driver: ModuleType, model: str) -> AbstractContextManager[None]:
+    """Around calls of a driver: `compiling`, if it has to be compiled first."""
+    return nullcontext() if is_loaded(driver) else compiling(model)
+
+
+@contextmanager
+def compiling(model: str) -> Iterator[None]:
+    """Turn what the compiler says of a rule into one line; an interruption is heard after each of its passes.
+
+    Raises RuleError, GivenUp.
+    """
+    from numba.core.errors import NumbaError
+    from numba.core.event import install_listener
+
+    from airflock.heeding import Heeding
+
+    try:
+        with install_listener("numba:run_pass", Heeding()):
+            yield
+    except NumbaError as fault:
+        lines = [line.strip() for line in str(fault).splitlines()]
+        said = next((line for line in lines if line and not line.startswith(("Failed in", "During", "File"))), "")
+        raise RuleError(f"model {model}: a rule does not compile, though plain Python takes it: {said}") from fault

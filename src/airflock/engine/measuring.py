@@ -1,0 +1,91 @@
+"""Measuring: order parameters of frames that are known, flown or recorded, by the very stages of a flight."""
+
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine import interpreted
+from airflock.engine.passes.build import columns
+from airflock.engine.passes.driver import replay
+from airflock.engine.plan import Plan
+from airflock.engine.planning import plan_of
+from airflock.engine.state import State
+from airflock.engine.store import load_driver
+from airflock.engine.tables import Tables, tables
+from airflock.scenarios.scenario import Scenario
+
+
+@cache
+def replay_driver(plan: Plan) -> ModuleType:
+    """Compiled driver that measures recordings."""
+    return load_driver(replay(plan), "recordings")
+
+
+def measure_frames(
+    scenario: Scenario,
+    frames: NDArray[Any],
+    period: float,
+    *,
+    precision: int = 64,
+    every: tuple[int, int] = (1, 1),
+    present: NDArray[np.bool_] | None = None,
+    device: str = "cpu",
+) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    """Score frames (time, component, agent), period s apart: values over all time, and of every instant by name.
+
+    every   : instants from sample to sample, and from one look at collisions to the next
+    present : (time, agent), whether an agent is there at all; by default all are. An instant counts with those who are
+              there, one with fewer than two of several does not (nan); what a metric remembers of an agent waits for it
+    """
+    plan = plan_of(scenario, precision=precision)
+    steps = {"sample_every": every[0], "collide_every": every[1]}
+    numbers = tables(scenario, plan, 0).changed(agents=frames.shape[2], **steps)
+    values, series = measured(plan, numbers, frames, period, device, present)
+    names = (name for name, _, _ in columns(plan.metrics))
+    return values, dict(zip(names, series.T, strict=True))
+
+
+def measured(
+    plan: Plan,
+    tables: Tables,
+    frames: NDArray[Any],
+    period: float = 0.0,
+    device: str = "cpu",
+    present: NDArray[np.bool_] | None = None,
+) -> tuple[dict[str, Any], NDArray[np.float64]]:
+    """The same from the numbers of a world; the values of every instant as (time, value)."""
+    driver = interpreted.replay_driver(plan) if device == "python" else replay_driver(plan)
+    real = tables.row.dtype
+    state = State(plan, tables, driver)
+    own = state.arrays
+    series = np.full((frames.shape[0], len(own["values"])), np.nan)
+
+    def measure(first: int, part: NDArray[Any]) -> None:
+        driver.measure_frames(
+            first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
+            own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
+            *state.scratch,
+        )  # fmt: skip
+
+    if present is None or present.all():
+        measure(0, frames)
+        return state.values(), series
+    remembered = own["memory"][:, : frames.shape[2]].copy()
+    for first, last in _runs(present):
+        there = np.flatnonzero(present[first])
+        if len(there) >= min(2, frames.shape[2]):
+            state.set_whole("agents", len(there))
+            own["memory"][:, : len(there)] = remembered[:, there]
+            measure(first, frames[first:last][:, :, there])
+            remembered[:, there] = own["memory"][:, : len(there)]
+    return state.values(), series
+
+
+def _runs(present: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last instant (exclusive) of each stretch in which the same agents are there."""
+    changes = np.flatnonzero((present[1:] != present[:-1]).any(axis=1)) + 1
+    borders = [0, *changes.tolist(), len(present)]
+    return list(zip(borders[:-1], borders[1:], strict=True))

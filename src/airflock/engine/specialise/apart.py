@@ -1,0 +1,161 @@
+"""Apart: no local of a helper overwrites what a stage, or another helper in it, still reads.
+
+A helper's statements take the place of its call, so that its locals lie beside the stage's. While statements are made,
+a local of a helper is spelled with a mark of the helper (`near@2`), which no name of Python can have. In the end each
+has its own name, unless somebody would then read what another has written: that one has the helper's name behind it.
+"""
+
+import ast
+import re
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from airflock.engine.specialise.values import Text, kind_of
+
+TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
+MARK = re.compile(r"@(\d+)")
+Written = dict[str, set[str]]  # of each name in the driver, who may have written it last: locals with their marks
+
+
+class Owners:
+    """Whose the locals of a stage are: the stage's, or those of a helper by its number."""
+
+    def __init__(self, stage: Text):
+        self.texts = [stage]
+        self.returned: dict[str, str] = {}
+
+    def spelled(self, name: str, text: Text) -> str:
+        """A local as it is spelled while statements are made: the stage's as it is, a helper's with its mark."""
+        if text not in self.texts:
+            self.texts.append(text)
+        number = self.texts.index(text)
+        return f"{name}@{number}" if number else name
+
+    def taken(self, vector: str, target: str) -> bool:
+        """Whether a vector that a helper returns has another name in its caller already, which it would overwrite."""
+        return self.returned.setdefault(vector, target) != target
+
+    def part(self, statements: list[ast.stmt], answer: ast.expr | None, fault: Callable[[str], Exception]) -> None:
+        """Give each marked local a name of the driver.
+
+        Raises what `fault` makes of a local of the stage that has a name which the driver itself binds.
+        """
+        parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
+        names = [item for part in parts for item in ast.walk(part) if isinstance(item, ast.Name)]
+        bound = {item.id for item in names if kind_of(item) not in (None, "rule")} | TABLES
+        clash = sorted(bound.intersection(item.id for item in names if isinstance(item.ctx, ast.Store)))
+        if clash:
+            raise fault(f"{clash[0]} is what the driver itself calls here; give the local another name")
+        marked = dict.fromkeys(item.id for item in names if MARK.search(item.id))
+        found = {name: MARK.sub("", name) for name in marked}
+        taken = {item.id for item in names if item.id not in marked} | set(found.values())
+        for name in marked:
+            if found[name] in bound:
+                found[name] = self._free(name, taken)
+        while overwritten := _Order(found).overwritten(statements, answer):
+            name = max(overwritten, key=lambda each: int((MARK.findall(each) or ["0"])[-1]))
+            found[name] = self._free(name, taken)
+        for item in names:
+            item.id = found.get(item.id, item.id)
+
+    def _free(self, marked: str, taken: set[str]) -> str:
+        """A name for a marked local that no other has."""
+        name = f"{MARK.sub('', marked)}_{self.texts[int(MARK.findall(marked)[-1])].node.name}"
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        return name
+
+
+class _Order:
+    """Goes through statements as they are done, and notes by whom each shared name may have been written last."""
+
+    def __init__(self, found: dict[str, str]):
+        self.found = found
+        self.shared = {*found.values()}
+        self.clash: set[str] = set()
+        self.left: list[Written] = []
+
+    def overwritten(self, statements: list[ast.stmt], answer: ast.expr | None) -> set[str]:
+        """Locals of one name of which one would be read where another has been written; nothing if there are none."""
+        if self.found:
+            written: Written = {}
+            self._block(statements, written)
+            self._read(answer, written)
+        return self.clash
+
+    def _block(self, statements: Iterable[ast.stmt], written: Written) -> None:
+        for statement in statements:
+            if isinstance(statement, (ast.For, ast.While)):
+                self._loop(statement, written)
+            elif isinstance(statement, ast.If):
+                self._read(statement.test, written)
+                other = {name: {*who} for name, who in written.items()}
+                self._block(statement.body, written)
+                self._block(statement.orelse, other)
+                _join(written, other)
+            elif isinstance(statement, (ast.Break, ast.Continue)):
+                self.left.append({name: {*who} for name, who in written.items()})
+            else:
+                self._read(statement, written)
+                self._write(statement, written)
+
+    def _loop(self, loop: ast.For | ast.While, written: Written) -> None:
+        """A loop, done never, once, or again after itself."""
+        outside, self.left = self.left, []
+        for _ in range(2):
+            again = {name: {*who} for name, who in written.items()}
+            if isinstance(loop, ast.For):
+                self._read(loop.iter, again)
+                self._write(loop.target, again)
+            else:
+                self._read(loop.test, again)
+            self._block(loop.body, again)
+            for state in (again, *self.left):
+                _join(written, state)
+        self.left = outside
+
+    def _read(self, node: ast.AST | None, written: Written) -> None:
+        for item in ast.walk(node) if node is not None else ():
+            if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load) or _adds(item):
+                name = item.target.id if isinstance(item, ast.AugAssign) else item.id  # type: ignore[union-attr,attr-defined]
+                others = written.get(self.found.get(name, name), set()) - {name}
+                self.clash |= {*others, name} if others else set()
+
+    def _write(self, node: ast.AST, written: Written) -> None:
+        for item in ast.walk(node):
+            if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store):
+                name = self.found.get(item.id, item.id)
+                if name in self.shared:
+                    written[name] = {item.id}
+
+
+def _adds(node: ast.AST) -> bool:
+    """Whether a statement reads what it assigns to."""
+    return isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name)
+
+
+def _join(written: Written, other: Written) -> None:
+    """After either of two ways."""
+    for name, who in other.items():
+        written.setdefault(name, set()).update(who)
+
+
+def shares(statements: list[ast.stmt], marked: Any, name: str) -> bool:
+    """Whether what a helper returns can be called what its caller calls it.
+
+    So it is where both use one word, and the helper reads nothing else by that name, but to begin with.
+    """
+    if not isinstance(marked, ast.Name) or MARK.sub("", marked.id) != MARK.sub("", name):
+        return False
+    rest = [s for s in statements if ast.unparse(s) != f"{marked.id} = {name}"]
+    return all(item.id != name for s in rest for item in ast.walk(s) if isinstance(item, ast.Name))
+
+
+def renamed(statements: list[ast.stmt], old: str, new: str) -> list[ast.stmt]:
+    """The statements with another name for a local, but those that would then do nothing."""
+    for statement in statements:
+        for item in ast.walk(statement):
+            if isinstance(item, ast.Name) and item.id == old:
+                item.id = new
+    return [statement for statement in statements if ast.unparse(statement) != f"{new} = {new}"]

@@ -1,0 +1,46 @@
+"""Teller: what the ether tells who watches a fleet in software: whose packets arrive where, and which faults hold."""
+
+from collections.abc import Sequence
+
+from airflock.fleet.faults import KINDS, Fault
+from airflock.fleet.starting import KEY
+from airflock.mavlink import witness
+from airflock.mavlink.signing import Signer
+
+WATCHED = ("127.0.0.1", 14600)  # where who watches hears a fleet in software
+PERIOD = 0.5  # s between two reports
+LATELY = 1.0  # s; a neighbour whose last packet arrived longer ago is not heard
+NEVER = -1e9
+NUMBERS = {kind: number for number, kind in enumerate(KINDS, start=witness.HEARS + 1)}
+
+
+class Teller:
+    """Keeps whose packets arrived, and reports it with the faults twice a second.
+
+    members : system ids
+    """
+
+    def __init__(self, members: Sequence[int], faults: Sequence[Fault]):
+        self._members, self._faults = tuple(members), tuple(faults)
+        self._at = {member: dict.fromkeys(members, NEVER) for member in members}
+        self._sign, self._due = Signer(KEY, witness.WITNESS), NEVER
+
+    def arrived(self, to: int, datagram: bytes, now: float) -> None:
+        """Note a datagram that arrived at a drone, by its place among the members."""
+        sender = datagram[5] if len(datagram) > 5 else 0
+        if sender in self._at:
+            self._at[self._members[to]][sender] = now
+
+    def report(self, now: float, utc: int) -> list[bytes]:
+        """Signed datagrams for who watches, where they are due; now: time of the flight, s; utc: µs of Unix time."""
+        if now < self._due:
+            return []
+        self._due = now + PERIOD
+        told = [
+            witness.message(witness.HEARS, member, [who for who, at in known.items() if now - at <= LATELY])
+            for member, known in self._at.items()
+        ]
+        for fault in self._faults:
+            if fault.begin <= now < fault.end:
+                told.append(witness.message(NUMBERS[fault.kind], 0, fault.who or self._members))
+        return [self._sign(each, utc) for each in told]

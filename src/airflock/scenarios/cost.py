@@ -1,0 +1,74 @@
+"""Cost: how long a flight takes on this machine, about, judged before it is compiled and flown."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from airflock.errors import FlightError
+from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
+
+TIMES = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
+LONGEST = 30 * 86400.0  # s of a processor that one flight may take; nobody waits longer for one
+# s of one core (2 cores of 2025, single precision). Of the shipped presets none takes more than twice what is told, and
+# none less than a fifth (benchmarks/RESULTS-trust.md).
+PAIR = 7e-10  # for one look at one other agent
+STEP = 4e-9  # for one motion step of one agent
+SIGHT = 2e-6  # for one look of one agent among a hundred buildings
+WING = 2e-6  # for what one wing does to another, while all are solved for
+
+
+def check_time(scenario: Scenario) -> None:
+    """Refuse a flight that nobody can wait for; raises FlightError with the number of agents or the time that fits."""
+    flight, n = scenario.flight, float(scenario.agents)
+    if flight.duration / flight.dt * n * (2.0 * n * PAIR + STEP + SIGHT + n * WING) <= LONGEST:
+        return  # whatever its rates and its law are
+    took = seconds_of(scenario)
+    if took <= LONGEST:
+        return
+    days = LONGEST / 86400.0
+    fit = most_below(scenario.agents, lambda agents: seconds_of(_of(scenario, agents)) <= LONGEST)
+    told = f"{scenario.name}: a flight takes about {took / 86400.0:.3g} days of a processor, more than {days:g}"
+    fits = [f"about {fit} agents fit"] if fit else []
+    fits.append(f"{'or ' if fits else ''}a duration of about {flight.duration * LONGEST / took:.3g} s")
+    raise FlightError(f"{told}; {'; '.join(fits)}, or a longer dt = {flight.dt:g} s")
+
+
+def _of(scenario: Scenario, agents: float) -> Scenario:
+    """The same with so many agents."""
+    return replace(scenario, flight=replace(scenario.flight, agents=float(agents)))
+
+
+def seconds_of(scenario: Scenario) -> float:
+    """Seconds of one core that a flight takes, about, without its compilation; at all cores, cells take a share."""
+    times, n, model = clock(scenario), float(scenario.agents), scenario.model
+    decisions = times["steps"] / times["decide_every"]
+    pairs = min(n, 60.0) if n >= 1000 and model.reach is not None else n
+    seconds = (decisions + times["steps"] / times["sample_every"]) * n * pairs * PAIR + times["steps"] * n * STEP
+    seconds += decisions * n * SIGHT if model.sight is not None else 0.0
+    return seconds + (decisions * n * n * WING if model.flock is not None else 0.0)
+
+
+def total_seconds(scenarios: Sequence[Scenario]) -> float:
+    """Seconds of one core that flights take, about; the same scenario may stand there very often."""
+    kinds = {id(scenario): scenario for scenario in scenarios}
+    return sum(count * seconds_of(kinds[kind]) for kind, count in Counter(map(id, scenarios)).items())
+
+
+def time_note(scenarios: Sequence[Scenario], threads: int) -> str:
+    """How long these flights take side by side, about, where that is more than a minute; empty if it is not."""
+    seconds = total_seconds(scenarios) / max(1, min(threads, len(scenarios)))
+    if seconds < 60.0:
+        return ""
+    unit, size = next((unit, size) for unit, size in TIMES if seconds >= size)
+    count = f"{len(scenarios)} flights" if len(scenarios) > 1 else "the flight"
+    return f"{count} will take about {seconds / size:.2g} {unit}"
+
+
+def most_below(high: int, fits: Callable[[int], bool]) -> int:
+    """The largest number up to `high` that fits, 0 if not even one does."""
+    low = 0
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low

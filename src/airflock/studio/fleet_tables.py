@@ -1,0 +1,86 @@
+"""What a page tells of a running fleet in words: a row for each drone, faults, notes, and what is wrong. HTML."""
+
+import html
+
+from airflock.fleet.faults import KINDS
+from airflock.fleet.observer import Observer
+from airflock.onboard.peers import FRESH, Peer
+from airflock.studio.room import note
+
+SHOWN = 14  # notes
+MOST = 60  # drones that have a row of their own
+LATE = 10  # datagrams of other keys after which it is said that none fits
+WHY = {
+    "signature": "signed with another key than that of this card's mission",
+    "clock": "of another time: the clocks differ by more than the card allows, or the card's limit is too small",
+    "card": "of another card",
+    "mission": "of another mission",
+    "stranger": "of systems that are no members",
+}
+TABLE = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;text-align:right'>"
+
+
+def members_table(observer: Observer, now: float) -> str:
+    """A row for each drone: phase, height, speed, battery, whom it hears, age of its last packet."""
+    heads = ("", "phase", "m", "m/s", "%", "hears", "s ago")
+    rows = [f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"]
+    members = observer.card.members
+    for member in members[:MOST]:
+        rows.append(_row(member, observer.peers[member], now))
+    more = note(f"and {len(members) - MOST} more") if len(members) > MOST else ""
+    return f"<div style='padding:0 0.75em'>{TABLE}{''.join(rows)}</table></div>{more}"
+
+
+def _row(member: int, peer: Peer, now: float) -> str:
+    if peer.status is None or peer.state is None:
+        said = "another card" if peer.other_card else "not heard"
+        return f"<tr style='color:#777'><th>{member}</th><td>{said}</td>{'<td>–</td>' * 5}</tr>"
+    s, age = peer.state, now - peer.heard_at
+    speed = (s.vx * s.vx + s.vy * s.vy + s.vz * s.vz) ** 0.5
+    tone = " style='color:#b00020'" if age > FRESH else ""
+    cells = (peer.phase.name.lower(), f"{s.z:.1f}", f"{speed:.1f}", f"{peer.status.battery}", f"{peer.status.peers}",
+             f"{age:.1f}")  # fmt: skip
+    return f"<tr{tone}><th>{member}</th>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def about(observer: Observer, member: int, now: float) -> str:
+    """All that one drone tells of itself."""
+    peer = observer.peers[member]
+    if peer.status is None or peer.state is None:
+        return note(f"<b>drone {member}</b>: not heard yet")
+    s, told = peer.state, peer.status
+    hears = [b if a == member else a for a, b in observer.links(now) if member in (a, b)]
+    linked = f"; packets between it and {', '.join(map(str, sorted(hears)))}" if hears else ""
+    others, age = len(observer.card.members) - 1, now - peer.heard_at
+    return note(
+        f"<b>drone {member}</b>: {peer.phase.name.lower()}, {'in the air' if told.airborne else 'on the ground'}<br>"
+        f"at east {s.x:.1f}, north {s.y:.1f}, {s.z:.1f} m above the site, known to {told.accuracy:.1f} m<br>"
+        f"flies {s.vx:.1f}, {s.vy:.1f}, {s.vz:.1f} m/s; battery {told.battery} %; clock off by {told.clock_error:.2f} s"
+        f"<br>hears {told.peers} of {others}{linked}; last packet {age:.1f} s ago"
+    )
+
+
+def faults_of(observer: Observer) -> str:
+    """Faults that hold, with what they do."""
+    lines = [f"<b>{kind}</b>, {observer.named(who)}: {KINDS[kind]}" for kind, who in observer.faults.items()]
+    return note("<br>".join(lines)) if lines else ""
+
+
+def notes_of(observer: Observer) -> str:
+    """What happened, newest first."""
+    lines = []
+    for told in list(observer.notes)[: -SHOWN - 1 : -1]:
+        who = f"drone {told.member}: " if told.member else ""
+        lines.append(f"{told.time - observer.begun:.1f} s · {who}{html.escape(told.text)}")
+    return note("<br>".join(lines))
+
+
+def trouble_of(observer: Observer, now: float) -> str:
+    """What is wrong with the whole: nothing arrives, or what arrives is not believed."""
+    refused = observer.refused
+    most = max(refused, key=refused.__getitem__, default="")
+    if not observer.accepted and sum(refused.values()) >= LATE:
+        return f"{sum(refused.values())} packets were refused, and none believed: {WHY.get(most, most)}"
+    if not observer.accepted:
+        return "nothing was heard yet" if now - observer.begun > FRESH else ""
+    return "" if observer.heard(now) else "nobody is heard any more"

@@ -1,0 +1,86 @@
+"""Watching a running fleet: its card, its key and its radios, and the page that shows what is heard by them."""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from airflock.errors import AirflockError, CardError
+from airflock.fleet.observer import Observer
+from airflock.fleet.teller import WATCHED
+from airflock.mavlink.frames import Stream
+from airflock.mavlink.keys import read_key
+from airflock.onboard.card import Card, read_card
+from airflock.onboard.ports import Port, Serial, open_port
+
+RADIOS = (f"udp:{WATCHED[0]}:{WATCHED[1]}",)  # where fleets in software are heard
+
+
+class Radios:
+    """Open radios that are only listened to: pieces of a serial line are put together to frames."""
+
+    def __init__(self, ports: Sequence[Port]):
+        self._lines = [(port, Stream() if isinstance(port, Serial) else None) for port in ports]
+
+    def __call__(self) -> Iterator[bytes]:
+        """Datagrams that have arrived."""
+        for port, line in self._lines:
+            for data in port.read():
+                yield from [data] if line is None else line.raw(data)
+
+    def close(self) -> None:
+        """Close all."""
+        for port, _ in self._lines:
+            port.close()
+
+
+def opened(card: Path, key: Path | None, radios: Sequence[str]) -> tuple[Card, bytes, Radios]:
+    """Card, key and open radios. Raises CardError with all faults at once, and leaves nothing open."""
+    faults: list[str] = []
+    found, secret, ports = None, b"", []
+    try:
+        found = read_card(card)
+    except AirflockError as fault:
+        faults += str(fault).splitlines()
+    try:
+        secret = read_key(key or card.with_suffix(".key"))
+    except AirflockError as fault:
+        faults += str(fault).splitlines()
+    for text in radios or RADIOS:
+        try:
+            ports.append(open_port(text))
+        except AirflockError as fault:
+            faults += str(fault).splitlines()
+    if faults or found is None:
+        Radios(ports).close()
+        raise CardError(faults)
+    return found, secret, Radios(ports)
+
+
+def watch_fleet(
+    card: str | os.PathLike[str], key: str | os.PathLike[str] | None, radios: Sequence[str], host: str, port: int,
+    say: Callable[[str], None],
+) -> None:  # fmt: skip
+    """Open a page that shows the fleet of a flight card by what its radios hear, until Ctrl-C. It sends nothing.
+
+    Raises CardError for card, key and radios, all faults at once, and StudioError for a port in use.
+    """
+    found, secret, heard = opened(Path(card), Path(key) if key else None, radios)
+    try:
+        if time.time() >= found.expires:
+            say(f"note: {card} has expired; its drones do not start any more")
+        from airflock.studio.fleet_page import FleetPage
+        from airflock.studio.view import View
+
+        view = View(host, port, found.name)
+        try:
+            observer = Observer(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
+            page = FleetPage(observer, view, heard)
+            say(f"listening at {', '.join(radios or RADIOS)}; watch at {view.address}  (Ctrl-C ends)")
+            page.run()
+        except KeyboardInterrupt:
+            say(f"ended; {observer.accepted} packets were heard")
+        finally:
+            view.stop()
+    finally:
+        heard.close()

@@ -1,0 +1,257 @@
+"""Watching a fleet: what an observer believes and what not, what the ether tells, cards that are written."""
+
+import os
+import random
+import threading
+import time
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import airflock
+from airflock.cli.main import app
+from airflock.core.agent import State
+from airflock.errors import AirflockError, CardError, StudioError
+from airflock.fleet import compare, realtime
+from airflock.fleet.faults import KINDS, Fault
+from airflock.fleet.lockstep import STARTED
+from airflock.fleet.observer import Observer
+from airflock.fleet.starting import KEY, Station, write_for_watching
+from airflock.fleet.teller import Teller
+from airflock.mavlink import witness
+from airflock.mavlink.keys import write_key
+from airflock.mavlink.orders import Do
+from airflock.mavlink.signing import Signer
+from airflock.onboard.card import read_card
+from airflock.onboard.mission import Phase
+from airflock.onboard.peers import FRESH
+from airflock.onboard.ports import Place, Udp
+from airflock.stage.field import field_of
+from airflock.studio.fleet_tables import about, members_table, notes_of, trouble_of
+from airflock.studio.fleet_watch import opened
+from fleets import PRIVATE, card, fleet, scenario
+
+START = [State(20.0 * i, 0.0, 0.0, 2.0, 0.0, 0.0) for i in range(3)]
+
+
+def watched(seconds=0.0, key=KEY, **more):
+    """A fleet of three in lock-step, and somebody who will watch it from now on."""
+    f = fleet(scenario(3), start=START, **more)
+    f.advance(seconds)
+    return f, Observer(f.card, key, now=f.now, utc=STARTED + round(f.now * 1e6) - 1)
+
+
+def said(f):
+    return [datagram for node in f.nodes for datagram in node.say_status(f.now)]
+
+
+def listen(f, observer, seconds):
+    """Fly on; the observer hears all packets, as they are sent."""
+    for _ in range(round(seconds / 0.2)):
+        for datagram in said(f):
+            observer.take(datagram, f.now)
+        observer.look(f.now)
+        f.advance(0.2)
+
+
+def test_drones_are_where_they_say_and_carried_on_between_packets():
+    f, observer = watched()
+    listen(f, observer, 3.0)
+    for vehicle, member in zip(f.vehicles, f.card.members, strict=True):
+        place = observer.place(member, f.now)
+        assert np.linalg.norm(np.subtract(place, vehicle.state[:3])) < 0.5
+        assert observer.peers[member].phase == Phase.FLOCK
+    assert observer.heard(f.now) == [1, 2, 3] and observer.flying(f.now) == [1, 2, 3] and not observer.refused
+    assert [note.text for note in observer.notes] == ["heard, FLOCK"] * 3
+
+
+@pytest.mark.parametrize(
+    ("reason", "bent"),
+    [
+        ("signature", lambda data: data[:30] + bytes([data[30] ^ 1]) + data[31:]),
+        ("stranger", lambda data: data[:5] + b"\x63" + data[6:]),
+        ("replay", lambda data: data),
+        ("short", lambda data: data[:9]),
+    ],
+)
+def test_what_is_forged_or_replayed_changes_nothing(reason, bent):
+    f, observer = watched()
+    listen(f, observer, 0.4)
+    first = said(f)[0]
+    observer.take(first, f.now)
+    known, notes = observer.peers[1].status, len(observer.notes)
+    observer.take(bent(first), f.now)
+    assert observer.peers[1].status == known and len(observer.notes) == notes and observer.refused == {reason: 1}
+
+
+def test_any_bytes_are_refused_without_a_change(n=300):
+    rng, (f, observer) = random.Random(7), watched()
+    genuine = said(f)
+    for _ in range(n):
+        data = bytearray(rng.choice(genuine) if rng.random() < 0.5 else rng.randbytes(rng.randrange(120)))
+        for _ in range(rng.randrange(1, 4) if data else 0):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        if bytes(data) not in genuine:
+            observer.take(bytes(data), f.now)
+    assert not observer.accepted and not observer.notes, "seed 7"
+    for datagram in genuine:
+        observer.take(datagram, f.now)
+    assert observer.accepted == 3
+
+
+def test_another_key_is_told():
+    f, observer = watched(key=bytes(32))
+    assert trouble_of(observer, f.now) == ""
+    listen(f, observer, 3.0)
+    assert "signed with another key" in trouble_of(observer, f.now) and not observer.accepted
+
+
+def test_who_falls_silent_is_told_once_and_told_again_when_heard():
+    f, observer = watched()
+    listen(f, observer, 0.4)
+    for _ in range(20):
+        f.advance(0.2)
+        for datagram in said(f)[1:]:
+            observer.take(datagram, f.now)
+        observer.look(f.now)
+    assert observer.heard(f.now) == [2, 3] and f.now - observer.peers[1].heard_at > FRESH
+    stays = observer.place(1, f.now)
+    assert stays == observer.place(1, f.now + 100.0), "who is silent is not carried on for ever"
+    listen(f, observer, 0.4)
+    assert [note.text for note in observer.notes if note.member == 1] == ["heard, FLOCK", "silent", "heard again"]
+
+
+def test_an_order_of_the_operator_is_told_and_one_of_another_key_is_not():
+    f, observer = watched()
+    utc = STARTED + round(f.now * 1e6)
+    genuine = Station(f.card, PRIVATE)
+    observer.take(genuine.order(Do.RETURN, utc), f.now)
+    assert [note.text for note in observer.notes] == ["the operator orders return"]
+    other = Station(f.card, bytes(range(32)))
+    observer.take(other.order(Do.LAND, utc + 10), f.now)
+    assert len(observer.notes) == 1
+
+
+def test_whom_the_ether_says_to_be_heard_is_a_link_for_a_while_both_ways_or_one():
+    f, observer = watched()
+    teller = Teller(f.card.members, [Fault("loss", (2, 3), 0.0, 5.0, 0.5)])
+    one, two, _ = said(f)
+    for to, datagram in ((1, one), (0, two), (2, one)):
+        teller.arrived(to, datagram, f.now)
+    utc = STARTED + round(f.now * 1e6)
+    for datagram in teller.report(f.now, utc):
+        observer.take(datagram, f.now)
+    assert observer.links(f.now) == {(1, 2): True, (3, 1): False}
+    assert observer.faults == {"loss": {2, 3}} and observer.notes[-1].text == "fault loss: drones 2, 3"
+    assert teller.report(f.now + 0.1, utc) == []
+    observer.look(f.now + 3.0)
+    assert not observer.links(f.now + 3.0) and not observer.faults and observer.notes[-1].text == "fault loss is over"
+
+
+def test_what_the_ether_tells_needs_the_key_and_its_own_system():
+    f, observer = watched()
+    utc = STARTED + round(f.now * 1e6)
+    told = witness.message(witness.HEARS, 1, {2, 3})
+    for key, system in ((bytes(32), witness.WITNESS), (KEY, 2)):
+        observer.take(Signer(key, system)(told, utc), f.now)
+    assert not observer.links(f.now) and not observer.accepted
+
+
+@pytest.mark.parametrize("systems", [set(), {1}, set(range(1, 251))])
+@pytest.mark.parametrize("what", [witness.HEARS, len(KINDS)])
+def test_what_is_told_comes_back(what, systems):
+    made = witness.message(what, 7, systems)
+    back = witness.told_of({"payload": made.payload, "payload_length": made.payload_length})
+    assert back == (what, 7, systems)
+
+
+def test_the_field_of_a_card_holds_fence_and_walls_at_their_heights():
+    made = card(scenario(3))
+    field = field_of(made)
+    lines = {line.name: line.points for line in field.lines}
+    assert np.ptp(lines["fence"][..., 2]) == pytest.approx(made.high - made.low)
+    assert np.abs(lines["arena"][..., :2]).max() == 60.0 and set(lines["arena"][..., 2].ravel()) == {made.height}
+    assert np.abs(lines["fence"][..., :2]).max() > 60.0 and field.span > 60.0
+
+
+def test_tables_name_every_drone_and_what_it_is_at():
+    f, observer = watched()
+    assert members_table(observer, f.now).count("not heard") == 3
+    listen(f, observer, 1.0)
+    table = members_table(observer, f.now)
+    assert table.count("<td>flock</td>") == 3 and "20.0" in table
+    assert "hears 2 of 2" in about(observer, 2, f.now) and "drone 3: heard" in notes_of(observer)
+
+
+def test_a_fleet_on_the_real_clock_is_heard_where_it_flies():
+    """Its packets, who hears whom and which faults hold come over UDP, and say what the recording says."""
+    port = Udp(Place(("127.0.0.1", 0), None))
+    found = compare.sampled(scenario(2, 1.5, **{"radio.delay": 0.1}), 0.2)
+    made = compare.software_card(found, silent=True, live=True)
+    observer = Observer(made, KEY, now=time.monotonic(), utc=time.time_ns() // 1000)
+    over = threading.Event()
+
+    def hear():
+        while not over.wait(0.02):
+            for datagram in port.read():
+                observer.take(datagram, time.monotonic())
+
+    ears = threading.Thread(target=hear)
+    ears.start()
+    try:
+        flown = realtime.fly(
+            found, made, 1, "tasks", start=compare.first_states(found, 1), watcher=port.here,
+            faults=(Fault("outage", (2,), 0.0, 1e6),),
+        )  # fmt: skip
+    finally:
+        over.set()
+        ears.join()
+        port.close()
+    assert observer.accepted > 10
+    assert observer.faults == {"outage": {2}} and not observer.links(time.monotonic()), "links of a drone without radio"
+    path = flown.array()[:, :, :3]
+    for place, member in enumerate(made.members):
+        gaps = np.linalg.norm(path[:, place] - observer.peers[member].status.position, axis=1)
+        assert gaps.min() < 2.0
+
+
+def test_the_card_of_a_fleet_in_software_is_written_and_never_over_a_real_one(tmp_path):
+    made, path = card(scenario(2)), tmp_path / "fleet.json"
+    write_for_watching(path, made)
+    write_for_watching(path, made)
+    assert read_card(path).hash == made.hash and os.stat(tmp_path / "fleet.key").st_mode & 0o777 == 0o600
+    found, key, radios = opened(path, None, ["udp:127.0.0.1:14699"])
+    radios.close()
+    assert key == KEY and found.members == (1, 2)
+    real = tmp_path / "mission.json"
+    write_key(real.with_suffix(".key"), bytes(range(32)))
+    with pytest.raises(CardError, match="is of a real mission"):
+        write_for_watching(real, made)
+    assert not real.exists()
+
+
+def test_what_is_wrong_with_card_key_and_radios_is_told_at_once(tmp_path):
+    with pytest.raises(CardError) as told:
+        opened(tmp_path / "none.json", None, ["udp:nowhere", "wifi:1"])
+    lines = str(told.value).splitlines()
+    assert len(lines) == 4 and "none.json" in lines[0] and "none.key" in lines[1] and "wifi:1" in lines[3]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["watch", "fleet.json", "--seed", "3", "--set", "model.p_rep=0.2"], "settings and seed need a scenario"),
+        (["watch", "vasarhelyi_2018/4ms", "--radio", "udp:0.0.0.0:14600"], "radios needs the flight card"),
+        (["fleet", "vasarhelyi_2018/real_4ms", "--card", "f.json"], "add --mode tasks or processes"),
+        (["fleet", "vasarhelyi_2018/real_4ms", "--mode", "tasks", "--card", "f.txt"], ".json"),
+    ],
+)
+def test_options_that_do_not_go_together_are_one_line(given, words):
+    told = CliRunner().invoke(app, given).exception
+    assert isinstance(told, AirflockError) and words in str(told) and len(str(told).splitlines()) == 1
+
+
+def test_a_card_is_watched_by_the_same_function_as_a_scenario(tmp_path):
+    with pytest.raises(StudioError, match="law needs a scenario"):
+        airflock.watch(tmp_path / "a.json", law="vicsek_1995")
