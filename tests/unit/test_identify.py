@@ -216,6 +216,38 @@ def test_the_curve_of_reception_comes_back():
     assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
 
 
+def test_entries_of_a_table_come_back_within_their_intervals():
+    """Of 40 tables' 320 entries about one in twenty lies outside; an entry without packets has no error."""
+    rng, outside = np.random.default_rng(4), 0
+    shares = np.linspace(0.95, 0.2, 8)
+    for _ in range(40):
+        distance = rng.uniform(0.0, 70.0, 4000)
+        got = (rng.random(4000) < np.interp(distance / 10.0, np.arange(8), shares)).astype(int)
+        found, errors = packets.fit_table(pd.DataFrame({"distance": distance, "got": got}), 10.0)
+        assert np.isnan(errors[8:]).all() and found[15] == found[7]
+        outside += int((np.abs(found[:8] - shares) > 1.96 * errors[:8]).sum())
+    assert 5 <= outside <= 32
+
+
+def test_identify_writes_a_table_where_the_radio_is_one(fleet):
+    """Told is what pairs flew; what is farther stays as --like has it."""
+    truth, first, _ = fleet
+    like = airflock.load("vasarhelyi_2018/real_6ms", {"radio.kind": "table", "radio.spacing": 20.0})
+    heard, _ = heard_by(truth.radio)
+    found = identify(first.logs, like, heard=heard)
+    told = {key: number for key, number in found.numbers.items() if key.startswith("radio.received_")}
+    known = packets.table_of(heard, 20.0)
+    assert list(told) == [f"radio.received_{n}" for n in range(16)] and "radio.near" not in found.numbers
+    assert [n for n in range(16) if told[f"radio.received_{n}"].told] == list(range(9))  # up to 150 m
+    assert all(told[f"radio.received_{n}"].value == known[f"received_{n}"] for n in range(9))
+    assert "no pair flew within 20 m of 300 m apart" in told["radio.received_15"].reason
+    flown = found.scenario().radio
+    assert flown.received_3 == known["received_3"] and flown.received_15 == like.radio.received_15
+    entry = found.document(uncertain=True)["radio"]["received_3"]
+    assert entry["interval"][0] < entry["value"] < entry["interval"][1]
+    assert found.scenario(0.9).radio.received_3 < flown.received_3  # the pessimistic end hears less
+
+
 def test_the_period_of_decisions_comes_back():
     logs, _ = fly(0.6, 4.0, 0.05, 0.1, hold=0.2, seconds=60.0)
     period, (low, high), reason = periods.decision_period(logs)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.optimize import brentq, lsq_linear, minimize
 
 from airflock.core.radio import Packets
@@ -201,6 +202,16 @@ def table_of(heard: pd.DataFrame, spacing: float) -> dict[str, float]:
 
     Raises RecordingError where a column is missing, no row is left, or the spacing is not positive.
     """
+    shares, _ = fit_table(heard, spacing)
+    return {"spacing": float(spacing), **{f"received_{n}": float(share) for n, share in enumerate(shares)}}
+
+
+def fit_table(heard: pd.DataFrame, spacing: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Entries of a table of reception, and their standard errors; nan of an entry that no row is near.
+
+    Errors are those of independent packets, each of which arrives with the probability of its distance. As in
+    `table_of`, which says what is raised.
+    """
     lacking = [name for name in ("distance", "got") if name not in heard]
     if lacking:
         raise RecordingError(f"heard: no column {', '.join(lacking)}; give distance (m) and got (0 or 1)")
@@ -213,9 +224,14 @@ def table_of(heard: pd.DataFrame, spacing: float) -> dict[str, float]:
     if not len(seen):
         raise RecordingError(f"heard: no pair within {table.ENTRIES * spacing:g} m; give a longer spacing")
     inside = s <= table.ENTRIES - 1
-    found = lsq_linear(hats[np.ix_(inside, seen)], got[inside], (0.0, 1.0)).x
-    shares = found[np.abs(number[:, None] - seen).argmin(axis=1)]
-    return {"spacing": float(spacing), **{f"received_{n}": float(share) for n, share in enumerate(shares)}}
+    rows = hats[np.ix_(inside, seen)]
+    found = lsq_linear(rows, got[inside], (0.0, 1.0)).x
+    expected = np.clip(rows @ found, 1.0 / (2.0 + len(rows)), 1.0 - 1.0 / (2.0 + len(rows)))  # never sure of 0 or 1
+    inverse = np.linalg.pinv(rows.T @ rows)
+    spread = inverse @ (rows.T * (expected * (1.0 - expected))) @ rows @ inverse
+    errors = np.full(table.ENTRIES, np.nan)
+    errors[seen] = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return found[np.abs(number[:, None] - seen).argmin(axis=1)], errors
 
 
 def _lowest(loss: Any, farthest: float) -> list[Any]:
