@@ -5,6 +5,8 @@ is the range of the radio or of the law, at equal distances and equal speeds, be
 spheres and rays touch what they pass. `drawn` takes any `random.Random`; a seeded one draws the same in every process.
 """
 
+import math
+from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
 from random import Random
@@ -15,7 +17,8 @@ from numpy.typing import NDArray
 
 from airflock.body.registry import BODIES as KNOWN_BODIES
 from airflock.core.contract import Model
-from airflock.core.parameters import Choice, Quantity, choices, declarations
+from airflock.core.parameters import Choice, Parameters, Quantity, choices, declarations, quantity
+from airflock.core.topology import topology as topology_of_ones_own
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
 from airflock.radios.registry import RADIOS
@@ -40,6 +43,28 @@ CUBE = str(Path(__file__).parent / "cube.obj")
 SEGMENTS = ("5", "5", "9")  # a lifting line of 80 segments takes minutes in plain Python
 
 
+@dataclass(frozen=True, kw_only=True)
+class Times(Parameters):
+    """The number of a topology that is none of ours."""
+
+    times: float = quantity(2.0, "1", low=1.0, high=100.0, meaning="how many times as far as the nearest")
+
+
+def meet(n, r2, dz, hidden, fade, met, weak, t):
+    """Who is not hidden, and at most so many times as far, or below by 1 m as dear, as the nearest."""
+    nearest = 1e30
+    for j in range(n):
+        weak[j] = r2[j] * math.exp(0.1 * fade[j])
+        if weak[j] < nearest:
+            nearest = weak[j]
+    for j in range(n):
+        near = weak[j] <= t.times * t.times * nearest or abs(dz[j]) > 1.0
+        met[j] = 1.0 if near and hidden[j] < 0.5 and r2[j] < 1e29 else 0.0
+
+
+OWN_TOPOLOGY = topology_of_ones_own({"Parameters": Times, "meet": meet}, "one of its own")
+
+
 class Draw(NamedTuple):
     """A scenario, a seed, and where its agents start (component, agent) if not at random; and its keys, to read."""
 
@@ -54,7 +79,8 @@ def drawn(rng: Random) -> Draw:
     for _ in range(200):
         keys, start = settings(rng)
         try:
-            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys)
+            own = OWN_TOPOLOGY if keys.get("topology.kind") == OWN_TOPOLOGY.name else None
+            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys, own_topology=own)
         except ScenarioError:
             continue  # a crowd without room, or a goal inside a building: the border says so, and it draws again
         return Draw(found, rng.randrange(2**32), start, keys)
@@ -362,6 +388,9 @@ def topology(keys: dict[str, Any], rng: Random, length: float, three: bool) -> N
     if rng.random() < 0.5:
         return
     kinds = [kind for kind in OPTIONS["topology"]["kind"] if not (three and kind == "voronoi")]
+    if rng.random() < 0.15:
+        keys |= {"topology.kind": OWN_TOPOLOGY.name, "topology.times": rng.choice((1.0, 1.5, 2.0))}
+        return
     keys |= {"topology.kind": rng.choice(kinds), "topology.k": rng.randint(1, 3)}
     keys |= {"topology.radius": length * rng.choice((0.0, 0.25, 0.5)), "topology.fading": rng.choice((0.0, 4.0))}
     keys |= {"topology.wall": rng.choice((0.0, 20.0)), "topology.exponent": rng.choice((2.0, 3.5))}

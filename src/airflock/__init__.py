@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.checking.models import check_model as check_model
     from airflock.checking.radios import check_radio as check_radio
     from airflock.checking.sensors import check_sensor as check_sensor
+    from airflock.checking.topologies import check_topology as check_topology
     from airflock.checking.types import check_types as check_types
     from airflock.core.contract import body as body
     from airflock.core.contract import metric as metric
@@ -77,6 +78,7 @@ _WHERE = {
     "check_metric": "airflock.checking.metrics",
     "check_body": "airflock.checking.bodies",
     "check_sensor": "airflock.checking.sensors",
+    "check_topology": "airflock.checking.topologies",
     "check_radio": "airflock.checking.radios",
     "check_types": "airflock.checking.types",
     "simulate": "airflock.recordings.flights",

@@ -14,10 +14,12 @@ from airflock.checking.models import check_model
 from airflock.checking.radios import check_radio
 from airflock.checking.report import CheckError
 from airflock.checking.sensors import check_sensor
+from airflock.checking.topologies import check_topology
 from airflock.checking.units import Units, factor
 from airflock.core.contract import body, metric, model
 from airflock.core.radio import radio
 from airflock.core.sensor import sensor
+from airflock.core.topology import topology
 from airflock.errors import RuleError, ScenarioError
 from airflock.metrics.registry import METRICS, SETS
 from airflock.models import vasarhelyi_2018, viragh_2014
@@ -266,3 +268,51 @@ def always(u0):
 def test_what_is_planted_in_a_radio_is_found(rules, truth):
     with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
         check_radio(radio(rules, "planted"))
+
+
+def half(n, r2, met):
+    for j in range(n):
+        met[j] = 0.5 if r2[j] < 1e29 else 0.0
+
+
+def everybody(n, met):
+    for j in range(n):
+        met[j] = 1.0
+
+
+def first(n, r2, met):
+    for j in range(n):
+        met[j] = 1.0 if j == 0 and r2[j] < 1e29 else 0.0
+
+
+def eastern(n, dx, r2, met):
+    for j in range(n):
+        met[j] = 1.0 if dx[j] > 0.0 and r2[j] < 1e29 else 0.0
+
+
+def farthest(n, r2, met):
+    for j in range(n):
+        met[j] = 1.0 if r2[j] < 1e29 else 0.0
+        for k in range(n):
+            if r2[j] < r2[k] < 1e29:
+                met[j] = 0.0
+
+
+def yard(n, r2, met):
+    for j in range(n):
+        met[j] = 1.0 if r2[j] < 400.0 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("rules", "truth"),
+    [({"meet": half}, "heard"), ({"meet": everybody}, "heard"), ({"meet": first}, "order"),
+     ({"meet": eastern}, "turned"), ({"meet": farthest, "NEAR": True}, "near"), ({"meet": yard}, "units")],
+)  # fmt: skip
+def test_what_is_planted_in_a_topology_is_found(rules, truth):
+    with pytest.raises(CheckError, match=f"BREAKS  {truth}:"):
+        check_topology(topology(rules, "planted"))
+
+
+@pytest.mark.parametrize("kind", ["nearest", "voronoi", "visible", "strongest"])
+def test_our_topologies_hold(kind):
+    assert check_topology(kind).broken == ()

@@ -34,6 +34,8 @@ def identity(scenario: Scenario) -> str:
         told["laws"].append(scenario.sensor.name)
     if "kind" not in told["radio"]:  # which tells those of the usual record apart
         told["laws"].append(scenario.transceiver.name)
+    if scenario.own_topology is not None:
+        told["laws"].append(scenario.own_topology.name)
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 

@@ -142,6 +142,8 @@ def _type_of(name: str, kind: str, names: _Names) -> str:
     if kind == "total":
         return names.spelled("Mapping[str, float]")
     special = SPECIAL.get(kind, {}).get(name)
+    if special == "Topology":
+        return names.record("Parameters") or names.known("Topology")
     if special == "SharedColumns":
         names.columns = "Shared" in names.records
         return '"SharedColumns"' if names.columns else ""

@@ -135,7 +135,7 @@ def _copies(names: Sequence[str]) -> dict[str, TypedCopy]:
         if not copies[name].rules:
             needed = (
                 "a law has decide, a body move, an order parameter sample, a sensor measure or error, a radio missed, "
-                "receive or late"
+                "receive, late or see, a topology meet"
             )
             faults.append(f"{name}: holds no rule; {needed}")
     if faults:

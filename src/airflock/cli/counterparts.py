@@ -54,14 +54,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
-            "quiet": "watch", "trust": "trust",
+            "quiet": "watch", "trust": "trust", "limit": "limit",
             **dict.fromkeys(SEARCH, "search_keys"),
         },
     ),
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "threads": "threads", **TABLE,
             "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
             **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
@@ -196,5 +196,5 @@ COUNTERPARTS: dict[str, Counterpart] = {
 LIBRARY = (
     "load", "simulate", "recording_of", "save", "load_recording", "over_time", "starting_set", "model", "body", "fault",
     "sensor", "radio", "metric", "metric_set", "check_model", "check_body", "check_metric", "check_sensor",
-    "check_radio", "quantity", "choice",
+    "check_radio", "check_topology", "quantity", "choice",
 )  # fmt: skip

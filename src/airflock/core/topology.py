@@ -1,12 +1,20 @@
 """The contract of a topology, and its use on board: which of those whom an agent hears it meets."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from airflock.core.agent import Heard, State
+from airflock.core.contract import names_of
 from airflock.core.maths import FAR, TINY
+from airflock.core.parameters import Choice, Parameters, declarations
 from airflock.core.vocabulary import asks
+from airflock.errors import RuleError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nothing(Parameters):
+    """No number."""
 
 
 class Seen(Protocol):
@@ -24,12 +32,16 @@ class Topology:
     meet : fills the row `met` with 1.0 for whom the agent meets
     flat : it is defined in a plane only
     near : whom it lets through within any distance depends on nobody farther: then cells as wide as a law's reach do
+    Parameters : record of its numbers; those that a scenario can name share one
+    violates   : truths of `airflock.check_topology` that do not hold for it, and why (VIOLATES)
     """
 
     name: str
     meet: Callable[..., None]
     flat: bool = False
     near: bool = False
+    Parameters: type | None = None
+    violates: Mapping[str, str] = field(default_factory=dict)
 
     def __hash__(self) -> int:
         return hash((self.name, self.meet))
@@ -37,6 +49,28 @@ class Topology:
     def asks(self, name: str) -> bool:
         """Whether the rule asks for something by this name."""
         return name in asks(self.meet, "meet", self.name)
+
+
+def topology(namespace: Any, name: str = "") -> Topology:
+    """Gather a topology of a user's own from a module, a class or a mapping of names.
+
+    namespace : holds the rule meet, and if it likes Parameters (numbers only), FLAT, NEAR and VIOLATES
+
+    Raises RuleError if it has no such rule, or one that asks for what there is not.
+    """
+    found, name = names_of(namespace, name)
+    rule, record = found.get("meet"), found.get("Parameters", Nothing)
+    if not callable(rule):
+        raise RuleError(f"topology {name} has no rule; give meet(n, r2, met), which fills met")
+    if "met" not in asks(rule, "meet", name):
+        raise RuleError(f"topology {name}: meet does not ask for met, the row that it fills")
+    if not (isinstance(record, type) and issubclass(record, Parameters)):
+        raise RuleError(f"topology {name}: Parameters is not a frozen dataclass derived from airflock.Parameters")
+    words = [word for word, declared, _ in declarations(record) if isinstance(declared, Choice)]
+    if words:
+        raise RuleError(f"topology {name}: Parameters.{words[0]} is a choice; a topology has numbers only")
+    near, flat = bool(found.get("NEAR", False)), bool(found.get("FLAT", False))
+    return Topology(name, rule, flat, near, record, dict(found.get("VIOLATES", {})))
 
 
 def met_of(

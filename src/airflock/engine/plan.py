@@ -11,6 +11,7 @@ from airflock.core.fault import Fault
 from airflock.core.radio import Radio, forward
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
+from airflock.core.vectors import vectors_of
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.sensors.registry import SENSORS, USUAL
@@ -285,6 +286,11 @@ class Plan:
         return self.meeting("hidden") and (self.obstacles or self.scene)
 
     @property
+    def placed(self) -> bool:
+        """Whether offsets to all who are heard are kept: the topology asks for one of them, or for what is hidden."""
+        return self.hides or any(self.meeting(name) for name in ("dx", "dy", "dz"))
+
+    @property
     def fades(self) -> bool:
         """Whether the strength of a signal is drawn."""
         return self.meeting("fade") and self.fading
@@ -316,6 +322,11 @@ class Plan:
         sensor: dict[str, str | float] = dict(self.sensor_choices)
         radio: dict[str, str | float] = dict(self.radio_choices)
         return {"p": dict(self.model_choices), "b": body, "s": sensor, "k": radio, "wing": wing, "aero": aero}
+
+    @property
+    def vectors(self) -> dict[str, dict[str, int]]:
+        """Of each record of numbers its vectors, with how many components each has."""
+        return {letter: vectors_of(names) for letter, names in self.numbers}
 
     @property
     def senses(self) -> bool:

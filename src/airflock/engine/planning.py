@@ -10,7 +10,7 @@ from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
 from airflock.engine.plan import Build, OwnLaw, Plan
 from airflock.errors import ScenarioError
-from airflock.rules.probe import probe, probe_fault, probe_radio, probe_sensor
+from airflock.rules.probe import probe, probe_fault, probe_radio, probe_sensor, probe_topology
 from airflock.scenarios.cells import by_cells, has_room, takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
@@ -46,6 +46,8 @@ def plan_of(
     if scenario.errs:
         probe_sensor(scenario.sensor)
     probe_radio(scenario.transceiver)
+    if scenario.own_topology is not None:
+        probe_topology(scenario.own_topology)
     return make_plan(
         scenario.model,
         scenario.parameters,
@@ -83,7 +85,7 @@ def plan_of(
         topology=scenario.meets if any(law.model.neighbour is not None for law in laws) else None,
         laws=tuple(OwnLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
         grouped=bool(scenario.groups) and any(law.asks_for_groups for law in laws),
-        fading=scenario.topology.fading > 0.0,
+        fading=scenario.own_topology is not None or scenario.topology.fading > 0.0,
         windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
         dryden=wind.kind == "dryden",
     )

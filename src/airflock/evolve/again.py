@@ -24,6 +24,7 @@ def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], se
     """Study of workaround (i): the scenario's space, searched under the stricter settings."""
     own: dict[str, Any] = {"law": scenario.model, "measures": scenario.measures, "vehicle": scenario.vehicle}
     own["sensor"], own["transceiver"] = scenario.sensor, scenario.transceiver
+    own["own_topology"] = scenario.own_topology
     found = make(scenario.document, f"{scenario.name}, stricter", settings, **own)
     return replace(make_study({}, found.name, search=search, scenario=found), space=space)
 

@@ -46,6 +46,10 @@ def card_document(
     """
     if scenario.world.arena == "none":
         raise CardError([f"{scenario.name}: world.arena = 'none': a card needs walls, and a fence around them"])
+    if scenario.own_topology is not None:
+        raise CardError(
+            [f"{scenario.name}: the topology {scenario.own_topology.name} is not in the package; a card names ours"]
+        )
     if scenario.transceiver.see is not None:
         raise CardError(
             [

@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
 from airflock.sensors.registry import SENSORS
+from airflock.topology.registry import TOPOLOGIES
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -138,7 +140,10 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
         )
     for name in attributes.own_laws_of_groups(document):
         raise RecordingError(f"recording: a group was flown with a law of its own, {name!r}, which is not in the file")
-    for section, known in (("body", BODIES), ("sensors", SENSORS), ("radio", RADIOS), ("metrics", SETS)):
+    ours: dict[str, Mapping[str, Any]] = {
+        "body": BODIES, "sensors": SENSORS, "radio": RADIOS, "topology": TOPOLOGIES, "metrics": SETS,
+    }  # fmt: skip
+    for section, known in ours.items():
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:
             raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")

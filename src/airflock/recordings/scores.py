@@ -31,6 +31,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
 from airflock.sensors.registry import SENSORS
+from airflock.topology.registry import TOPOLOGIES
 
 
 def score(
@@ -253,6 +254,8 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
     if not _in_file(_kind(document, "radio"), RADIOS):
         common = {key: value for key, value in document["radio"].items() if key in number_names(Packets)}
         document = {**document, "radio": common}
+    if not _in_file(_kind(document, "topology"), TOPOLOGIES):
+        document = {key: value for key, value in document.items() if key != "topology"}
     if not flown_with_own_law(recording):
         return make(document, name, settings)
     measured = measured_by(recording)

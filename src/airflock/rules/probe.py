@@ -14,6 +14,7 @@ from airflock.core.fault import RULES, Fault
 from airflock.core.radio import RULES as RADIO_RULES
 from airflock.core.radio import Radio
 from airflock.core.sensor import COMPONENTS, Sensor
+from airflock.core.topology import Topology
 from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
 from airflock.errors import RuleError
 from airflock.rules import law
@@ -112,6 +113,19 @@ def probe_radio(radio: Radio) -> None:
             raise RuleError(f"{_place(rule)}: {radio.name}.{kind} must return {wanted}")
         if kind == "receive" and radio.Packet is not None:
             _same_length(rule, answer[1], radio.Packet, radio.name)
+
+
+@cache
+def probe_topology(kind: Topology) -> None:
+    """The same for the rule of a topology: it says of each of two others, by 1.0 or 0.0, whether it is met."""
+    law.check(kind.meet)
+    rows = {name: [0.5, 2.0] for name in VOCABULARY["meet"]}
+    rows |= {"hidden": [0.0, 1.0], "met": [2.0, 2.0], "heap": [1e30] * 2, "weak": [1e30] * 2}
+    given: dict[str, Any] = {**rows, "n": 2, "t": kind.Parameters() if kind.Parameters is not None else None}
+    if _call(kind.meet, "meet", given, kind.name) is not None:
+        raise RuleError(f"{_place(kind.meet)}: {kind.name}.meet must return nothing; it fills met")
+    if not set(rows["met"]) <= {0.0, 1.0}:
+        raise RuleError(f"{_place(kind.meet)}: {kind.name}.meet must fill met with 1.0 or 0.0 for each of n")
 
 
 def _shared(model: Model, given: dict[str, Any]) -> Any:

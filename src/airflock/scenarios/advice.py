@@ -71,6 +71,8 @@ def _unsent(scenario: Scenario) -> str:
 
 def _all_met(scenario: Scenario) -> str:
     """Numbers of a topology by which everybody is met."""
+    if scenario.own_topology is not None:
+        return ""
     topology, given = scenario.topology, scenario.document.get("topology", {})
     numbers = [f"topology.{key}" for key in given if key != "kind"]
     if topology.kind == "range" and numbers:

@@ -14,6 +14,7 @@ from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors.registry import SENSORS
+from airflock.topology.registry import TOPOLOGIES
 
 # what a scenario holds beside a section, that section, and the kinds that are ours
 KINDS = (
@@ -21,6 +22,7 @@ KINDS = (
     ("vehicle", "body", BODIES),
     ("sensor", "sensors", SENSORS),
     ("transceiver", "radio", RADIOS),
+    ("own_topology", "topology", TOPOLOGIES),
 )
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
@@ -28,7 +30,7 @@ LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at
 def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """The scenario with keys set anew, checked as a whole as if it came from a file.
 
-    Its law, body, sensor, radio and order parameters stay those that it has where they are no names of ours,
+    Its law, body, sensor, radio, topology and order parameters stay those that it has where they are no names of ours,
     unless their kind is set anew. Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}

@@ -9,6 +9,7 @@ from airflock.body.registry import BODIES, body_for
 from airflock.core.contract import Body, Metric, MetricSet, Model, body
 from airflock.core.radio import Packets, Radio, radio
 from airflock.core.sensor import Sensor, sensor
+from airflock.core.topology import Topology, topology
 from airflock.core.vocabulary import asks
 from airflock.errors import AirflockError
 from airflock.metrics.registry import SETS, USUAL, metric_set
@@ -18,7 +19,6 @@ from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
-from airflock.topology.registry import TOPOLOGIES
 
 
 def body_of(
@@ -151,9 +151,23 @@ def order_faults(flight: Any, found: Sensor, sensors: Any, link: Radio, k: Any) 
     ]
 
 
-def topology_faults(topology: Any, world: Any, found: Model | None) -> list[str]:
+def topology_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Topology | None, list[str]]:
+    """Topology of a user's own that the section topology names by its key kind, if it does; and what is wrong with it.
+
+    Raises nothing: a kind that is none of ours and no file is told by the section's own check.
+    """
+    kind = table.get("kind") if isinstance(table, Mapping) else None
+    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
+    if not isinstance(kind, str) or not kind.endswith(".py"):
+        return None, []
+    try:
+        return topology(own_code("topology.kind", kind, folder, trust=trust), Path(kind).stem), []
+    except AirflockError as fault:
+        return None, str(fault).splitlines()
+
+
+def topology_faults(kind: Topology | None, world: Any, found: Model | None) -> list[str]:
     """Why agents of a law in a world cannot meet each other by a topology."""
-    kind = TOPOLOGIES[topology.kind] if topology is not None else None
     faults = []
     if kind is not None and kind.flat and world is not None and world.dimensions == "3":
         faults.append(f"topology.kind = {kind.name!r}: cells are found in a plane; world.dimensions = '2' is one")

@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
+from airflock.core.vectors import overruled
 from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
@@ -53,9 +54,12 @@ def _section(key: str, base: Any, own: Any) -> Any:
     """One section: the document's keys over the file's, unless they are of different kinds."""
     if not isinstance(base, Mapping) or not isinstance(own, Mapping) or (set(own) & {"value", "unit"} and key != "set"):
         return own
-    other = key in KINDS and "kind" in own and _plain(own["kind"]) != _plain(base.get("kind"))
+    kinds = (_plain(own.get("kind", base.get("kind"))), _plain(base.get("kind")))
+    other = key in KINDS and kinds[0] != kinds[1]
+    if key == "topology":  # ours share their numbers; a file has its own
+        other = kinds[0] != kinds[1] and any(isinstance(kind, str) and kind.endswith(".py") for kind in kinds)
     kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
-    return {**kept, **own}
+    return {**overruled(kept, own), **own}
 
 
 def _plain(value: Any) -> Any:
@@ -63,9 +67,9 @@ def _plain(value: Any) -> Any:
 
 
 def _with_paths(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A document whose own files (a law, a body, a sensor, a radio, metrics, a mesh) are named from anywhere."""
+    """A document whose own files, of rules or of a mesh, are named from anywhere."""
     result = dict(document)
-    kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "metrics")]
+    kinds = [(section, "kind") for section in ("model", "body", "sensors", "radio", "topology", "metrics")]
     for section, key in (*kinds, ("scene", "file")):
         table = result.get(section)
         name = _plain(table.get(key)) if isinstance(table, Mapping) else None

@@ -16,6 +16,8 @@ from airflock.core.radio import Packets, Radio
 from airflock.core.radio import radio as gathered_radio
 from airflock.core.sensor import Sensor
 from airflock.core.sensor import sensor as gathered_sensor
+from airflock.core.topology import Topology
+from airflock.core.topology import topology as gathered_topology
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import ScenarioError
 from airflock.metrics.registry import as_set
@@ -25,6 +27,7 @@ from airflock.scenarios.ground import with_ground
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.topology.registry import TOPOLOGIES
 
 
 def presets() -> dict[str, Path]:
@@ -60,6 +63,7 @@ def load(
     body: Any = None,
     sensor: Any = None,
     radio: Any = None,
+    topology: Any = None,
     faults: Any = None,
     laws: Any = None,
     trust: bool = False,
@@ -86,6 +90,8 @@ def load(
         A sensor of your own by which agents know themselves: a `Sensor`, a namespace, or a name or file.
     radio : optional
         A radio of your own by which agents hear each other: a `Radio`, a namespace, or a name or file.
+    topology : optional
+        A topology of your own, which says whom of those that they hear agents meet: a namespace, or a name or file.
     faults : optional
         Kinds of fault of your own, which entries of [[faults]] may name: a namespace such as a module, what
         `airflock.fault` gives, or a list of these.
@@ -94,7 +100,7 @@ def load(
         `airflock.model` gives, or a list of these.
     trust : bool
         Whether code that the file names, or a file that it extends, may run: a law, also of a group, a body, a sensor,
-        a radio, order parameters.
+        a radio, a topology, order parameters.
 
     Returns
     -------
@@ -121,7 +127,7 @@ def load(
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
-        document, own = _given(document, metrics, body, sensor, radio)
+        document, own = _given(document, metrics, body, sensor, radio, topology)
         own["kinds"] = _kinds(faults)
         own["laws"] = {law.name: law for law in map(given_law, _several(laws))}
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
@@ -151,9 +157,9 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
 
 
 def _given(
-    document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any, radio: Any
+    document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any, radio: Any, topology: Any
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics, the body, the sensor and the radio which the caller gives, and these.
+    """A document that names the metrics, body, sensor, radio and topology that the caller gives, and these.
 
     Giving them is consent to run them. Raises ScenarioError.
     """
@@ -189,9 +195,35 @@ def _given(
     if radio is not None:
         kept = {key: value for key, value in document.get("radio", {}).items() if key in number_names(Packets)}
         document["radio"] = {**kept, "kind": own["transceiver"].name}
+    meets, more = _topology(topology)
+    own |= {"own_topology": meets} if isinstance(meets, Topology) else {}
+    document |= _meeting(document, meets)
+    faults = [*faults, *more]
     if faults:
         raise ScenarioError(faults)
     return document, own
+
+
+def _meeting(document: Mapping[str, Any], meets: Topology | str | None) -> dict[str, Any]:
+    """The section of a topology that the caller gives: ours share their numbers, another one has its own."""
+    if meets is None:
+        return {}
+    kept = document.get("topology", {}) if isinstance(meets, str) else {}
+    return {"topology": {**kept, "kind": meets if isinstance(meets, str) else meets.name}}
+
+
+def _topology(given: Any) -> tuple[Topology | str | None, list[str]]:
+    """A topology that the caller gives, or the name of one of ours; and what is wrong with it."""
+    if given is None or isinstance(given, Topology):
+        return given, []
+    if not isinstance(given, (str, os.PathLike)):
+        return gathered_topology(given), []
+    name = str(given)
+    if name in TOPOLOGIES or name.endswith(".py"):
+        return (name, []) if name in TOPOLOGIES else checks.topology_of({"kind": name}, trust=True)
+    near = get_close_matches(name, TOPOLOGIES, n=1, cutoff=0.4)
+    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(TOPOLOGIES)}, or a file that ends in .py"
+    return None, [f"topology = {name!r}: unknown topology; {hint}"]
 
 
 def _kinds(given: Any) -> dict[str, Fault]:

@@ -146,7 +146,8 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             unit = {"unit": value["unit"]} if "unit" in value else {}
             spreads[key] = {"value": value["spread"], **unit} if unit else value["spread"]
             rest = {name: entry for name, entry in value.items() if name != "spread"}
-            values |= {key: rest} if "value" in rest else {}
+            inner = rest.get("value")  # set anew beside a spread that has a unit, it may be a table of its own
+            values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
         else:
             values[key] = value
     converted, notes, wrong = units.converted({where: values, "spread": spreads}, {where: record, "spread": record})

@@ -12,6 +12,8 @@ from airflock.core.fault import Fault
 from airflock.core.parameters import declarations, number_names
 from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
+from airflock.core.topology import Topology
+from airflock.core.vectors import expanded, overruled
 from airflock.doors import is_file
 from airflock.errors import AirflockError, ParameterError, ScenarioError
 from airflock.radios.registry import RADIOS
@@ -21,6 +23,7 @@ from airflock.scenarios import (
     faulty,
     formats,
     geometry,
+    group_keys,
     group_laws,
     groups,
     places,
@@ -37,11 +40,14 @@ from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
+from airflock.topology.registry import TOPOLOGIES
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
 FAMILIES: Mapping[str, Mapping[str, Any]] = {"body": BODIES, "sensors": SENSORS, "radio": RADIOS}
+OURS = tuple(TOPOLOGIES)
 KINDS = {  # usual kind; keys of every kind
     "body": ("multirotor", ()), "sensors": (USUAL_SENSOR, ("period",)), "radio": (USUAL_RADIO, number_names(Packets)),
+    "topology": ("range", ()),
 }  # fmt: skip
 
 
@@ -56,6 +62,7 @@ def make(
     vehicle: Body | None = None,
     sensor: Sensor | None = None,
     transceiver: Radio | None = None,
+    own_topology: Topology | None = None,
     kinds: Mapping[str, Fault] | None = None,
     laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
@@ -65,15 +72,17 @@ def make(
 
     where : names it in faults; notes : what is known of it already
     law, measures, vehicle, sensor, transceiver : a model, a metric set, a body, a sensor, a radio given directly
+    own_topology : a topology given directly
     kinds : kinds of fault given directly, by name; laws : laws that groups may name
     trust : whether code that the document names may run
     """
     document = formats.current(document, where)
+    document, settings, in_groups = group_keys.with_groups(document, settings or {})
     short = {key: value for key, value in (settings or {}).items() if "." not in key and key not in TOP}
     document, left_out = _with_kinds(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
-    faults += more
+    faults += in_groups + more
     found = law
     if found is None and not more:
         try:
@@ -101,15 +110,22 @@ def make(
         transceiver, more = checks.radio_of(merged.get("radio", {}), folder, trust=trust)
         faults += more
         merged = _understood(merged, "radio", transceiver.Parameters) if more else merged
+    if own_topology is None:
+        own_topology, more = checks.topology_of(merged.get("topology", {}), folder, trust=trust)
+        faults += more
+        merged = {**merged, "topology": {}} if more else merged
     own = SECTIONS | {"body": vehicle.Parameters, "sensors": sensor.Parameters, "metrics": measures.Parameters}
     own |= {"radio": transceiver.Parameters}
+    own |= {"topology": own_topology.Parameters} if own_topology and own_topology.Parameters else {}
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
-    merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
+    merged, more = _components(_merged(merged, named)[0], records)
+    faults += more
+    merged, converted, more = units.converted(merged, {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
-    faults += more + _faults_between(parts, found, sensor, transceiver, measures)
+    faults += more + _faults_between(parts, found, sensor, transceiver, measures, own_topology)
     faults += checks.body_faults(vehicle, parts, found) + checks.sensor_faults(sensor, parts)
     single, told_of, more = _individuals(merged, parts, found, (vehicle, sensor), folder, kinds, laws, trust)
     faults += more
@@ -119,7 +135,7 @@ def make(
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
         name=where, model=found, vehicle=vehicle, sensor=sensor, transceiver=transceiver, measures=measures,
-        published=published, document=merged, **parts, **single,
+        own_topology=own_topology, published=published, document=merged, **parts, **single,
     )  # fmt: skip
     faults = _derived_faults(scenario) or places.place_faults(scenario)
     if faults:
@@ -183,6 +199,8 @@ def _with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tup
             continue
         if section == "radio" and _share_a_record(settings[key], given.get("kind", usual)):
             continue
+        if section == "topology" and settings[key] in OURS and given.get("kind", usual) in OURS:
+            continue
         if set(given) - {"kind", *shared}:
             kind = given.get("kind", usual)
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
@@ -205,7 +223,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
         if name and not isinstance(merged.setdefault(section, {}), dict):
             faults.append(f"{key}: unknown key")
         elif name:
-            merged[section][name] = value
+            merged[section] = {**overruled(merged[section], {name: value}), name: value}
         else:
             merged[section] = value
     for key in merged:
@@ -222,6 +240,16 @@ def _understood(merged: dict[str, Any], section: str, record: type) -> dict[str,
     if not isinstance(given, Mapping):
         return merged
     return {**merged, section: {key: value for key, value in given.items() if key in known}}
+
+
+def _components(merged: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
+    """A document in which each vector is its components, and what is wrong with those that are given whole."""
+    faults: list[str] = []
+    for section, record in records.items():
+        if isinstance(given := merged.get(section), Mapping) and getattr(record, "VECTORS", None):
+            merged[section], more = expanded(section, given, record)
+            faults += more
+    return merged, faults
 
 
 def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:
@@ -255,15 +283,17 @@ def _parts(
 
 
 def _faults_between(
-    parts: Mapping[str, Any], found: Model | None, sensor: Sensor, transceiver: Radio, measures: MetricSet
-) -> list[str]:
+    parts: Mapping[str, Any], found: Model | None, sensor: Sensor, transceiver: Radio, measures: MetricSet,
+    own_topology: Topology | None,
+) -> list[str]:  # fmt: skip
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight = parts["flight"]
     if flight is not None and flight.agents != int(flight.agents):
         faults.append(f"agents = {flight.agents:g} is not a whole number")
     begin: Any = parts["start"] or SECTIONS["start"]()
-    faults += checks.topology_faults(parts["topology"], parts["world"], found)
+    meets = own_topology or (TOPOLOGIES[parts["topology"].kind] if parts["topology"] is not None else None)
+    faults += checks.topology_faults(meets, parts["world"], found)
     faults += file_faults(parts["world"])
     if parts["world"] is not None:
         separation = parts["start"].separation if parts["start"] is not None else 0.0

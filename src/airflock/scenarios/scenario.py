@@ -26,7 +26,6 @@ from airflock.scenarios.portrait import html, sentence
 from airflock.scenarios.sections import ORDER, Flight
 from airflock.scenes.build import Scene, scene_of, waypoints
 from airflock.sensors.registry import SENSORS
-from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena, goals, scenery, start
 
@@ -66,12 +65,13 @@ class Scenario:
     aero: descent.Parameters
     silence: Silence
     metrics: metric_parameters.Parameters
-    topology: topologies.Parameters
+    topology: Any
     flight: Flight
     vehicle: Body
     sensor: Sensor
     transceiver: Radio
     measures: MetricSet
+    own_topology: Topology | None = None
     groups: tuple[Group, ...] = ()
     faults: tuple[Entry, ...] = ()
     published: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
@@ -137,7 +137,7 @@ class Scenario:
     @property
     def meets(self) -> Topology | None:
         """Which of those whom an agent hears it meets; None: all of them."""
-        return TOPOLOGIES[self.topology.kind]
+        return self.own_topology or TOPOLOGIES[self.topology.kind]
 
     @property
     def fault_kinds(self) -> tuple[Fault, ...]:

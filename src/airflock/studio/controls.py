@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from airflock.core.parameters import Choice, Quantity, declarations, with_unit
+from airflock.scenarios.group_keys import declared_of_groups, parts_of
 from airflock.scenarios.scenario import Scenario
 
 SECTIONS = ("model", "body", "sensors", "radio", "topology", "wind", "goals", "wing", "metrics")
@@ -41,7 +42,8 @@ class Control(NamedTuple):
 def controls_of(scenario: Scenario, usual: Mapping[str, tuple[float, float]] | None = None) -> dict[str, list[Control]]:
     """Controls by section, in the order in which the paper's parameters are declared; empty sections are left out.
 
-    The law's section is sorted into the parts that the law names, "model: repulsion" and so on.
+    The law's section is sorted into the parts that the law names, "model: repulsion" and so on. Numbers that a group
+    has of its own follow: those that the file names for it, and all of a law of its own.
     usual : spans of sliders by key, as a study of the law has them
 
     A number that is derived from the rest of the scenario (None) gets no control, nor do lists and texts.
@@ -62,6 +64,10 @@ def controls_of(scenario: Scenario, usual: Mapping[str, tuple[float, float]] | N
             else:
                 continue
             found.setdefault(part_of.get(key, section), []).append(made)
+    for key, declared, value in declared_of_groups(scenario):
+        if isinstance(declared, Quantity) and value is not None:
+            group, section, _ = parts_of(key)
+            found.setdefault(f"group {group}: {section}", []).append(slider(key, declared, value))
     return {part: made for part, made in found.items() if made}
 
 
@@ -72,7 +78,7 @@ def slider(key: str, declared: Quantity, value: float, studied: tuple[float, flo
     """
     usual = studied or declared.usual
     low, high = (min(usual[0], value), max(usual[1], value)) if usual else span(declared.low, declared.high, value)
-    label = with_unit(key.partition(".")[2], f"({declared.unit})" if declared.unit not in ("", "1") else "")
+    label = with_unit(key.rpartition(".")[2], f"({declared.unit})" if declared.unit not in ("", "1") else "")
     hint = _hint(declared.meaning, declared.span, declared.source)
     step = _round_step((high - low) / STEPS)
     return Control(key, label, hint, value, low, high, max(1.0, round(step)) if declared.whole else step)

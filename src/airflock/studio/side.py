@@ -16,6 +16,7 @@ from airflock.recordings.files import load_recording
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.events import Event
 from airflock.scenarios.files import load
+from airflock.scenarios.group_keys import is_group_key, value_in_group
 from airflock.scenarios.scenario import Scenario
 from airflock.studio.controls import fields
 from airflock.threads import in_background
@@ -280,7 +281,9 @@ def in_space(state: NDArray[Any], dimensions: int) -> tuple[NDArray[Any], NDArra
 
 
 def value_of(scenario: Scenario, key: str) -> Any:
-    """Value of a key such as model.p_rep."""
+    """Value of a key such as model.p_rep or groups.heavy.body.tau."""
+    if is_group_key(key):
+        return value_in_group(scenario, key)
     section, _, name = key.partition(".")
     if not name:
         return getattr(scenario.flight, section)

@@ -17,7 +17,8 @@ class Parameters(Record):
         ("range", "nearest", "voronoi", "visible", "strongest"),
         source="our choice",
         meaning="range: all that the radio brings; nearest: the k nearest; voronoi: whose cell borders on the own one, "
-        "in a plane; visible: not hidden by others, obstacles or the scene; strongest: the k strongest signals",
+        "in a plane; visible: not hidden by others, obstacles or the scene; strongest: the k strongest signals; "
+        "or a file that ends in .py",
     )
     k: float = quantity(
         7.0, "1", low=1, high=1e6, source=STARLINGS, whole=True, meaning="how many, nearest or strongest"

@@ -196,7 +196,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                         random.uniform(word_of(i, j, lot, drawn)) >= unheard({"distance": distance}, k, plan=plan)
                     )
                 if part == HEAR:
-                    if plan.meeting("dx") or plan.hides:
+                    if plan.placed:
                         for a in axes:
                             flock.away[a][j] = d[a]
                     flock.square[j] = choose(ok, r2, FAR)

@@ -1,0 +1,82 @@
+"""Keys of groups: `groups.NAME.SECTION.KEY`, by which settings, sliders and open flights change a group."""
+
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from airflock.core.parameters import Declaration, declarations
+from airflock.scenarios.groups import LETTERS
+
+FIRST = "groups."
+FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
+
+
+def is_group_key(key: str) -> bool:
+    """Whether a key names something of a group."""
+    return key.startswith(FIRST)
+
+
+def parts_of(key: str) -> tuple[str, str, str]:
+    """Group, section and name that a key consists of; empty words where it has too few."""
+    rest = key.removeprefix(FIRST).rsplit(".", 2)
+    return (rest[0], rest[1], rest[2]) if len(rest) == 3 else ("", "", "")
+
+
+def with_groups(
+    document: Mapping[str, Any], settings: Mapping[str, Any]
+) -> tuple[Mapping[str, Any], dict[str, Any], list[str]]:
+    """A document with the keys of its groups set, the other settings, and what is wrong with these keys."""
+    wanted = {key: value for key, value in settings.items() if is_group_key(key)}
+    others = {key: value for key, value in settings.items() if key not in wanted}
+    given = others.get("groups", document.get("groups", ()))
+    if (
+        not wanted
+        or not given
+        or not isinstance(given, (list, tuple))
+        or not all(isinstance(table, Mapping) for table in given)
+    ):
+        return document, others, [f"{key}: the scenario has no [[groups]]" for key in wanted]
+    tables = [dict(table) for table in given]
+    names = [table.get("name", f"group_{number}") for number, table in enumerate(tables)]
+    faults = []
+    for key, value in wanted.items():
+        group, section, name = parts_of(key)
+        if section not in LETTERS or not name:
+            faults.append(f"{key}: unknown key; {FORM}; sections: {', '.join(LETTERS)}")
+        elif group not in names:
+            near = get_close_matches(group, [str(known) for known in names], n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(map(str, names))}"
+            faults.append(f"{key}: unknown group {group!r}; {hint}")
+        else:
+            table = tables[names.index(group)]
+            own = table.get(section, {})
+            table[section] = {**own, name: _kept(own.get(name), value)} if isinstance(own, Mapping) else own
+    return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
+
+
+def _kept(before: Any, value: Any) -> Any:
+    """A value with the spread that the number had before, which keeps its unit."""
+    if not isinstance(before, Mapping) or "spread" not in before or isinstance(value, Mapping):
+        return value
+    unit = {"unit": before["unit"]} if "unit" in before else {}
+    return {"value": {"value": value} if unit else value, "spread": before["spread"], **unit}
+
+
+def declared_of_groups(scenario: Any) -> Iterator[tuple[str, Declaration, Any]]:
+    """Key, declaration and value of what groups have of their own: numbers, and all of a law that only they have."""
+    for group in scenario.groups:
+        for section, letter in LETTERS.items():
+            law = group.law if section == "model" else None
+            record = law[1] if law else scenario.records[section]
+            for name, declared, _ in declarations(record):
+                if law or (letter, name) in group.numbers or (letter, name) in group.spread:
+                    value = group.numbers.get((letter, name), getattr(record, name))
+                    yield f"{FIRST}{group.name}.{section}.{name}", declared, value
+
+
+def value_in_group(scenario: Any, key: str) -> Any:
+    """Value of a key of a group; that of the flock where the group has none of its own."""
+    group, section, name = parts_of(key)
+    found = next(each for each in scenario.groups if each.name == group)
+    record = found.law[1] if found.law and section == "model" else scenario.records[section]
+    return found.numbers.get((LETTERS[section], name), getattr(record, name))

@@ -1,0 +1,98 @@
+"""Keys of groups: in settings and in flight they mean what the file would; wrong ones are one line; sliders."""
+
+import numpy as np
+import pytest
+
+import airflock
+from airflock.engine.simulate import fly
+from airflock.errors import ScenarioError
+from airflock.scenarios.files import load
+from airflock.studio.controls import controls_of, fields
+from airflock.studio.side import value_of
+
+PAPER = "vasarhelyi_2018/4ms"
+SMALL = {"agents": 6, "duration": 1.0, "world.side": 60.0, "start.separation": 5.0}
+GROUPS = [
+    {"name": "heavy", "agents": 2, "body": {"tau": {"value": "2000 ms", "spread": 0.1}, "a_max": "3 m/s^2"}},
+    {"name": "old.ones", "agents": [4], "model": {"kind": "viragh_2014", "p_rep": 0.5}},
+    {"name": "light"},
+]
+
+
+def flock(settings=None, groups=GROUPS):
+    return load(PAPER, SMALL | {"groups": groups} | (settings or {}))
+
+
+def frames(scenario, seed):
+    return fly(scenario, seed, record=True, device="python").frames
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "place", "written"),
+    [
+        ("groups.heavy.body.tau", 3.0, (0, "body", "tau"), {"value": 3.0, "spread": 0.1}),
+        ("groups.heavy.body.tau", "3000 ms", (0, "body", "tau"), {"value": "3000 ms", "spread": 0.1}),
+        ("groups.light.model.p_rep", 0.1, (2, "model", "p_rep"), 0.1),
+        ("groups.old.ones.model.v_flock", 2.0, (1, "model", "v_flock"), 2.0),
+        ("groups.light.model.kind", "viragh_2014", (2, "model", "kind"), "viragh_2014"),
+    ],
+)
+def test_a_key_means_what_the_file_would(key, value, place, written, seed):
+    number, section, name = place
+    tables = [{**table} for table in GROUPS]
+    tables[number][section] = {**tables[number].get(section, {}), name: written}
+    known, found = flock(groups=tables), flock({key: value})
+    assert [(g.numbers, g.spread, g.agents) for g in found.groups] == [
+        (g.numbers, g.spread, g.agents) for g in known.groups
+    ]
+    assert np.array_equal(frames(found, seed), frames(known, seed))
+    assert not np.array_equal(frames(found, seed), frames(flock(), seed))
+    assert GROUPS[0]["body"]["tau"] == {"value": "2000 ms", "spread": 0.1}  # what was given is left as it was
+
+
+def test_a_spread_keeps_its_unit_beside_a_value_that_is_set_anew():
+    table = {"name": "heavy", "agents": 2, "body": {"tau": {"value": 1500.0, "spread": 100.0, "unit": "ms"}}}
+    (found,) = flock({"groups.heavy.body.tau": 3.0}, [table]).groups
+    assert found.numbers["b", "tau"] == 3.0 and found.spread["b", "tau"] == pytest.approx(0.1)
+
+
+def test_an_open_flight_takes_a_key_of_a_group(seed):
+    flight = airflock.open(flock(), seed, device="python")
+    flight.change({"groups.light.model.p_rep": 0.1, "groups.old.ones.model.p_rep": 0.1}).advance(1.0)
+    known = frames(flock({"groups.light.model.p_rep": 0.1, "groups.old.ones.model.p_rep": 0.1}), seed)
+    np.testing.assert_allclose(flight.state, known[-1, :4], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("groups.hevy.body.tau", "unknown group 'hevy'; did you mean heavy"),
+        ("groups.heavy.bdy.tau", "unknown key; write groups.NAME.SECTION.KEY"),
+        ("groups.heavy", "unknown key; write groups.NAME.SECTION.KEY"),
+        ("groups.heavy.body.tua", r"groups\[0\].body.tua: unknown key; did you mean groups.0..body.tau"),
+        ("groups.heavy.sensors.period", "all measure and decide at the same times"),
+    ],
+)
+def test_a_wrong_key_is_said_in_one_line(key, said):
+    with pytest.raises(ScenarioError, match=said) as caught:
+        flock({key: 1.0})
+    assert len(str(caught.value).splitlines()) == 1
+    with pytest.raises(ScenarioError, match=r"groups.heavy.body.tau: the scenario has no \[\[groups\]\]"):
+        load(PAPER, {"groups.heavy.body.tau": 1.0})
+
+
+def test_each_group_has_sliders_of_its_own_numbers():
+    scenario = flock()
+    found = controls_of(scenario)
+    assert [control.key for control in found["group heavy: body"]] == [
+        "groups.heavy.body.tau",
+        "groups.heavy.body.a_max",
+    ]
+    own = {control.key: control for control in found["group old.ones: model"]}
+    assert own["groups.old.ones.model.p_rep"].value == 0.5 and len(own) > 3  # all of a law that only they have
+    assert not any(section.startswith("group light") for section in found)
+    for section in found:
+        for control in found[section] if section.startswith("group") else ():
+            assert control.value == value_of(scenario, control.key) and control.low <= control.value <= control.high
+    assert own["groups.old.ones.model.p_rep"].label.startswith("p_rep")
+    assert fields({"groups.old.ones.model.p_rep": 0.2}) == "--set groups.old.ones.model.p_rep=0.2"
