@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine import fly, plan_of
 from airflock.errors import AirflockError, CardError, RecordingError, RuleError, ScenarioError
 from airflock.fleet.prepare import card_document
 from airflock.recordings.files import fly_again

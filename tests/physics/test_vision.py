@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock.engine.simulate import fly, plan_of
+from airflock.engine import fly, plan_of
 from airflock.radios import vision
 from airflock.radios.vision import Packet, Parameters, gains, lasts, receive, see
 from airflock.scenarios.files import load

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.engine.simulate import fly
+from airflock.engine import fly
 from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
 from airflock.studio.controls import controls_of, fields
