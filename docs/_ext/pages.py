@@ -91,7 +91,8 @@ def models() -> None:
             raise ExtensionError(f"equations/{name}.md: no function {', '.join(missing)} in the model")
         pieces = [f"# `{name}`\n\n**{plain(title)}**\n\n{prose(rest)}\n"]
         pieces.append(f"\nIts command is {model.command}; the source is `src/airflock/models/{name}.py`. ")
-        pieces.append(f"[A picture of it](/generated/gallery/{PICTURES[name]}) is in the gallery.\n")
+        if name in PICTURES:
+            pieces.append(f"[A picture of it](/generated/gallery/{PICTURES[name]}) is in the gallery.\n")
         pieces.append("\n## Equations beside code\n")
         for rule, text in written.items():
             code = functions[rule]

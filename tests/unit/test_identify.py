@@ -11,8 +11,9 @@ import pytest
 import airflock
 from airflock.core import random
 from airflock.errors import RecordingError, ScenarioError
-from airflock.identify import body, packets, periods, synthetic
+from airflock.identify import body, hills, packets, periods, synthetic
 from airflock.identify import sensors as standing
+from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
 from airflock.identify.run import HARDER, UNITS, Number, identify
@@ -147,33 +148,33 @@ def test_where_a_drone_stands_says_nothing_of_its_sensor():
 
 def hill(numbers, widths):
     """Loss of a normal likelihood of near, far and the two shares."""
-    return lambda z: 0.5 * float((((np.array(packets.unpacked(z)) - numbers) / widths) ** 2).sum())
+    return lambda z: 0.5 * float((((np.array(hills.unpacked(z)) - numbers) / widths) ** 2).sum())
 
 
 def test_the_highest_of_two_hills_of_a_radio_is_found_though_the_other_is_wider():
     low = hill(np.array([28.0, 75.0, 0.91, 0.33]), np.array([3.0, 12.0, 0.03, 0.1]))
     high = hill(np.array([26.0, 58.0, 0.91, 0.45]), np.array([3.0, 3.0, 0.03, 0.1]))
-    best, *others = packets._lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
-    assert packets.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
+    best, *others = hills.lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
+    assert hills.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
     assert not others  # the lower one is not nearly as likely
 
 
 def test_intervals_are_those_of_the_profile():
     numbers, widths = np.array([25.0, 60.0, 0.9, 0.3]), np.array([1.0, 2.0, 0.01, 0.03])
-    top = packets._at(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
-    assert packets.unpacked(top) == pytest.approx(numbers)
+    top = hills.placed(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
+    assert hills.unpacked(top) == pytest.approx(numbers)
     for (low, high), value, width in zip(
-        packets._intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
+        hills.intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
     ):
         assert (low, high) == pytest.approx((value - 1.96 * width, value + 1.96 * width), abs=0.05 * width)
 
     # all of 100 packets came: a share p says log(p) each, so that 100 log(p) = -1.92 at the lower end
     def all_came(z):
-        near, far, share, other = packets.unpacked(z)
+        near, far, share, other = hills.unpacked(z)
         return -100.0 * np.log(share) + hill(numbers, np.array([1.0, 2.0, np.inf, 0.03]))(z)
 
     certain = np.array([*top[:2], 9.0, np.log(0.3 / 0.7)])
-    low, high = packets._intervals(all_came, certain)["received_near"]
+    low, high = hills.intervals(all_came, certain)["received_near"]
     assert low == pytest.approx(np.exp(-0.0192), abs=2e-3) and high > 0.9995
 
 
@@ -208,12 +209,44 @@ def test_the_curve_of_reception_comes_back():
     k = links.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
     found = packets.fit_links(heard_by(k)[0], 0.2, k)
     assert not found.refused
-    for name in packets.LINKS:
+    for name in LINKS:
         low, high = found.interval[name]
         assert low - (high - low) < getattr(k, name) < high + (high - low)
     near = heard_by(k)[0]
     near = near[near["distance"] < 40.0]
     assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
+
+
+def test_entries_of_a_table_come_back_within_their_intervals():
+    """Of 40 tables' 320 entries about one in twenty lies outside; an entry without packets has no error."""
+    rng, outside = np.random.default_rng(4), 0
+    shares = np.linspace(0.95, 0.2, 8)
+    for _ in range(40):
+        distance = rng.uniform(0.0, 70.0, 4000)
+        got = (rng.random(4000) < np.interp(distance / 10.0, np.arange(8), shares)).astype(int)
+        found, errors = packets.fit_table(pd.DataFrame({"distance": distance, "got": got}), 10.0)
+        assert np.isnan(errors[8:]).all() and found[15] == found[7]
+        outside += int((np.abs(found[:8] - shares) > 1.96 * errors[:8]).sum())
+    assert 5 <= outside <= 32
+
+
+def test_identify_writes_a_table_where_the_radio_is_one(fleet):
+    """Told is what pairs flew; what is farther stays as --like has it."""
+    truth, first, _ = fleet
+    like = airflock.load("vasarhelyi_2018/real_6ms", {"radio.kind": "table", "radio.spacing": 20.0})
+    heard, _ = heard_by(truth.radio)
+    found = identify(first.logs, like, heard=heard)
+    told = {key: number for key, number in found.numbers.items() if key.startswith("radio.received_")}
+    known = packets.table_of(heard, 20.0)
+    assert list(told) == [f"radio.received_{n}" for n in range(16)] and "radio.near" not in found.numbers
+    assert [n for n in range(16) if told[f"radio.received_{n}"].told] == list(range(9))  # up to 150 m
+    assert all(told[f"radio.received_{n}"].value == known[f"received_{n}"] for n in range(9))
+    assert "no pair flew within 20 m of 300 m apart" in told["radio.received_15"].reason
+    flown = found.scenario().radio
+    assert flown.received_3 == known["received_3"] and flown.received_15 == like.radio.received_15
+    entry = found.document(uncertain=True)["radio"]["received_3"]
+    assert entry["interval"][0] < entry["value"] < entry["interval"][1]
+    assert found.scenario(0.9).radio.received_3 < flown.received_3  # the pessimistic end hears less
 
 
 def test_the_period_of_decisions_comes_back():

@@ -13,7 +13,9 @@ from scipy.stats import norm
 from airflock.body import motion
 from airflock.errors import AirflockError, RecordingError
 from airflock.identify import body, packets, periods, sensors
+from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
+from airflock.radios.table import ENTRIES
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
 from airflock.scenarios.files import loaded
@@ -32,6 +34,11 @@ UNITS = {
     "sensors.damping": "1/s", "sensors.scale": "m", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
     "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
+OF_TABLE = [f"radio.received_{n}" for n in range(ENTRIES)]
+HARDER |= dict.fromkeys(OF_TABLE, False)
+UNITS |= dict.fromkeys(OF_TABLE, "1")
+LEAST = 1e-6  # share of packets; what nothing was heard of
+WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
 NEVER = {
     "wind.east, wind.north": "steady wind and drag act as one push; kept from --like",
     "radio.range": "a flight shows no packet beyond the farthest pair; kept from --like",
@@ -226,21 +233,36 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
     nan = float("nan")
     if heard is None:
         reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
-        for name in ("delay", *packets.LINKS):
+        for name in ("delay", *LINKS):
             tell(f"radio.{name}", nan, (nan, nan), "", reason)
         return None
     table = packets.checked(heard)
     late = packets.fit_delay(table)
     origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
     tell("radio.delay", late.value, late.interval, origin, late.reason)
+    if scenario.transceiver.name == "table":
+        _table(table, scenario.radio, tell)
+        return packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
     links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
     lossy = scenario.transceiver.name == "links"
-    for name in packets.LINKS:
+    for name in LINKS:
         why = links.refused.get(name, "") or (
             "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
         )
         tell(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets", why)
     return links
+
+
+def _table(heard: pd.DataFrame, k: Any, tell: Any) -> None:
+    """Entries of a radio of kind "table", at the spacing that the scenario has."""
+    shares, errors = packets.fit_table(heard, k.spacing)
+    half = norm.ppf(0.975) * errors
+    for n, (share, off) in enumerate(zip(shares.tolist(), half.tolist(), strict=True)):
+        near = f"no pair flew within {k.spacing:g} m of {n * k.spacing:g} m apart; kept from --like"
+        wide = f"only known to ± {off:.2f}: more packets at {n * k.spacing:g} m" if off > WIDE else ""
+        ends = (max(share - off, 0.0), min(share + off, 1.0))
+        share = max(share, LEAST)
+        tell(f"radio.received_{n}", share, ends, f"{len(heard)} packets", near if np.isnan(off) else wide)
 
 
 def _like(scenario: Scenario, key: str) -> float | None:

@@ -13,7 +13,7 @@ from airflock.scenarios.own_code import own_code
 
 MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
-    "dimock_2003", "chen_2014",
+    "dimock_2003", "chen_2014", "couzin_2005",
 )  # fmt: skip
 
 
