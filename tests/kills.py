@@ -60,8 +60,8 @@ def rows(folder):
 def certify(folder):
     """A campaign of toy flights, so many in all, and its certificate."""
     from airflock.certify.campaign import FOLDER, Campaign
-    from airflock.certify.limits import read_all
     from airflock.certify.run import run
+    from airflock.limits.limit import read_all
     from airflock.scenarios.files import load
 
     scenario = load("vasarhelyi_2018/real_6ms")

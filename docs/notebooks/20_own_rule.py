@@ -177,3 +177,31 @@ except airflock.AirflockError as fault:
 # %%
 # In a file of its own, `mine.py`, the same law flies by `model.kind = "mine.py"` in a scenario file, with `--trust`.
 # There `airflock types mine.py` also tells a misspelled parameter, without running anything.
+
+# %%
+# Several numbers of one meaning
+# ------------------------------
+# A force with several terms has a weight for each. `size` declares them in one line: a rule reads a tuple, and loops
+# over it are written out when the law is compiled. A scenario file gives all of them, `model.w = [1.0, 0.3, 0.1]`, or
+# one, `model.w_1 = 0.5`; each has a slider on the live page, and bounds in a search.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terms(airflock.Parameters):
+    """Weights of the terms of a force."""
+
+    w: tuple[float, ...] = airflock.quantity(
+        (1.0, 0.3, 0.1), "m/s^2", size=3, low=0.0, high=5.0, meaning="weight of a term"
+    )
+
+
+def strength(near, p):
+    """Force at a nearness from 0 (far) to 1 (close): terms of growing power, m/s²."""
+    total, power = 0.0, near
+    for k in range(len(p.w)):
+        total += p.w[k] * power
+        power *= near
+    return total
+
+
+print(strength(0.5, Terms()), strength(0.5, Terms(w_2=2.0)))

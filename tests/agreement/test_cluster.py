@@ -12,7 +12,6 @@ import pytest
 import toys
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.flights import CampaignTask, measured, score_of
-from airflock.certify.limits import read_all
 from airflock.certify.run import run as certified
 from airflock.errors import FlightError, StudyError
 from airflock.evolve.folder import open_folder
@@ -23,6 +22,7 @@ from airflock.executors import Flight
 from airflock.executors.cluster import Cluster
 from airflock.executors.here import Here
 from airflock.executors.scores import scores
+from airflock.limits.limit import read_all
 from airflock.scenarios.files import load
 from needed import needed
 

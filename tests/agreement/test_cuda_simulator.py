@@ -15,7 +15,7 @@ needed("numba_cuda")
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
     "paper", "split", "storm", "polygon", "silo", "links", "torus", "table", "couzin", "vicsek", "groups", "together",
-    "city", "herd", "stop", "display", "wings", "vee", "echelon",
+    "city", "herd", "stop", "display", "wings", "vee", "echelon", "weights",
 )  # fmt: skip
 
 

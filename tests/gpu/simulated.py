@@ -12,8 +12,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import airflock  # noqa: E402
+import several_terms  # noqa: E402
 from airflock.engine import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
+from airflock.scenarios.making import make  # noqa: E402
 from flocks import IDEAL, ISLANDS, NOTCHED, scenario  # noqa: E402
 from inside import (
     Shape,  # noqa: E402
@@ -96,13 +99,16 @@ CASES = {
         "agents": 3, "duration": 0.6, "dt": 0.1, "sensors.period": 0.2, "metrics.period": 0.3, "wing.segments": "5",
     }, 1, False),
     "city": ("kidger/city", {"agents": 3, "duration": 0.3, "scene.blocks": 3, "goals.count": 2}, 1, True),
+    "weights": (several_terms, {"model.w": [0.5, 0.3, 0.1], "start.separation": 3.0}, 1, True),
 }  # fmt: skip
 
 
 def build(name):
     """Scenario and layout of a case."""
     kind, keys, per_agent, registers = CASES[name]
-    if "/" in kind:
+    if kind is several_terms:
+        found = make({}, name, COMMON | keys, law=airflock.model(vars(kind)))
+    elif "/" in kind:
         found = load(kind, keys)
     else:
         found = scenario(kind, **{key.replace(".", "__"): value for key, value in (COMMON | keys).items()})

@@ -19,7 +19,8 @@ import numpy as np
 import xarray as xr
 
 import airflock
-from airflock.infer.run import LAWS, Inferred, interval
+from airflock.infer.found import Inferred, interval
+from airflock.infer.run import LAWS
 from airflock.scenarios.making import make
 
 NOISE, MISSING = 0.02, 0.02

@@ -36,3 +36,12 @@ def test_two_times_one_after_another_are_their_sum(tau, a_max, gap, first, secon
 def test_rate_of_small_steps_is_one_over_tau():
     assert held.decay_rate(0.8, 1e-9) == pytest.approx(1.0 / 0.8, rel=1e-6)
     assert pytest.approx(math.exp(-20 * DT * held.decay_rate(0.5, DT))) == (1.0 - DT / 0.5) ** 20
+
+
+@pytest.mark.parametrize("tau", [0.1, 0.5, 3.0])
+def test_a_velocity_wanders_as_far_as_many_noisy_steps_let_it(tau):
+    noise, variance = 0.3, 0.0
+    for _ in range(round(20.0 * tau / DT)):  # each step keeps 1 - DT/tau of the gap, and adds 2 noise DT
+        variance = (1.0 - DT / tau) ** 2 * variance + 2.0 * noise * DT
+    assert noise * held.wander(tau, DT) == pytest.approx(variance, rel=1e-12)
+    assert held.wander(tau, 0.0) == tau

@@ -9,11 +9,9 @@ import pytest
 import tomlkit
 from typer.testing import CliRunner
 
-from airflock.certify.bounds import per_hour
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import digest, sealed
 from airflock.certify.check import check
-from airflock.certify.limits import read, read_all
 from airflock.certify.run import certify, run
 from airflock.certify.seeds import COUNT, identity, seed
 from airflock.certify.tolerance import sound_keys
@@ -22,6 +20,8 @@ from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
 from airflock.executors.here import Here
+from airflock.limits.bounds import per_hour
+from airflock.limits.limit import read, read_all
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 

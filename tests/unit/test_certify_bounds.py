@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from airflock.certify import seeds
-from airflock.certify.bounds import look, lower_bound, needed, per_flight, per_hour, schedule
 from airflock.certify.hazard import hazard
 from airflock.evolve.study import load_study
+from airflock.limits.bounds import look, lower_bound, needed, per_flight, per_hour, schedule
 from airflock.recordings.rare import upper_bound
 from airflock.scenarios.change import remade
 from airflock.scenarios.files import load

@@ -112,6 +112,71 @@ def test_the_error_of_navigation_comes_back_from_drones_that_stand():
     assert "stand still" in short.refused["noise"]
 
 
+def differences_loss(q, u, h, noise, damping, scale, white, grain):
+    """Negative log-likelihood of what does not depend on the place: differences of positions, and velocities."""
+    spring = np.sqrt(2.0 * damping * noise) / scale
+    step = np.array([[1.0 - h * h * spring, h * (1.0 - damping * h)], [-h * spring, 1.0 - damping * h]])
+    push = 2.0 * damping * h * noise * np.array([[h * h, h], [h, 1.0]])
+    n, p = len(q), np.diag([scale * np.sqrt(noise / (2.0 * damping)), noise])
+    blocks = np.zeros((n, n, 2, 2))
+    for k in range(n):
+        blocks[k, k], later = p, p
+        for j in range(k + 1, n):
+            later = step @ later
+            blocks[j, k], blocks[k, j] = later, later.T
+        p = step @ p @ step.T + push
+    covariance = blocks.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    covariance += np.diag(np.tile([grain**2, white**2 + 1e-12], n))
+    contrasts = np.zeros((2 * n - 1, 2 * n))
+    for k in range(n - 1):
+        contrasts[k, [2 * k, 2 * k + 2]] = -1.0, 1.0
+    contrasts[np.arange(n - 1, 2 * n - 1), 2 * np.arange(n) + 1] = 1.0
+    y, c = contrasts @ np.stack([q, u], axis=1).ravel(), contrasts @ covariance @ contrasts.T
+    return 0.5 * np.linalg.slogdet(c)[1] + 0.5 * y @ np.linalg.solve(c, y)
+
+
+def test_where_a_drone_stands_says_nothing_of_its_sensor():
+    g = np.random.default_rng(3)
+    q, u = 7.0 + np.cumsum(g.normal(0.0, 0.02, 40)), g.normal(0.0, 0.1, 40)
+    first = np.arange(40) == 0
+    here, there = (0.004, 0.1, 3.0, 0.05), (0.02, 0.2, 2.0, 0.1)
+    ours = [standing._kernel()(q, u, first, 0.2, *numbers, 0.01) for numbers in (here, there)]
+    truth = [differences_loss(q, u, 0.2, *numbers, 0.01) for numbers in (here, there)]
+    assert ours[0] - ours[1] == pytest.approx(truth[0] - truth[1], abs=1e-3)
+
+
+def hill(numbers, widths):
+    """Loss of a normal likelihood of near, far and the two shares."""
+    return lambda z: 0.5 * float((((np.array(packets.unpacked(z)) - numbers) / widths) ** 2).sum())
+
+
+def test_the_highest_of_two_hills_of_a_radio_is_found_though_the_other_is_wider():
+    low = hill(np.array([28.0, 75.0, 0.91, 0.33]), np.array([3.0, 12.0, 0.03, 0.1]))
+    high = hill(np.array([26.0, 58.0, 0.91, 0.45]), np.array([3.0, 3.0, 0.03, 0.1]))
+    best, *others = packets._lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
+    assert packets.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
+    assert not others  # the lower one is not nearly as likely
+
+
+def test_intervals_are_those_of_the_profile():
+    numbers, widths = np.array([25.0, 60.0, 0.9, 0.3]), np.array([1.0, 2.0, 0.01, 0.03])
+    top = packets._at(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
+    assert packets.unpacked(top) == pytest.approx(numbers)
+    for (low, high), value, width in zip(
+        packets._intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
+    ):
+        assert (low, high) == pytest.approx((value - 1.96 * width, value + 1.96 * width), abs=0.05 * width)
+
+    # all of 100 packets came: a share p says log(p) each, so that 100 log(p) = -1.92 at the lower end
+    def all_came(z):
+        near, far, share, other = packets.unpacked(z)
+        return -100.0 * np.log(share) + hill(numbers, np.array([1.0, 2.0, np.inf, 0.03]))(z)
+
+    certain = np.array([*top[:2], 9.0, np.log(0.3 / 0.7)])
+    low, high = packets._intervals(all_came, certain)["received_near"]
+    assert low == pytest.approx(np.exp(-0.0192), abs=2e-3) and high > 0.9995
+
+
 def heard_by(k, count=60_000, delay=0.4, jitter=0.02, seed=2, drones=6):
     """Packets by the reception law itself, with clocks that differ by seconds."""
     g = np.random.default_rng(seed)
@@ -254,7 +319,9 @@ def test_recordings_can_be_identified_and_need_commands(fleet):
 
 def test_the_flight_card_lists_every_number_and_takes_ten_minutes():
     card = flight_card(airflock.load("vasarhelyi_2018/real_6ms"))
-    assert {key for part in card for key in part.keys} == set(UNITS)
+    tabled = flight_card(airflock.load("vasarhelyi_2018/real_6ms", {"radio.kind": "table"}))
+    told, told_of_table = ({key for part in each for key in part.keys} for each in (card, tabled))
+    assert told | told_of_table == set(UNITS) and told_of_table - told == set(packets.OF_TABLE)
     assert sum(part.seconds for part in card) < 660.0
 
 

@@ -10,7 +10,8 @@ import xarray as xr
 
 import airflock
 from airflock.errors import AirflockError, RecordingError
-from airflock.infer import bootstrap, candidates, fit, run, select
+from airflock.infer import bootstrap, candidates, search, select
+from airflock.infer.found import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
 
@@ -59,9 +60,8 @@ def walkers(agents=10, frames=300, seed=5):
 def brief(monkeypatch):
     """Little searching: enough for two laws of a few numbers."""
     for module, name, value in (
-        (fit, "DRAWN", 40), (fit, "STARTS", 3), (select, "SEARCHES", 0), (select, "DEEP", 0),
-        (select, "HOPS", 0), (select, "FEW_HOPS", 0), (bootstrap, "ROUNDS", (2, 5)),
-        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)),
+        (search, "DRAWN", 5), (search, "RACE", ((4, 3), (2, 5))), (search, "SWEEPS", 0), (bootstrap, "ROUNDS", (2, 5)),
+        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 
@@ -164,15 +164,15 @@ def test_bad_tracks_and_laws_are_one_line_each():
 
 def test_the_best_is_named_with_its_doubts():
     def law(name, gain, missed, surprise):
-        return run.Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))
+        return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))
 
     ahead = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0])
-    assert run._verdict([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
-    doubtful = run._verdict([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
+    assert verdict_of([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
+    doubtful = verdict_of([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
     assert "b cannot be told from it" in doubtful
-    assert "would explain 30%" in run._verdict([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
-    assert run._verdict([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
-    assert run._verdict([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
+    assert "would explain 30%" in verdict_of([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
+    assert verdict_of([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
+    assert verdict_of([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
 
 
 def test_the_command_says_all_that_is_wrong_in_lines(tmp_path):
@@ -188,8 +188,8 @@ def test_json_holds_what_the_table_says():
     from airflock.cli.infer import _plain
 
     scale = scale_of([tracks_of(vicsek(frames=130))])
-    laws = [run.Law("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
-    found = run.Inferred(laws, None, "none", 10, (5, 9), scale, 10)
+    laws = [Law("a", 1.0, 2.0, 0.5, 20.0, 3.0, 0.9, float("nan"), {}, None, None, None, np.zeros(3))]
+    found = Inferred(laws, None, "none", 10, (5, 9), scale, 10)
     plain = json.loads(json.dumps(_plain(found)))
     assert plain["best"] is None and plain["laws"][0]["gain"] == 1.0 and plain["frames"] == {"fitted": 5, "all": 9}
 

@@ -11,6 +11,14 @@ def decay_rate(tau, dt):
     return -math.log1p(-dt / tau) / dt if dt > 0.0 else 1.0 / tau
 
 
+def wander(tau, dt):
+    """Variance of a velocity about a held command after a long time, per unit of outer noise, s.
+
+    A step keeps the share 1 - dt/tau of the gap and adds 2 dt; for dt = 0 this is tau.
+    """
+    return tau / (1.0 - 0.5 * dt / tau)
+
+
 def gap_left(gap, time, tau, rate, a_max):
     """What is left of a velocity gap (m/s) after `time` (s), and for how long of it a_max limited the motion (s).
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from airflock.certify.campaign import Campaign
-from airflock.certify.limits import read_all
 from airflock.errors import ScenarioError, StudyError
 from airflock.executors.cluster import fly_on_their_cpu
+from airflock.limits.limit import read_all
 from airflock.scenarios.scenario import Scenario
 
 

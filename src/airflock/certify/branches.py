@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.certify.bounds import per_hour
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Count
 from airflock.certify.seeds import COUNT, SPLIT, seed
@@ -16,6 +15,7 @@ from airflock.certify.splitting import Estimate, Falls, Lineage, Particle, estim
 from airflock.errors import ScenarioError
 from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight, Landed
+from airflock.limits.bounds import per_hour
 from airflock.scenarios.events import Event
 from airflock.scenarios.scenario import Scenario
 

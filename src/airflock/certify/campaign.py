@@ -10,8 +10,8 @@ import numpy as np
 from airflock import __version__
 from airflock.certify import seeds
 from airflock.certify.flights import measured
-from airflock.certify.limits import Limit
 from airflock.evolve.study import fingerprint
+from airflock.limits.limit import Limit
 from airflock.scenarios.scenario import Scenario
 
 LAYOUT = 1  # of the folder; raised whenever an older folder could not be continued
@@ -23,7 +23,7 @@ class Campaign:
     """Flights that are to show limits.
 
     confidence : of all limits together
-    flights    : a number that is fixed beforehand: one look at its end; None: looks as `bounds.sizes` says
+    flights    : a number that is fixed beforehand: one look at its end; None: looks as `limits.bounds.schedule` says
     uncertain  : whether each flight draws the numbers of its world from the intervals that the scenario file holds
     """
 

@@ -9,12 +9,12 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from airflock.certify.bounds import per_hour
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Verdict
 from airflock.certify.hazard import Hazard
 from airflock.certify.seeds import COUNT, seed
 from airflock.evolve.folder import plain, write
+from airflock.limits.bounds import per_hour
 
 FORMAT = 1
 LOOK = ("flights", "events", "above", "below", "low", "high")

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from airflock.certify.bounds import Look, look, needed, schedule, share
 from airflock.certify.campaign import Campaign
-from airflock.certify.limits import Limit
 from airflock.certify.seeds import COUNT, seed
 from airflock.errors import StudyError
 from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight
+from airflock.limits.bounds import Look, look, needed, schedule, share
+from airflock.limits.limit import Limit
 
 BATCH = Batch("count", 0, 0)
 CHUNK = 2.0  # s of flights that are handed out together

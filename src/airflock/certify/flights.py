@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from airflock.certify.limits import OF_R_COLL, Limit
 from airflock.evolve.space import with_parameters
 from airflock.executors import Score
 from airflock.executors.cluster import Task
+from airflock.limits.limit import OF_R_COLL, Limit
 from airflock.scenarios.scenario import Scenario
 
 PARTS = 60  # of a flight that is flown again: when an event happened is known to a sixtieth of its duration

@@ -12,7 +12,6 @@ from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any
 
-from airflock.certify.bounds import Look, look, needed, schedule, share
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Count
 from airflock.certify.seeds import TOLERANCE, seed
@@ -21,6 +20,7 @@ from airflock.errors import ScenarioError
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight
+from airflock.limits.bounds import Look, look, needed, schedule, share
 from airflock.scenarios.scenario import Scenario
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from airflock.core.parameters import choices, number_names
+from airflock.core.vectors import names_of
 from airflock.errors import RuleError
 from airflock.rules.generate import Source
 
@@ -78,5 +79,6 @@ def single(value: Any) -> Any:
         return value._replace(**{name: single(getattr(value, name)) for name in value._fields})  # type: ignore[attr-defined]
     if hasattr(value, "__dataclass_fields__"):
         numbers = {name: Single(getattr(value, name) or 0.0) for name in number_names(value)}
-        return SimpleNamespace(**choices(value), **numbers)
+        whole = {key: tuple(numbers[part] for part in names_of(key, n)) for key, n in type(value).VECTORS.items()}
+        return SimpleNamespace(**choices(value), **numbers, **whole)
     return value

@@ -54,14 +54,14 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
-            "quiet": "watch", "trust": "trust",
+            "quiet": "watch", "trust": "trust", "limit": "limit",
             **dict.fromkeys(SEARCH, "search_keys"),
         },
     ),
     "harden": Counterpart(
         'airflock.harden("study/best.toml", range(100))', "harden",
         {
-            "scenario": "scenario", **SEEDS, "cost": "cost", "threads": "threads", **TABLE,
+            "scenario": "scenario", **SEEDS, "cost": "cost", "limit": "limit", "threads": "threads", **TABLE,
             "changes": LOADED["changes"],
             "trust": "airflock.load", "duration": "airflock.load", "out": "airflock.evolve.harden.document",
             **dict.fromkeys(("r_coll", "delay", "generations"), "airflock.evolve.again.evolved_again"),
@@ -160,7 +160,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
         {
             "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
-            "trust": "trust", **TABLE, "out": "airflock.infer.run.Inferred.document",
+            "trust": "trust", **TABLE, "out": "airflock.infer.found.Inferred.document",
             "plot": "airflock.plots.inferred.inferred",
         },
     ),

@@ -17,6 +17,17 @@ def evolve(
     generations: Annotated[int | None, typer.Option(help="Generations of a run.", show_default="150")] = None,
     seeds: Annotated[int | None, typer.Option(help="Flights of a candidate.", show_default="1")] = None,
     seed: Annotated[int | None, typer.Option(help="Decides all chance of the study.", show_default="0")] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            "-l",
+            metavar="LIMIT",
+            show_default=False,
+            help="What candidates are to keep before fitness counts, such as 'r_min<3 at 0.01/h', as in certify; "
+            "--seeds is then 2 by default. Repeatable.",
+        ),
+    ] = None,
     restarts: Annotated[int | None, typer.Option(help="Independent further runs.", show_default="0")] = None,
     flights: Annotated[
         str | None,
@@ -78,6 +89,7 @@ def evolve(
         scenario,
         options.settings(changes, agents, duration),
         search_keys={key: value for key, value in given.items() if value is not None},
+        limit=limit or (),
         trust=trust,
     )
     if sensitivity and sensitivity not in METHODS:
@@ -105,6 +117,8 @@ def _print(result: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from airflock.evolve.safe import told
+
     title = f"{result.scenario.name}: {result.fitness:.4f} ± {result.sd:.2g} on {result.seeds} fresh seeds"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column("parameter", style="bold")
@@ -120,6 +134,8 @@ def _print(result: Any) -> None:
         f"{result.above} of {result.candidates} candidates reach the mean; {result.failed} failed",
         highlight=False,
     )
+    for entry in result.limits:
+        console.print(told(entry), highlight=False, markup=False, soft_wrap=True)
     for name, (mean, low, high) in result.scenarios.items():
         console.print(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})", highlight=False, markup=False)
     if result.dead:

@@ -29,6 +29,16 @@ def harden(
     ] = None,
     generations: Annotated[int, typer.Option(min=1, help="Generations of that evolution.")] = 150,
     cost: Annotated[float, typer.Option(min=0.0, help="Fitness that the recipe may give up.")] = 0.05,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            "-l",
+            metavar="LIMIT",
+            show_default=False,
+            help="What no step may break, such as 'r_min<3 at 0.01/h', as in certify; repeatable.",
+        ),
+    ] = None,
     changes: options.Set = None,
     trust: options.Trust = False,
     duration: options.Duration = None,
@@ -37,8 +47,8 @@ def harden(
 ) -> None:
     """Make an optimum safer: steps of Table S4 stay if they gain, cost little, and break nothing that held.
 
-    Of a study of several scenarios a step must keep what held in each; further files end in _2 and so on. Exit status 1
-    where no step could be kept.
+    A step towards a limit that is not kept yet may cost more. Of a study of several scenarios a step must keep what
+    held in each; further files end in _2 and so on. Exit status 1 where no step could be kept.
 
     Example: airflock harden study --out flyable.toml
     """
@@ -59,6 +69,8 @@ def harden(
             faults.append(f"{name} {factor:g} lies outside [1, 100]")
     if again and len(found) > 1:
         faults.append(f"{scenario}: is a study of {len(found)} scenarios; --r-coll and --delay take one")
+    if again and limit:
+        faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
     options.refuse(faults)
     numbers = range(first_seed, first_seed + seeds)
     if again:
@@ -68,7 +80,7 @@ def harden(
         from airflock.evolve.harden import harden
 
         with options.progress(f"{scenario}: flights", 15 * seeds * len(found), quiet=as_json) as done:  # at most
-            steps = harden(found, numbers, cost=cost, threads=threads, done=done)
+            steps = harden(found, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(found, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:

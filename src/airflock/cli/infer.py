@@ -131,7 +131,7 @@ def _table(found: Any) -> None:
 def _numbers(found: Any) -> None:
     from rich.console import Console
 
-    from airflock.infer.run import interval
+    from airflock.infer.found import interval
 
     console = Console()
     for key, number in found.best.numbers.items():

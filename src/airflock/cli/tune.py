@@ -20,7 +20,11 @@ def tune(
     limit: Annotated[
         list[str] | None,
         typer.Option(
-            "--limit", "-l", metavar="LIMIT", help="As in certify; repeatable.", show_default="r_coll at 0.01/h"
+            "--limit",
+            "-l",
+            metavar="LIMIT",
+            help="As in certify; repeatable. Search, hardening and certificate hold to it.",
+            show_default="collisions and contacts with walls at 0.01/h each",
         ),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of the certificate.")] = 0.95,
@@ -112,6 +116,8 @@ def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
 def _print(made: Any) -> None:
     from rich.console import Console
 
+    from airflock.evolve.safe import told
+
     console = Console()
 
     def line(text: str) -> None:
@@ -121,6 +127,8 @@ def _print(made: Any) -> None:
         line(f"start: {note}")
     r = made.result
     line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")
+    for entry in r.limits:
+        line(f"evolved: {told(entry)}")
     line(f"hardened: {made.steps[-1].verdict}" if made.steps else f"not hardened: {made.why}")
     for text in made.certificate.statements:
         line(text)

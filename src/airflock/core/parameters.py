@@ -11,6 +11,7 @@ from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
+from airflock.core.vectors import MOST, Vector, Vectors
 from airflock.errors import ParameterError
 
 
@@ -66,15 +67,16 @@ Declaration = Quantity | Choice | Points | Text
 
 
 def quantity(
-    default: float | None, unit: str, *, low: float, high: float, meaning: str, source: str = "", whole: bool = False,
-    usual: tuple[float, float] | None = None,
+    default: float | tuple[float, ...] | None, unit: str, *, low: float, high: float, meaning: str, source: str = "",
+    whole: bool = False, usual: tuple[float, float] | None = None, size: int | None = None,
 ) -> Any:  # fmt: skip
-    """Declare a number of a record of parameters.
+    """Declare a number of a record of parameters, or several of one meaning.
 
     Parameters
     ----------
-    default : float or None
-        None makes it optional: it then comes from the rest of the scenario.
+    default : float, tuple of float or None
+        None makes it optional: it then comes from the rest of the scenario. Of a vector one number for all components,
+        or one for each.
     unit : str
         SI unit, "1" for a plain number.
     low, high : float
@@ -88,6 +90,10 @@ def quantity(
     usual : (float, float), optional
         The span in which it is usually set, inside the allowed range: the ends of its slider on a live page. Without
         it a slider takes the bounds of a study of the same law, or else reaches from 0 to 4 times the value.
+    size : int, optional
+        How many components a vector has. A rule reads it as a tuple, `p.weights[k]`; loops over it are unrolled. In a
+        scenario file it is a list, `model.weights = [0.2, 0.1]`, and `model.weights_0` is its first component, with a
+        slider and bounds of a search of its own.
 
     Returns
     -------
@@ -106,7 +112,21 @@ def quantity(
     >>> Gains(push=9.0)
     Traceback (most recent call last):
     airflock.errors.ParameterError: Gains.push = 9 1/s lies outside [0, 5] 1/s
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Weights(airflock.Parameters):
+    ...     w: tuple[float, ...] = airflock.quantity(0.5, "1", size=3, low=0.0, high=1.0, meaning="weights")
+    >>> Weights(w=(0.1, 0.2, 0.3)).w, Weights(w_1=0.9).w
+    ((0.1, 0.2, 0.3), (0.5, 0.9, 0.5))
     """
+    if size is not None:
+        parts = default if isinstance(default, tuple) else (default,) * size
+        if not 1 <= size <= MOST or len(parts) != size or None in parts:
+            raise ParameterError(f"size = {size}: give 1 to {MOST} components and a default for each ({meaning})")
+        words = [f"{meaning}, {k + 1} of {size}" for k in range(size)]
+        rest: dict[str, Any] = {"low": low, "high": high, "source": source, "whole": whole, "usual": usual}
+        return Vector(tuple(quantity(part, unit, meaning=of, **rest) for part, of in zip(parts, words, strict=True)))
+    if isinstance(default, tuple):
+        raise ParameterError(f"default = {default} of several numbers needs their size ({meaning})")
     if usual is not None and not low <= usual[0] < usual[1] <= high:
         raise ParameterError(f"usual = {usual} is no span inside [{low:g}, {high:g}] ({meaning})")
     record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole, usual)
@@ -179,7 +199,7 @@ def _declared(item: Field[Any]) -> Declaration:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters:
+class Parameters(metaclass=Vectors):
     """Base of every record of parameters: numbers become floats, and all faults are reported together.
 
     A record is a frozen dataclass whose fields are declared by `quantity` and `choice`. Raises ParameterError.

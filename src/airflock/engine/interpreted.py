@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from airflock import atomic
 from airflock.cache import cache_folder
 from airflock.core import random
+from airflock.core.vectors import as_properties, vectors_of
 from airflock.core.vocabulary import BOUND
 from airflock.engine.passes import driver as drivers
 from airflock.engine.passes.build import Builder
@@ -180,7 +181,9 @@ def _bound(build: Builder) -> dict[str, Any]:
     for name, fields in build.source.rows.items():
         record, _, law = name.partition("_")
         constants = build.plan.of(int(law or 0)).constants.get(record[: len(record) // 2].lower(), {})
-        choices = {key: value for key, value in constants.items() if key not in fields}
+        choices = {key: value for key, value in constants.items() if key not in fields} | as_properties(
+            vectors_of(fields)
+        )
         found[name] = type(name, (namedtuple(name, fields),), choices)  # type: ignore[misc]
     return found
 

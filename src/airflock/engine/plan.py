@@ -11,6 +11,7 @@ from airflock.core.fault import Fault
 from airflock.core.radio import Radio, forward
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
+from airflock.core.vectors import vectors_of
 from airflock.radios.registry import RADIOS
 from airflock.radios.registry import USUAL as USUAL_RADIO
 from airflock.sensors.registry import SENSORS, USUAL
@@ -321,6 +322,11 @@ class Plan:
         sensor: dict[str, str | float] = dict(self.sensor_choices)
         radio: dict[str, str | float] = dict(self.radio_choices)
         return {"p": dict(self.model_choices), "b": body, "s": sensor, "k": radio, "wing": wing, "aero": aero}
+
+    @property
+    def vectors(self) -> dict[str, dict[str, int]]:
+        """Of each record of numbers its vectors, with how many components each has."""
+        return {letter: vectors_of(names) for letter, names in self.numbers}
 
     @property
     def senses(self) -> bool:

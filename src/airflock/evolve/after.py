@@ -24,6 +24,7 @@ from airflock.evolve.folder import plain, write
 from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
 from airflock.evolve.race import race
+from airflock.evolve.safe import excess_of, kept, safe_first
 from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
@@ -33,6 +34,7 @@ from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 
 FINAL, SCORE = Batch("final", 0, 0), Batch("score", 0, 0)
+EXCESS = "excess"  # column: how far a candidate is from keeping all limits
 RESULT, BEST = "result.toml", "best.toml"
 
 
@@ -48,6 +50,7 @@ class Result:
     finalists  : one row each: origin, parameters, fitness on fresh seeds
     failed     : candidates of the search that failed
     scenarios  : of several: what each is called → mean, low and high of the winner's fitness in it
+    limits     : what the winner's fresh flights say of each limit: events, flights, estimated and allowed probability
     dead       : why nothing flies, in words; then no best.toml is written; empty if something flies
     """
 
@@ -68,6 +71,7 @@ class Result:
     finalists: pd.DataFrame
     dead: str = ""
     scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    limits: tuple[Mapping[str, Any], ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The result as plain values, for result.toml and --json."""
@@ -84,6 +88,7 @@ class Result:
             "origin": self.origin,
             **({"dead": self.dead} if self.dead else {}),
             "parameters": self.parameters,
+            **({"limits": [dict(entry) for entry in self.limits]} if self.limits else {}),
             **({"scenarios": [_told(name, *span) for name, span in self.scenarios.items()]} if self.scenarios else {}),
             "working_ranges": {
                 "candidates": self.candidates,
@@ -107,6 +112,8 @@ def conclude(
     names = [objective.name for objective in study.objectives]
     table = tables.candidates(store, names)
     whole = tables.whole_flights(table, study.search.flights == "growing")
+    if study.limits:
+        whole = whole.assign(**{EXCESS: _excess(study, store, whole)})
     sound = tables.best_first(whole, first.name, first.maximise)
     if not len(sound):
         reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
@@ -115,13 +122,15 @@ def conclude(
     n = study.whole("final_seeds")
     fresh = [study.seed(1, j) for j in range(n)]
     rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
-    i = _winner(study, rows)
+    i = _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
     winner = study.space.parameters(points[i])
     others = [[study.seed(2, j) for j in range(n)]]
     evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = interval(values)
+    if study.limits and (sound[EXCESS] == 0.0).any():
+        sound = sound[sound[EXCESS] == 0.0]
     good = sound[sound[first.name] >= mean] if first.maximise else sound[sound[first.name] <= mean]
     shown = pd.DataFrame(
         [
@@ -134,6 +143,7 @@ def conclude(
         float(sound[first.name].iloc[0]), origins[i],
         {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
         len(good), len(table), int(table[first.name].isna().sum()), shown, _dead(study, flown), each,
+        tuple(kept(study, [flown[0, r] for r in range(n * len(study.scenarios))])),
     )  # fmt: skip
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead:
@@ -202,6 +212,10 @@ def finalists(
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
     known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
     losses = known[names].to_numpy() * signs
+    if study.limits:
+        losses = safe_first(losses, known[EXCESS].to_numpy())
+        order = np.argsort(losses[:, 0], kind="stable")
+        known, losses = known.iloc[order], losses[order]
     if len(names) > 1:
         best = front(losses)
         best = best[np.argsort(losses[best, 0], kind="stable")]
@@ -223,13 +237,30 @@ def _points(store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
     return np.array([batches[run, generation][candidate] for run, generation, candidate in places])
 
 
-def _winner(study: Study, rows: Sequence[Sequence[float | None]]) -> int:
-    """Index of the best finalist; of several objectives, the one nearest to the best of each."""
+def _excess(study: Study, store: Store, table: pd.DataFrame) -> NDArray[np.float64]:
+    """How far each candidate of the search is from keeping all limits, in the order of the table."""
+    found: dict[tuple[int, int], NDArray[np.float64]] = {}
+    durations = table[tables.DURATION] if tables.DURATION in table else pd.Series(np.nan, table.index)
+    for run, generation, flown in zip(table["run"], table["generation"], durations, strict=True):
+        if (run, generation) not in found:
+            share = 1.0 if np.isnan(flown) else float(flown) / study.scenario.flight.duration
+            found[run, generation] = excess_of(study, store, Batch("search", int(run), int(generation)), share)
+    places = zip(table["run"], table["generation"], table["candidate"], strict=True)
+    return np.array([found[run, generation][candidate] for run, generation, candidate in places])
+
+
+def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArray[np.float64] | None = None) -> int:
+    """Index of the best finalist; of several objectives, the one nearest to the best of each.
+
+    excess : how far each is from keeping all limits; the one that is nearest wins, of equals the fittest
+    """
     signs = np.array([1.0 if objective.maximise else -1.0 for objective in study.objectives])
     table = np.array([[np.nan if v is None else v for v in row] for row in rows], float) * signs
     sound = np.isfinite(table).all(axis=1)
     if not sound.any():
         raise StudyError("every finalist failed on fresh seeds; the store says why in the column reason")
+    if excess is not None:
+        sound &= excess == excess[sound].min()
     if table.shape[1] == 1:
         return int(np.argmax(np.where(sound, table[:, 0], -np.inf)))
     best, worst = table[sound].max(axis=0), table[sound].min(axis=0)

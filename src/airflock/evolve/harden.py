@@ -10,6 +10,7 @@ So a step stays only if it gains, costs little, and keeps every constraint that 
 is undone. What is left is judged on fresh seeds.
 """
 
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -21,8 +22,13 @@ from airflock.errors import ScenarioError
 from airflock.evolve.after import interval
 from airflock.evolve.folder import plain
 from airflock.evolve.landscape import ZERO, why_zero
+from airflock.evolve.objective_table import read_limits
+from airflock.evolve.safe import allowed, excess
+from airflock.evolve.search_table import Search
 from airflock.evolve.space import declared
 from airflock.evolve.steps import RECIPE, ROOM, Measured, Step, Table, against, flown, moved, recipe
+from airflock.limits.chance import chance
+from airflock.limits.limit import Limit
 from airflock.scenarios import formats
 from airflock.scenarios.files import loaded
 from airflock.scenarios.scenario import Scenario
@@ -30,6 +36,7 @@ from airflock.scenarios.scenario import Scenario
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 COST = 0.05  # of fitness, at most
+RESERVE = Search().reserve  # how many times rarer than allowed an event is to look, as in a search
 
 
 def harden(
@@ -38,6 +45,7 @@ def harden(
     *,
     steps: Sequence[Step] = RECIPE,
     cost: float = COST,
+    limit: str | Sequence[str] = (),
     threads: int | None = None,
     done: Callable[[], None] | None = None,
 ) -> list[Measured]:
@@ -54,7 +62,10 @@ def harden(
         What is tried, one after another; earlier braking is added where agents touch walls or obstacles, and comes
         first where that is what is short.
     cost : float
-        Fitness that may be given up in all.
+        Fitness that may be given up in all; a step towards limits that are not kept yet may cost more.
+    limit : str or sequence of str
+        What may happen how rarely, as `airflock.certify` takes it. A step must not raise the estimated probability of
+        an event above its limit, with a reserve of ten.
     threads : int, optional
         Flights side by side; by default one per core.
     done : callable, optional
@@ -69,7 +80,8 @@ def harden(
     Raises
     ------
     ScenarioError
-        If the model has no such parameters, the flights have no fitness, or the optimum does not fly.
+        If the model has no such parameters, the flights have no fitness, the optimum does not fly, or a limit cannot
+        be read.
 
     Examples
     --------
@@ -81,7 +93,10 @@ def harden(
     """
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
-    trial = _Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, cost, threads, done)
+    held, faults = read_limits({"limits": limit}, scenarios)
+    if faults:
+        raise ScenarioError(faults)
+    trial = _Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, cost, held, threads, done)
     found = [trial.first]
     hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
@@ -108,10 +123,11 @@ class _Trial:
         optimum: tuple[Step, dict[str, float]],
         seeds: Sequence[int],
         cost: float,
+        limits: Sequence[Limit],
         threads: int | None,
         done: Callable[[], None] | None,
     ):
-        self.scenarios, self.cost, self.threads, self.done = scenarios, cost, threads, done
+        self.scenarios, self.cost, self.limits, self.threads, self.done = scenarios, cost, limits, threads, done
         self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
         self.kept, self.seen = [optimum], [optimum[1]]
@@ -139,7 +155,7 @@ class _Trial:
             self.seen.append(parameters)
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
-            gains = _gains(together(self.table), together(table))
+            gains = _gains(together(self.table), together(table)) or self._excess(table) < self._excess(self.table)
             verdict = broken or ("kept" if gains else "undone: gains neither distance nor room at walls")
             kept = verdict == "kept"
             named = replace(step, name=name)
@@ -174,10 +190,34 @@ class _Trial:
     def _broken(self, before: Sequence[Table], after: Sequence[Table]) -> str:
         """What a step breaks in one of the scenarios or costs too much, in words; empty if nothing."""
         for scenario, was, now in zip(self.scenarios, before, after, strict=True):
-            if found := _broken(was, now):
+            if found := _broken(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(self.scenarios) > 1 else found
+        if self._excess(after) < self._excess(before):
+            return ""
         price = float((together(before)["fitness"] - together(after)["fitness"]).mean())
         return f"undone: costs {price:.3g} of fitness, more than {self.cost:g}" if price > self.cost else ""
+
+    def _limit_broken(self, scenario: Scenario, before: Table, after: Table) -> str:
+        """Which limit a step breaks that was kept, or breaks more than before, in words; empty if none."""
+        for limit in self.limits:
+            most = allowed(limit, scenario)
+            was, now = (chance(limit, _rows(table)) for table in (before, after))
+            if now > max(was, most / RESERVE):
+                return f"undone: {limit.event} in about {now:.2g} of flights, before {was:.2g}; allowed are {most:.2g}"
+        return ""
+
+    def _excess(self, tables: Sequence[Table]) -> float:
+        """How far flights are from keeping all limits in all scenarios; 0: they keep them."""
+        return math.fsum(
+            float(excess(self.limits, scenario, [_rows(table)], RESERVE)[0])
+            for scenario, table in zip(self.scenarios, tables, strict=True)
+        )
+
+
+def _rows(table: Table) -> list[dict[str, float]]:
+    """Scores of each flight, from a table of them."""
+    names = list(table)
+    return [dict(zip(names, row, strict=True)) for row in np.array([table[name] for name in names]).T.tolist()]
 
 
 def together(tables: Sequence[Table]) -> Table:

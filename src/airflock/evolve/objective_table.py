@@ -1,7 +1,7 @@
 """The table [objective] of a study file: what is better, and the user's own fitness functions."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -9,10 +9,11 @@ from typing import Any
 from airflock.doors import is_file
 from airflock.errors import RuleError, ScenarioError
 from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
+from airflock.limits.limit import Limit, read_all
 from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario
 
-KEYS = ("maximise", "minimise", "over_seeds", "quantile", "own", "source", "note")
+KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
 
 
 def read_objectives(
@@ -60,6 +61,28 @@ def read_objectives(
         others = f" (it holds {', '.join(names)})" if len(names) > 1 else ""
         faults.append(f"objective.own = {table['own']!r}: no objective names a function of this file; {write}{others}")
     return tuple(found), faults
+
+
+def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[Limit, ...], list[str]]:
+    """Limits that candidates are to keep in all scenarios, from the key `limits` of a table; and all faults in it."""
+    texts = table.get("limits", []) if isinstance(table, Mapping) else []
+    texts = [texts] if isinstance(texts, str) else texts
+    if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
+        return (), [f"objective.limits = {texts!r} is neither a limit nor a list of limits, as 'r_min<3 at 0.01/h'"]
+    found: tuple[Limit, ...] = ()
+    faults: list[str] = []
+    for scenario in scenarios if texts else ():
+        try:
+            found = found or read_all(list(texts), scenario)
+            read_all(list(texts), scenario)
+        except ScenarioError as fault:
+            faults += [f"objective.limits: {line}" for line in fault.faults]
+    faults += [
+        f"objective.limits: limit '{limit.text}': says not how rarely; write {limit.event} at 0.01/h, for instance"
+        for limit in found
+        if limit.rate is None
+    ]
+    return found, list(dict.fromkeys(faults))
 
 
 def _own(name: Any, folder: Path | None, trust: bool) -> tuple[dict[str, Own], str, list[str]]:

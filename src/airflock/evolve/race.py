@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from airflock.evolve.fitness import losses as losses_of
+from airflock.evolve.safe import excess_of, safe_first
 from airflock.evolve.search import evaluate
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
@@ -40,7 +42,8 @@ def race(
 ) -> NDArray[np.int64]:
     """Indices of the candidates that win, the best first, at most `search.top`.
 
-    points : (candidate, axis) of all candidates that did not fail; losses : (candidate,), less is better
+    points : (candidate, axis) of all candidates that did not fail
+    losses : (candidate,), less is better; who broke limits comes after all others
     """
     pool, top = study.whole("pool"), study.whole("top")
     alive = np.argsort(smoothed(points, losses), kind="stable")[:pool]
@@ -49,8 +52,9 @@ def race(
         alive = alive[: max(top, round(share * pool))]
         numbers = [[study.seed(4, number + j) for j in range(seeds)]] * len(alive)
         number += seeds
-        rows = evaluate(study, store, executor, Batch("race", 0, k), points[alive], note, seeds=numbers)
-        sign = -1.0 if study.objectives[0].maximise else 1.0
-        found = np.array([np.inf if row[0] is None else sign * row[0] for row in rows])
-        alive = alive[np.argsort(found, kind="stable")]
+        batch = Batch("race", 0, k)
+        found = losses_of(evaluate(study, store, executor, batch, points[alive], note, seeds=numbers), study.objectives)
+        if study.limits:
+            found = safe_first(found, excess_of(study, store, batch))
+        alive = alive[np.argsort(found[:, 0], kind="stable")]
     return alive[:top]

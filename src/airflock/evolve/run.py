@@ -18,7 +18,7 @@ from airflock.evolve.sensitivity import METHODS
 from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
-from airflock.evolve.study import Study, load_study, make_study
+from airflock.evolve.study import Study, load_study, make_study, with_limits
 from airflock.executors import Executor, Score
 from airflock.executors.cluster import Cluster, fly_on_their_cpu
 from airflock.executors.here import Here
@@ -39,6 +39,7 @@ def evolve(
     space: Mapping[str, Any] | None = None,
     objective: Mapping[str, Any] | None = None,
     fitness: Own | None = None,
+    limit: str | Sequence[str] = (),
     over_scenarios: str | None = None,
     scheduler: str | None = None,
     threads: int | None = None,
@@ -68,6 +69,10 @@ def evolve(
         {"maximise": ..., "minimise": ..., "over_seeds": ..., "quantile": ...}, names of order parameters.
     fitness : callable, optional
         Instead of it, a function of your own: order parameters of one flight → number, more is better.
+    limit : str or sequence of str
+        What may happen how rarely, such as "r_min<3 at 0.01/h", as `airflock.certify` takes it. Candidates that look as
+        if they kept all limits, with a reserve of ten (`reserve`), come before all others, whatever their fitness; each
+        flies twice unless `seeds` says otherwise.
     over_scenarios : str, optional
         "mean" or "worst": what counts of the fitness in several scenarios; by default the mean.
     scheduler : str, optional
@@ -112,7 +117,7 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    study = study_of(what, settings, space, objective, fitness, search_keys, over_scenarios, trust=trust)
+    study = study_of(what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust)
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
@@ -131,6 +136,7 @@ def study_of(
     fitness: Own | None = None,
     search_keys: Mapping[str, Any] | None = None,
     over_scenarios: str | None = None,
+    limit: str | Sequence[str] = (),
     *,
     trust: bool = False,
 ) -> Study:
@@ -153,7 +159,8 @@ def study_of(
         text = _text_of(code) if code is not None else ""
         name = getattr(fitness, "__name__", "fitness")
         study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
-    return study
+    limits = [limit] if isinstance(limit, str) else list(limit)
+    return with_limits(study, limits, seeds="seeds" in (search_keys or {})) if limits else study
 
 
 def _text_of(code: Any) -> str:

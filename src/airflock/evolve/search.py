@@ -17,6 +17,7 @@ from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
 from airflock.evolve.racing import still_needed
+from airflock.evolve.safe import excess_of, safe_first
 from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
@@ -33,7 +34,8 @@ class Progress:
     """How far a search is, after each flight and each generation.
 
     done, total : flights, those of the store included; fresh : flights of this process
-    best, mean  : first objective of the best candidate so far and of the last generation; None before there are any
+    best, mean  : first objective of the best candidate so far and of the last generation, of those that keep all
+                  limits; None before there are any
     """
 
     run: int
@@ -117,11 +119,15 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
         racing = study.search.racing == "optimistic"
         rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share, racing=racing)
         tally.total -= len(points) * study.whole("seeds") * len(study.scenarios) - (tally.done - begun)
-        state.tell(points, losses(rows, study.objectives))
-        values = [row[0] for row in rows]
+        values, told = [row[0] for row in rows], losses(rows, study.objectives)
+        sound = values
+        if study.limits:
+            broken = excess_of(study, store, batch, length.share)
+            told, sound = safe_first(told, broken), [v for v, much in zip(values, broken, strict=True) if much == 0.0]
+        state.tell(points, told)
         centre = state.centre()
         if length.whole:
-            tally.generation_over(values, first.maximise)
+            tally.generation_over(sound, first.maximise)
             seen += values
             if run == 0:
                 refuse_flat(study, store, whole, seen)

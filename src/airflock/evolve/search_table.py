@@ -80,6 +80,14 @@ class Search(Record):
         source="our choice; docs/decisions/0072",
         meaning="further finalists: means of CMA-ES averaged over its last half, quarter, eighth, ... of generations",
     )
+    reserve: float = quantity(
+        10.0,
+        "1",
+        low=1.0,
+        high=1e6,
+        source="our choice; docs/decisions/0097",
+        meaning="with limits: how many times rarer than allowed an event is to look",
+    )
     seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
     precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
     top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
@@ -92,9 +100,9 @@ class Search(Record):
 
 
 def search_faults(
-    search: Search, objectives: Sequence[Objective], space: Space | None, over_scenarios: str
+    search: Search, objectives: Sequence[Objective], space: Space | None, over_scenarios: str, *, limits: bool = False
 ) -> list[str]:
-    """What of a search cannot be, one line each; `space` as far as it could be read."""
+    """What of a search cannot be, one line each; `space` as far as it could be read; limits: whether it has some."""
     faults = [
         f"search.{name} = {value:g} is not a whole number"
         for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds", "averages")
@@ -111,6 +119,8 @@ def search_faults(
             f"give one, or search.algorithm = 'nsga2'"
         )
     faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
+    if limits and search.racing != "none":
+        faults.append("search.racing compares fitness and knows no limits; leave out objective.limits or search.racing")
     if search.flights == "growing":
         if search.generations < FEWEST:
             faults.append(

@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -13,11 +13,12 @@ from airflock import __version__
 from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.fitness import Objective
-from airflock.evolve.objective_table import read_objectives
+from airflock.evolve.objective_table import read_limits, read_objectives
 from airflock.evolve.search_table import SEED_BITS, Search, search_faults
 from airflock.evolve.several import common_space, distinct, faults_together, read_scenarios
 from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
+from airflock.limits.limit import Limit
 from airflock.scenarios import formats, schema
 from airflock.scenarios.files import presets, tells_of_study
 from airflock.scenarios.scenario import Scenario
@@ -32,6 +33,7 @@ class Study:
 
     others : further scenarios in which each candidate flies; over_scenarios: mean or worst of them all
     labels : what to call each scenario, the first included
+    limits : what may happen how rarely; who keeps them comes before all who do not
     """
 
     scenario: Scenario
@@ -44,6 +46,7 @@ class Study:
     others: tuple[Scenario, ...] = ()
     over_scenarios: str = "mean"
     labels: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -75,6 +78,7 @@ class Study:
             "search": {
                 name: int(value) if isinstance(value, float) and value.is_integer() else value
                 for name, value in ((n, getattr(q, n)) for n in q.__dataclass_fields__)
+                if name != "reserve" or self.limits
             },
             "objective": [
                 {
@@ -86,6 +90,7 @@ class Study:
                 }
                 for o in self.objectives
             ],
+            **({"limits": [limit.text for limit in self.limits]} if self.limits else {}),
             "space": self.space.document(),
             "scenario": _unpublished(self.scenario),
             **self._several(),
@@ -197,7 +202,8 @@ def make_study(
     over = document.get("over_scenarios", "mean")
     faults += faults_together(scenarios, labels, space, over)
     objectives, more = read_objectives(document.get("objective", {}), scenarios[0], folder, trust=trust)
-    faults += more
+    limits, of_limits = read_limits(document.get("objective", {}), scenarios)
+    faults += more + of_limits
     table = document.get("search", {})
     if isinstance(table, Mapping):
         found, more = schema.check("search", {**table, **(search or {})}, Search)
@@ -205,13 +211,26 @@ def make_study(
         found, more = schema.check("search", table, Search)
     faults += more
     if found is not None:
-        faults += search_faults(found, objectives, space, str(over))
+        faults += search_faults(found, objectives, space, str(over), limits=bool(limits))
     if faults or space is None or found is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     return Study(
         scenarios[0], space, objectives, found, str(document.get("title", "")), notes=tuple(notes),
-        others=scenarios[1:], over_scenarios=str(over), labels=labels,
+        others=scenarios[1:], over_scenarios=str(over), labels=labels, limits=limits,
     )  # fmt: skip
+
+
+def with_limits(study: Study, limits: Sequence[str], *, seeds: bool = False) -> Study:
+    """The study with limits in place of its own; two flights of a candidate instead of one, unless `seeds` are given.
+
+    Raises ScenarioError, all faults together.
+    """
+    found, faults = read_limits({"limits": list(limits)}, study.scenarios)
+    search = study.search if seeds or study.search.seeds > 1 else replace(study.search, seeds=2.0)
+    faults += search_faults(search, study.objectives, study.space, study.over_scenarios, limits=True)
+    if faults:
+        raise ScenarioError([f"{study.scenario.name}: {fault}" for fault in faults])
+    return replace(study, limits=found, search=search)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any], at: str = "") -> list[str]:

@@ -58,7 +58,7 @@ def _kernel() -> Any:
     """Negative log-likelihood per block, compiled."""
     from numba import njit
 
-    decay_rate, gap_left = njit(held.decay_rate), njit(held.gap_left)
+    decay_rate, wander, gap_left = njit(held.decay_rate), njit(held.wander), njit(held.gap_left)
 
     @njit
     def kernel(time, m, c, new, block, out, tau, a_max, noise, white, dt):  # type: ignore[no-untyped-def]
@@ -66,7 +66,7 @@ def _kernel() -> Any:
         axes = m.shape[1]
         v, e = np.zeros(3), np.zeros(3)
         variance, r2 = 0.0, white * white
-        rate = decay_rate(tau, dt)
+        rate, still = decay_rate(tau, dt), noise * wander(tau, dt)
         for k in range(len(time)):
             if new[k]:
                 for i in range(axes):
@@ -82,7 +82,7 @@ def _kernel() -> Any:
             left, limited = gap_left(size, h, tau, rate, a_max)
             keep = np.exp(-2.0 * rate * (h - limited))
             # across the gap a limited motion keeps errors as they are; along it both ends move alike
-            variance = keep * variance + 2.0 * noise * limited * keep + noise / rate * (1.0 - keep)
+            variance = keep * variance + 2.0 * noise * limited * keep + still * (1.0 - keep)
             total, loss = variance + r2, 0.0
             gain = variance / total
             for i in range(axes):

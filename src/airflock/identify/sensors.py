@@ -4,6 +4,7 @@
 error u. The place where a drone stands is unknown and is a third state; logged velocities may have white noise.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -16,7 +17,9 @@ from airflock.identify.logs import Logs
 
 NAMES = ("noise", "damping", "scale", "white")
 LEAST = 30.0  # s of standing
-START = (0.01, 0.1, 3.0, 0.02)
+ANYWHERE = 1e4  # m²; variance of where a drone stands: must not depend on what is sought, or it is sought too small
+START = (0.1, 3.0)  # damping, 1/s, and scale, m s^(1/2), to begin with
+RESTARTS = 2  # a simplex that has shrunk on a slope is spread again
 
 
 @dataclass
@@ -49,7 +52,7 @@ def _kernel() -> Any:
         for k in range(len(q)):
             if new[k]:
                 x0, x1, x2 = 0.0, 0.0, q[k]
-                p00, p01, p02, p11, p12, p22 = still, 0.0, 0.0, noise, 0.0, 100.0 * still + 1.0
+                p00, p01, p02, p11, p12, p22 = still, 0.0, 0.0, noise, 0.0, ANYWHERE
             else:
                 x0, x1 = a00 * x0 + a01 * x1, a10 * x0 + a11 * x1
                 b00, b01 = a00 * p00 + a01 * p01, a00 * p01 + a01 * p11
@@ -104,9 +107,10 @@ def fit_sensors(logs: Logs, period: float) -> SensorFit:
             return 1e15
         return float(kernel(q, u, new, period, *np.exp(z), max(min(grain, 0.05), 1e-4)))
 
-    guess = (max(float(u.var()), 1e-5), *START[1:])
-    best = minimize(loss, np.log(guess), method="Nelder-Mead", options={"maxiter": 800, "xatol": 1e-3, "fatol": 1e-2})
-    z = best.x
+    half = max(0.5 * float(u.var()), 1e-5)  # of the velocity's variance: wandering, the rest white
+    z = np.log((half, *START, math.sqrt(half)))
+    for _ in range(1 + RESTARTS):
+        z = minimize(loss, z, method="Nelder-Mead", options={"maxiter": 800, "xatol": 1e-3, "fatol": 1e-2}).x
     spread = _curvature(loss, z)
     value = dict(zip(NAMES, (float(v) for v in np.exp(z)), strict=True))
     interval = {

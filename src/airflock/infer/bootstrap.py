@@ -3,7 +3,8 @@
 Places are seen with noise, and the slope of a law against a noisy percept is too flat; a threshold is blurred. So the
 law is flown from the same beginnings with the noise that was found, is seen with the same gaps and the same noise of
 the tracks, and is fitted again. Where that fit misses the law that flew, the fit to the tracks is put right by as much
-(indirect inference, Gouriéroux, Monfort & Renault 1993); the scatter of such fits gives the intervals.
+(indirect inference, Gouriéroux, Monfort & Renault 1993). The scatter of such fits gives the intervals, which are no
+narrower than the curvature of the likelihood says: a fit that is repeated from beside its end does not walk a ridge.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,14 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import climb
+from airflock.infer.fit import Fit, climb, settle, spread
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, ENTERS, Tracks, restated
 from airflock.infer.walk import Walk
 
 Array = NDArray[np.float64]
 ROUNDS = (3, 10)  # flights of each round; the last gives the intervals
-STEPS = 3  # of a climb
+STEPS = 6  # of a climb
 FREE = 1e-9  # m²: least variance
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
 # fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
@@ -173,15 +174,15 @@ class Flights:
 LADDER = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of the logarithm of noise
 
 
-def again(
-    model: Model, fitted: Array, free: list[int], spans: Sequence[int], say: Callable[[], None] = lambda: None
-) -> Again:
+def again(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] = lambda: None) -> Again:
     """Put a fit right by flights of its own law, and tell how sure it is.
 
-    fitted, free, spans : place of the fit, what was free in it, and on which spans it was
+    spans : on which it was fitted
     """
+    fitted, free = fit.place, fit.free
     flights = Flights(model, fitted, spans)
     noise = _first_noise(model, fitted, spans)
+    curved = spread(model, fit, spans)
     place, number, refits = fitted.copy(), 1, np.zeros((0, len(fitted)))
     noises: list[Array] = []
     named = [k for k in free if k < model.named]
@@ -192,7 +193,7 @@ def again(
         for _ in range(count):
             number += 1
             twin = flights.model_of(flights.tracks(place, noise, number))
-            refit = climb(twin, fitted, free, list(spans), STEPS).place
+            refit = settle(twin, climb(twin, fitted, free, list(spans), STEPS, rough=True), list(spans)).place
             found.append(refit)
             noises.append(back @ (statistics(twin, refit, flights.spans) - flights.wanted))
             say()
@@ -203,14 +204,15 @@ def again(
     count = len(refits)
     wide = float(student.ppf(0.975, count - 1)) * np.sqrt(1.0 + 1.0 / count)
     # half of what was put right is doubt about the noise, which is simpler in flights than in animals
-    spread = np.hypot(wide * refits.std(axis=0, ddof=1), DOUBT * (place - fitted))
+    scatter = np.maximum(wide * refits.std(axis=0, ddof=1), 1.96 * curved)
+    ends = np.hypot(scatter, DOUBT * (place - fitted))
     slopes = [n.slope(float(x)) / max(n.value(float(x)), 1e-9) for n, x in zip(model.numbers, place, strict=True)]
-    spread = np.hypot(spread, 1.96 * BEYOND[0] / np.maximum(slopes, 1e-9))
+    ends = np.hypot(ends, 1.96 * BEYOND[0] / np.maximum(slopes, 1e-9))
     law = np.array([steps[0] for steps in noises])
     half = 1.96 * float(np.hypot(wide / 1.96 * law.std(ddof=1), BEYOND[1]))
     middle = -float(np.median(law))
     return Again(
-        place, place - spread, place + spread, noise.moved(np.array([middle, 0.0, 0.0])),
+        place, place - ends, place + ends, noise.moved(np.array([middle, 0.0, 0.0])),
         noise.law * float(np.exp(middle - half)), noise.law * float(np.exp(middle + half)),
     )  # fmt: skip
 

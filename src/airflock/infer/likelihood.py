@@ -5,6 +5,7 @@ Differences along and across the heading are normal, their two variances are tho
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,8 +79,7 @@ class Model:
 
     def fixed(self, numbers: Sequence[int]) -> "Model":
         """The same model in which some numbers stay at their defaults, whatever the place says."""
-        twin = object.__new__(Model)
-        twin.__dict__.update(self.__dict__)
+        twin = copy(self)
         twin.held = frozenset({*self.held, *numbers})
         return twin
 

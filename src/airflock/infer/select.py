@@ -7,16 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import Fit, climb, drawn, hop, scan, search, simplify, telling
+from airflock.infer.fit import CLIMBS, Fit, climb, settle
 from airflock.infer.likelihood import Model
+from airflock.infer.search import drawn, profile, race, scan
+from airflock.infer.told import simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]
 FOLDS = 4  # parts of the tracks that are held out in turn
 ENOUGH = 24_000  # individual steps, and
 FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
-SEARCHES, DEEP = 1, 2  # searches by CMA-ES for any law, and once more for the best
-HOPS, FEW_HOPS = 6, 4  # climbs beside the best law's fit, and beside any
+LONG = 20  # steps of a climb to the end
 AGAIN = 3  # steps of a climb without the part that is held out
 WITHIN = 1.959964  # standard deviations that hold 95 %
 
@@ -54,30 +55,27 @@ def fit(
     model = Model(law, tracks, scale)
     begin = drawn(model, _begin(model, gains), model.few(), seed)
     kept = telling(model, _begin(model, gains), begin, model.few())
-    model = Model(replace(law, numbers=tuple(law.numbers[k] for k in kept)), tracks, scale)
     say()
-    found = polish(model, search(model, _begin(model, gains), begin[:, kept], model.few(), seed, say, SEARCHES))
+    model = Model(replace(law, numbers=tuple(law.numbers[k] for k in kept)), tracks, scale)
+    found = race(model, _begin(model, gains), begin[:, kept], free(model), model.few(), say)
+    found = polish(model, found.place)
     say()
     return model, found
 
 
-def simpler(model: Model, found: Fit, scale: Scale, seed: int, say: Callable[[], None]) -> tuple[Model, Fit]:
-    """The fit after more searching beside it, without numbers that the others make up for."""
-    if DEEP:
-        begin = drawn(model, found.place, model.few(), seed + 1)
-        other = polish(model, search(model, found.place, begin, model.few(), seed + 1, say, DEEP))
-        found = min(found, other, key=lambda each: each.loss)
-    found = hop(model, found, sample(model), HOPS, seed, say)
-    found = climb(model, found.place, found.free, sample(model))
-    gone = simplify(model, found, say)
+def simpler(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit after a search along each number, without numbers that the others make up for."""
+    other = profile(model, climb(model, found.place, found.free, model.few(), rough=True), model.few(), say)
+    other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
+    found = min(found, other, key=lambda each: each.loss)
+    gone, place = simplify(model, found, say)
     if not gone:
         return model, found
     rest = [k for k in range(len(model.numbers)) if k not in gone]
     assert model.law is not None
     numbers = tuple(n for k, n in enumerate(model.law.numbers) if k not in gone)
-    without = Model(replace(model.law, numbers=numbers), model.tracks, scale)
-    place, _ = scan(without, found.place[rest], free(without), without.few())
-    less = polish(without, place)
+    without = Model(replace(model.law, numbers=numbers), model.tracks, scale=model.scale)
+    less = settle(without, polish(without, place[rest], LONG), sample(without))
     return (without, less) if less.loss < found.loss + 2.0 * len(gone) else (model, found)
 
 
@@ -86,9 +84,8 @@ def free(model: Model) -> list[int]:
     return list(range(len(model.numbers) - (0 if model.own_speed else 1)))
 
 
-def polish(model: Model, place: Array) -> Fit:
+def polish(model: Model, place: Array, steps: int = CLIMBS) -> Fit:
     """Climb on a few spans and on the sample, looking along each number's range in between."""
-    spans = sample(model)
     few = model.few()
     rough = climb(model, place, free(model), few, rough=True)
     for _ in range(3):
@@ -96,8 +93,7 @@ def polish(model: Model, place: Array) -> Fit:
         if not better:
             break
         rough = climb(model, place, free(model), few, rough=True)
-    rough = hop(model, rough, few, FEW_HOPS, 0, lambda: None)
-    return climb(model, rough.place, free(model), spans)
+    return climb(model, rough.place, free(model), sample(model), steps)
 
 
 def _begin(model: Model, gains: Array) -> Array:

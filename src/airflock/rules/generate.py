@@ -19,11 +19,13 @@ from airflock.core import random as random_streams
 from airflock.errors import RuleError
 from airflock.rules import law
 from airflock.rules.integers import tree_of
+from airflock.rules.unrolled import Unrolled
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
 GIVEN = law.ALLOWED_CALLS | {law.TAKEN, *law.RESERVED.values()}  # what every driver has
 NOTHING: Mapping[str, str] = {}
+NONE: Mapping[str, Mapping[str, int]] = {}
 INLINED = '@njit(inline="always", **JIT)'
 
 
@@ -32,15 +34,22 @@ class Source:
 
     decorator : line put above each function
     constants : for each record name (p, b, q, ...) its choices and usual numbers, inlined as constants
+    vectors   : for each record name its vectors, with how many components each has
     rows      : fields of each record that is made of a row of numbers, by its name
     lenient   : whether rules may call what only plain Python has, such as breakpoint() and print()
     """
 
     lenient = False
 
-    def __init__(self, decorator: str, constants: Mapping[str, Mapping[str, str | float]]):
+    def __init__(
+        self,
+        decorator: str,
+        constants: Mapping[str, Mapping[str, str | float]],
+        vectors: Mapping[str, Mapping[str, int]] = NONE,
+    ):
         self.decorator = decorator
         self.constants = constants
+        self.vectors = vectors
         self.law = 0
         self.blocks: list[str] = []
         self.rows: dict[str, tuple[str, ...]] = {}
@@ -48,10 +57,12 @@ class Source:
         self._originals: dict[str, Any] = {}
         self._apart = False
 
-    def of(self, law: int, constants: Mapping[str, Mapping[str, str | float]]) -> "Source":
+    def of(
+        self, law: int, constants: Mapping[str, Mapping[str, str | float]], vectors: Mapping[str, Mapping[str, int]]
+    ) -> "Source":
         """The same text, for rules of another law of the flock: what they read of its records is its own."""
         other = copy(self)
-        other.constants, other.law = constants, law
+        other.constants, other.vectors, other.law = constants, vectors, law
         return other
 
     def name(self, item: Any, chosen: Mapping[str, str] = NOTHING) -> str:
@@ -138,7 +149,7 @@ def _depth(node: ast.AST) -> int:
     return inner + isinstance(node, (ast.For, ast.While))
 
 
-class _Rewrite(ast.NodeTransformer):
+class _Rewrite(Unrolled):
     """Bind the free names of one rule and cast its literals; arguments that are chosen become constants."""
 
     def __init__(self, rule: Callable[..., Any], source: Source, chosen: Mapping[str, str]):
@@ -146,6 +157,7 @@ class _Rewrite(ast.NodeTransformer):
         self.source = source
         self.chosen = chosen
         self.local = set(rule.__code__.co_varnames) - set(chosen)
+        super().__init__(rule, source.vectors)
 
     def _real(self, node: ast.expr) -> ast.expr:
         return ast.Call(ast.Name("real", ast.Load()), [node], [])
@@ -161,6 +173,8 @@ class _Rewrite(ast.NodeTransformer):
             if node.attr in chosen:
                 value = chosen[node.attr]
                 return ast.Constant(value) if isinstance(value, str) else self._real(ast.Constant(value))
+            if self.size(node):
+                return ast.Tuple([self.visit(part) for part in self.components(node)], ast.Load())
         self.generic_visit(node)
         return node
 
@@ -193,6 +207,8 @@ class _Rewrite(ast.NodeTransformer):
         return node
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
+        if self.counts(node):
+            return ast.Constant(self.size(node.args[0]))
         self._hand_on(node)
         self.generic_visit(node)
         method = node.func
@@ -235,6 +251,8 @@ class _Rewrite(ast.NodeTransformer):
         return value if isinstance(value, str) else None
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        if (part := self.component(node)) is not None:
+            return self.visit(part)  # type: ignore[no-any-return]
         self.generic_visit(node)
         inner = node.value
         if isinstance(inner, ast.Subscript) and isinstance(inner.value, (ast.Name, ast.Attribute)):  # a[i][j] → a[i, j]

@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
+from airflock.core.vectors import overruled
 from airflock.doors import is_file
 from airflock.errors import ScenarioError
 
@@ -58,7 +59,7 @@ def _section(key: str, base: Any, own: Any) -> Any:
     if key == "topology":  # ours share their numbers; a file has its own
         other = kinds[0] != kinds[1] and any(isinstance(kind, str) and kind.endswith(".py") for kind in kinds)
     kept = {name: base[name] for name in SHARED.get(key, ()) if name in base} if other else base
-    return {**kept, **own}
+    return {**overruled(kept, own), **own}
 
 
 def _plain(value: Any) -> Any:

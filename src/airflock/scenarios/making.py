@@ -13,6 +13,7 @@ from airflock.core.parameters import declarations, number_names
 from airflock.core.radio import Packets, Radio
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
+from airflock.core.vectors import expanded, overruled
 from airflock.doors import is_file
 from airflock.errors import AirflockError, ParameterError, ScenarioError
 from airflock.radios.registry import RADIOS
@@ -119,7 +120,9 @@ def make(
     records = ({"model": found.Parameters} if found else {}) | own
     named, told, more = short_keys.whole_keys(short, records, TOP)
     faults += more + [f"{key} is given twice, once by its last word" for key in named if key in (settings or {})]
-    merged, converted, more = units.converted(_merged(merged, named)[0], {"": Flight, **records})
+    merged, more = _components(_merged(merged, named)[0], records)
+    faults += more
+    merged, converted, more = units.converted(merged, {"": Flight, **records})
     faults += more
     parts, more = _parts(merged, merged.get("model", {}), found, own)
     faults += more + _faults_between(parts, found, sensor, transceiver, measures, own_topology)
@@ -220,7 +223,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
         if name and not isinstance(merged.setdefault(section, {}), dict):
             faults.append(f"{key}: unknown key")
         elif name:
-            merged[section][name] = value
+            merged[section] = {**overruled(merged[section], {name: value}), name: value}
         else:
             merged[section] = value
     for key in merged:
@@ -237,6 +240,16 @@ def _understood(merged: dict[str, Any], section: str, record: type) -> dict[str,
     if not isinstance(given, Mapping):
         return merged
     return {**merged, section: {key: value for key, value in given.items() if key in known}}
+
+
+def _components(merged: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
+    """A document in which each vector is its components, and what is wrong with those that are given whole."""
+    faults: list[str] = []
+    for section, record in records.items():
+        if isinstance(given := merged.get(section), Mapping) and getattr(record, "VECTORS", None):
+            merged[section], more = expanded(section, given, record)
+            faults += more
+    return merged, faults
 
 
 def _model_table(merged: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:

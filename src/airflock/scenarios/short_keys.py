@@ -21,6 +21,8 @@ def places(records: Mapping[str, type]) -> dict[str, list[str]]:
                 derived = section == "metrics" and isinstance(declared, Quantity) and declared.optional
                 if not (derived and name in found):
                     found.setdefault(name, []).append(f"{section}.{name}")
+        for name in getattr(record, "VECTORS", {}):
+            found.setdefault(name, []).append(f"{section}.{name}")
     return found
 
 
@@ -53,5 +55,5 @@ def whole_keys(
 def _meaning(key: str, records: Mapping[str, type]) -> str:
     """What a whole key means, up to the first comma or semicolon."""
     section, _, last = key.partition(".")
-    declared = next(found for name, found, _ in declarations(records[section]) if name == last)
+    declared = next(found for name, found, _ in declarations(records[section]) if name in (last, f"{last}_0"))
     return re.split(r"[;,(]", declared.meaning)[0].strip()

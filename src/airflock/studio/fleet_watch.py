@@ -72,9 +72,9 @@ def watch_fleet(
         from airflock.studio.fleet_page import FleetPage
         from airflock.studio.view import View
 
+        observer = Observer(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
         view = View(host, port, found.name)
         try:
-            observer = Observer(found, secret, now=time.monotonic(), utc=time.time_ns() // 1000)
             page = FleetPage(observer, view, heard)
             say(f"listening at {', '.join(radios or RADIOS)}; watch at {view.address}  (Ctrl-C ends)")
             page.run()

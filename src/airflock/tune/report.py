@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from airflock import __version__, atomic
 from airflock.core.parameters import with_unit
 from airflock.evolve import tables
+from airflock.evolve.safe import told
 from airflock.evolve.space import declared
 from airflock.evolve.store import Store
 from airflock.identify.run import UNITS
@@ -102,6 +103,7 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str], shows
         "<h2>What was found</h2>",
         f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
         f"{r.candidates:,} candidates.</p>",
+        _list([told(entry) for entry in r.limits]),
         _table(("number", "start", "tuned", "working range of the search"), numbers),
         "<h2>What hardening cost and gained</h2>",
         _table(("step", "fitness", "cost", "r_min", "gain", "verdict"), steps)

@@ -24,15 +24,17 @@ from airflock.evolve.harden import document as hardened_document
 from airflock.evolve.harden import harden
 from airflock.evolve.run import executor_for as searching
 from airflock.evolve.run import run as evolved
+from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
 from airflock.evolve.steps import Measured
 from airflock.evolve.study import make_study
+from airflock.metrics.registry import numbers_of
 from airflock.scenarios import formats
 from airflock.scenarios.change import variant
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
-from airflock.tune.plan import Plan, plan_of
+from airflock.tune.plan import USUAL, Plan, plan_of
 from airflock.tune.start import start_of
 
 PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
@@ -115,7 +117,8 @@ def tune(
         Time to spend, s.
     limit : sequence of str
         What is to be shown, as `airflock.certify` takes it; by default that collisions (`metrics.r_coll`) are rarer
-        than 0.01 per flock hour.
+        than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
+        that look as if they kept these limits before all others.
     confidence : float
         Of the certificate.
     like : Scenario, str or path, optional
@@ -156,18 +159,20 @@ def tune(
     folder = Path(out)
     mine, logs = _mine(folder, scenario, like, heard, settings, trust)
     start, notes = start_of(mine)
-    limits = list(limit) or [usual_limit(start)]
-    campaign_of(start, limits, confidence)  # refused before anything flies
-    plan = _planned(folder, start, budget, resume, threads, warm=warm)
+    limits = list(limit) or usual_limits(start)
+    asked = campaign_of(start, limits, confidence)  # refused before anything flies
+    telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
+    plan = _planned(folder, start, budget, resume, threads, warm=warm, telling=telling)
+    searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
     _say(note, "search")
-    result = _evolved(folder, start, plan, threads, watch)
+    result = _evolved(folder, start, plan, searched, threads, watch)
     notes = [*notes, *usual_space(start)[1]]
     if result.dead:
         raise StudyError(f"{mine.name}: {result.dead}")
     _say(note, "hardening")
-    tuned, steps, why = _hardened(folder, result, plan, threads, trust)
+    tuned, steps, why = _hardened(folder, result, plan, searched, threads, trust)
     _say(note, "certificate")
     certificate = _certified(folder, tuned, limits, confidence, plan, threads, note)
     found = Tuned(
@@ -202,9 +207,12 @@ def _mine(
     return found.scenario, found
 
 
-def usual_limit(scenario: Scenario) -> str:
-    """Collisions rarer than once in a hundred flock hours."""
-    return f"r_min<{scenario.metrics.r_coll:g} at 0.01/h"
+def usual_limits(scenario: Scenario) -> list[str]:
+    """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each."""
+    known = numbers_of(scenario.measures, scenario.metrics)
+    walls = scenario.world.arena != "none" or bool(scenario.world.obstacles)
+    contacts = ["phi_wall>0 at 0.01/h"] if walls and "phi_wall" in known else []
+    return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
 
 
 def _say(note: Note | None, text: str) -> None:
@@ -213,7 +221,14 @@ def _say(note: Note | None, text: str) -> None:
 
 
 def _planned(
-    folder: Path, start: Scenario, budget: float, resume: bool, threads: int | None, *, warm: bool = False
+    folder: Path,
+    start: Scenario,
+    budget: float,
+    resume: bool,
+    threads: int | None,
+    *,
+    warm: bool = False,
+    telling: int = USUAL,
 ) -> Plan:
     """The plan of the folder, made where there is none. Raises StudyError for a folder of something else."""
     if (folder / PLAN).is_file():
@@ -227,7 +242,7 @@ def _planned(
         raise StudyError(f"{folder}: holds no tuning to resume ({PLAN} is missing)")
     if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
         raise StudyError(f"{folder}: is not empty and holds no {PLAN}; give a new folder")
-    plan = plan_of(budget, _rate(start, threads), warm=warm)
+    plan = plan_of(budget, _rate(start, threads), warm=warm, telling=telling)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write(folder / START, _document(start), "Where tuning starts.")
@@ -270,14 +285,17 @@ def _rate(scenario: Scenario, threads: int | None) -> float:
     return count / max(time.perf_counter() - began, 1e-6)
 
 
-def _evolved(folder: Path, start: Scenario, plan: Plan, threads: int | None, watch: Watch | None) -> Result:
-    study = make_study({}, start.name, search=plan.search, scenario=start)
+def _evolved(
+    folder: Path, start: Scenario, plan: Plan, limits: Sequence[str], threads: int | None, watch: Watch | None
+) -> Result:
+    objective = {"objective": {"limits": list(limits)}} if limits else {}
+    study = make_study(objective, start.name, search=plan.search, scenario=start)
     open_folder(folder / STUDY, study, resume=(folder / STUDY / "study.toml").is_file())
     return evolved(study, folder / STUDY, searching(study, threads=threads), watch)
 
 
 def _hardened(
-    folder: Path, result: Result, plan: Plan, threads: int | None, trust: bool
+    folder: Path, result: Result, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
@@ -286,7 +304,7 @@ def _hardened(
     best = load(folder / STUDY / "best.toml", trust=trust)
     steps, why = [], ""
     try:
-        steps = harden(best, range(plan.seeds), threads=threads)
+        steps = harden(best, range(plan.seeds), limit=limits, threads=threads)
         write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
     except ScenarioError as fault:
         why = fault.faults[0]

@@ -34,7 +34,7 @@ class Builder:
 
     def __init__(self, plan: Plan):
         self.plan = plan
-        self.source = Source(JIT, plan.constants)
+        self.source = Source(JIT, plan.constants, plan.vectors)
         self.rows: dict[str, int] = {}
         self.functions: list[str] = []
         self.stages: dict[str, Any] = {}  # functions of the driver by name, as other stages call them
@@ -61,7 +61,7 @@ class Builder:
         found = []
         for law, plan in enumerate(self.plan.every):
             made = copy(self)
-            made.plan, made.source = plan, self.source.of(law, plan.constants)
+            made.plan, made.source = plan, self.source.of(law, plan.constants, plan.vectors)
             found.append(made)
         return found
 

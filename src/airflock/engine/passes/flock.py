@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from airflock.core.contract import Metric
+from airflock.core.vectors import names_of, vectors_of
 from airflock.core.vocabulary import asks
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
@@ -88,7 +89,8 @@ def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str,
         for other, names in plan.records.items():
             if other == letter:
                 numbers = {name: 0.0 if row is None else float(row[start + c]) for c, name in enumerate(names)}
-                found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {})})
+                whole = {key: tuple(numbers[part] for part in names_of(key, n)) for key, n in vectors_of(names).items()}
+                found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {}), **whole})
             start += len(names)
     return found
 

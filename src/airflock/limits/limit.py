@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-from airflock.certify.bounds import per_flight, per_hour
 from airflock.errors import ScenarioError
+from airflock.limits.bounds import per_flight, per_hour
 from airflock.metrics.registry import numbers_of, reports
 from airflock.scenarios.scenario import Scenario
 

@@ -1,0 +1,171 @@
+"""What `infer` found: laws with their numbers, the one that explains the tracks, and how sure that is."""
+
+import datetime
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.errors import AirflockError
+from airflock.infer.bootstrap import Again, Noise
+from airflock.infer.candidates import Candidate
+from airflock.infer.fit import Fit
+from airflock.infer.likelihood import Model
+from airflock.infer.maps import Maps
+from airflock.infer.predictive import Check
+from airflock.infer.tracks import Scale
+from airflock.scenarios.making import make
+from airflock.scenarios.scenario import Scenario
+
+Array = NDArray[np.float64]
+SURE = 2.0  # standard errors by which a law must predict better than going straight on, and
+MOST = 0.75  # share of the spans in which it must
+APART = 2.0  # standard errors by which the best law must be ahead of the second
+EDGE = 0.01  # of a range: nearer to its end nothing is told
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of a law: value and 95 % interval; an end of it is None where the tracks set no limit."""
+
+    key: str
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+
+
+@dataclass
+class Law:
+    """How well one law explains the tracks.
+
+    gain, error : log-likelihood of held-out steps above that of going straight on, and its standard error
+    ahead       : share of spans in which it predicts better
+    price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
+    criterion   : Akaike's, of the fit, below that of going straight on; negative is better
+    inside      : share of held-out differences within the 95 % that are predicted
+    missed      : share of what is explained with a free sum of forces added that the law alone leaves over, 0 to 1
+    numbers     : fitted; with intervals for the best law alone
+    """
+
+    name: str
+    gain: float
+    error: float
+    ahead: float
+    price: float
+    criterion: float
+    inside: float
+    missed: float
+    numbers: dict[str, Number]
+    candidate: Candidate
+    fit: Fit
+    maps: Maps
+    surprise: Array
+
+
+@dataclass
+class Inferred:
+    """What infer found: laws from best to worst, the one that explains the tracks if any does, and how sure that is.
+
+    best   : None where no law predicts better than going straight on
+    steps  : individual steps that were predicted; fitted: frames on which laws were fitted, of all frames
+    check  : flights of the best law against the tracks
+    """
+
+    laws: list[Law]
+    best: Law | None
+    verdict: str
+    steps: int
+    fitted: tuple[int, int]
+    scale: Scale
+    individuals: int
+    noise: Noise | None = None
+    check: Check | None = None
+    settings: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Any]:
+        """A scenario file's content: the best law with its numbers; raises AirflockError where there is none."""
+        if self.best is None:
+            raise AirflockError(f"infer: {self.verdict}; nothing can be written")
+        scenario = self.best.candidate.scenario
+        found: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in scenario.document.items()}
+        found.pop("published", None)
+        found["title"] = f"{self.best.name}, inferred from tracks of {self.individuals} individuals"
+        found |= {"agents": self.individuals, "duration": 120.0, "dt": scenario.flight.dt}
+        for key, value in self.settings.items():
+            section, _, name = key.partition(".")
+            entry: dict[str, Any] = {"value": _short(value), "source": self.sources[key]}
+            found.setdefault(section, {})[name] = entry
+        if "arena" not in found.get("world", {}) or found["world"]["arena"] == "none":
+            found["start"] = {
+                "kind": "ball", "radius": _short(max(0.5 * self.scale.far, 1e-3)), "speed": _short(self.scale.speed),
+                "separation": 0.0,
+            }  # fmt: skip
+        else:
+            found["start"] = {"kind": "arena", "speed": _short(self.scale.speed), "separation": 0.0}
+        return found
+
+    def scenario(self) -> Scenario:
+        """The best law as a scenario that flies."""
+        document = self.document()
+        assert self.best is not None
+        own = self.best.candidate.scenario
+        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+
+
+def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
+    """The law that explains the tracks, if one does, and the line that says so."""
+    best = laws[0]
+    if not (best.gain > max(SURE * best.error, best.price) and best.ahead >= MOST):
+        return None, "none of these explains the tracks better than going straight on"
+    missed = (
+        f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""
+    )
+    if len(laws) > 1:
+        ahead = laws[1].surprise - best.surprise
+        error = float(np.sqrt(len(ahead)) * ahead.std(ddof=1))
+        if ahead.sum() < APART * error:
+            return best, f"{best.name} explains the tracks best, but {laws[1].name} cannot be told from it{missed}"
+    return best, f"{best.name} explains the tracks best{missed}"
+
+
+def tell(found: Inferred, model: Model, sure: Again) -> None:
+    """Write the numbers of the best law, put right, with their intervals."""
+    assert found.best is not None
+    numbers: dict[str, Number] = {}
+    for k, n in enumerate(model.numbers[: model.named]):
+        low, high = sure.low[k], sure.high[k]
+        numbers[n.key] = Number(
+            n.key, n.value(sure.place[k]), n.value(low) if low > EDGE else None,
+            n.value(high) if high < 1.0 - EDGE else None, n.unit,
+        )  # fmt: skip
+    noise = sure.noise
+    known = {n.column: (n.key, n.unit) for n in found.best.candidate.noises}
+    if found.best.candidate.body_noise >= 0:
+        known[found.best.candidate.body_noise] = ("body.noise", "m^2/s^3")
+    if noise.column in known:
+        key, unit = known[noise.column]
+        numbers[key] = Number(key, noise.law, sure.noise_low, sure.noise_high, unit)
+    found.best.numbers, found.noise = numbers, noise
+    today = datetime.date.today().isoformat()
+    found.settings = {key: number.value for key, number in numbers.items()}
+    found.sources = {key: f"infer, {today}: {interval(number)}" for key, number in numbers.items()}
+
+
+def interval(number: Number) -> str:
+    """A 95 % interval in words."""
+    if number.low is None and number.high is None:
+        return "not told by the tracks"
+    if number.low is None:
+        return f"at most {number.high:.4g}"
+    if number.high is None:
+        return f"at least {number.low:.4g}"
+    return f"95 % in {number.low:.4g} to {number.high:.4g}"
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}") if math.isfinite(value) else value

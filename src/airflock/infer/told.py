@@ -1,0 +1,96 @@
+"""Told: which numbers of a law the tracks can tell at all, and which the others make up for."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.infer.fit import SIDES, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
+from airflock.infer.likelihood import Model
+from airflock.infer.search import scan
+
+Array = NDArray[np.float64]
+DEPENDENT = 0.2  # share of a slope that the others do not explain, below which a number cannot be told
+LOOKS = 6  # best places at which is asked what a number does
+ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where is asked whether a number does anything
+FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
+WORSE = 1.92  # loss that a number is worth: what 95 % of numbers that are not needed bring at most (Wilks 1938)
+APART = 0.1  # of a range, from the default
+
+
+def telling(model: Model, start: Array, begin: Array, spans: Sequence[int]) -> list[int]:
+    """Named numbers that differences tell apart, in their order; the others stay at their defaults.
+
+    A number is not told that changes nothing anywhere along its range, such as the limit of a law that has none, or
+    whose slope the earlier ones explain at the best of many places taken together, such as a mass beside all weights.
+    A radius within which nobody is at these places has no slope, but does something along its range: it is kept.
+    """
+    places = []
+    for x in begin[:LOOKS]:
+        u = start.copy()
+        u[: model.named] = x
+        places.append(u)
+    alive = [k for k in range(model.named) if k == model.usual or _acts(model, places, k, spans)]
+    flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
+    kept: list[int] = []
+    basis = np.zeros((len(flat), 0))
+    for column, number in zip(flat.T, alive, strict=True):
+        size = float(np.linalg.norm(column))
+        rest = column - basis @ (basis.T @ column)
+        left = float(np.linalg.norm(rest))
+        if size > 1.0 and left < DEPENDENT * size and number != model.usual:
+            continue
+        kept.append(number)
+        if size > 1.0:
+            basis = np.column_stack([basis, rest / max(left, 1e-12)])
+    return kept
+
+
+def _acts(model: Model, places: Sequence[Array], number: int, spans: Sequence[int]) -> bool:
+    """Whether a number changes the loss anywhere along its range."""
+    for u in places:
+        here = model.score(u, spans).loss()
+        for x in ALONG:
+            moved = u.copy()
+            moved[number] = x
+            if abs(model.score(moved, spans).loss() - here) > 1.0:
+                return True
+    return False
+
+
+def _slopes(model: Model, u: Array, numbers: Sequence[int], spans: Sequence[int]) -> Array:
+    """Slopes of all differences in units of their standard deviations, (difference, number)."""
+    weights = 1.0 / np.sqrt(np.maximum((model.differences(u, spans)[0] ** 2).mean(axis=0), 1e-30))
+    found: Array = (jacobian(model, u, numbers, spans, FINE) * weights[None, :, None]).reshape(-1, len(numbers))
+    return found
+
+
+def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int], Array]:
+    """Named numbers without which the tracks are explained as well, and the place of the rest without them.
+
+    Each that stands away from its default, or whose default lies beyond what was sought, is put there in turn, the last
+    declared first, and the rest is fitted anew: from where the others make up for it, and from where another number of
+    its unit takes its part. Numbers of the body are tried where their default is none at all.
+    """
+    few = model.few()
+    best = climb(model, fit.place, fit.free, few, rough=True)
+    lowest, gone = best.loss, list[int]()
+    for k in reversed(range(model.named)):
+        number = model.numbers[k]
+        default = number.place(number.default)
+        if k == model.usual or not (number.key.startswith("model.") or number.default == 0.0):
+            continue
+        if number.low <= number.default <= number.high and abs(default - best.place[k]) < APART:
+            continue
+        without, rest = model.fixed([*gone, k]), [f for f in best.free if f != k]
+        moved = followed(best, curvature(model.fixed(gone), best, few, SIDES[-1]), k, default)
+        starts = [moved, by_powers(model, best, moved, k)]
+        for other in (f for f in rest if f < model.named and model.numbers[f].unit == number.unit):
+            starts.append(best.place.copy())
+            starts[-1][other] = model.numbers[other].place(number.value(best.place[k]))
+        start = min(starts, key=lambda u: loss_at(without, u, rest, few))
+        found = climb(without, scan(without, start, rest, few)[0], rest, few, rough=True)
+        say()
+        if found.loss < lowest + WORSE:
+            gone, best, lowest = [*gone, k], found, min(lowest, found.loss)
+    return gone, best.place
