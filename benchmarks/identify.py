@@ -12,6 +12,7 @@ import pandas as pd
 
 import airflock
 from airflock.identify import body, packets, sensors, synthetic
+from airflock.identify.hills import LINKS
 
 KEYS = {"tau": "body.tau", "a_max": "body.a_max", "noise": "body.noise"}
 
@@ -59,7 +60,7 @@ def fleet(seed, white, rate, duration, only_body):
         late = packets.fit_delay(heard)
         rows["radio.delay"] = late.value, late.interval, late.reason
         links = packets.fit_links(heard, scenario.sensors.period, scenario.radio)
-        rows |= {f"radio.{n}": (links.value[n], links.interval[n], links.refused.get(n, "")) for n in packets.LINKS}
+        rows |= {f"radio.{n}": (links.value[n], links.interval[n], links.refused.get(n, "")) for n in LINKS}
         row["seconds"] = time.process_time() - begin
     for key, (value, (low, high), reason) in rows.items():
         row |= {

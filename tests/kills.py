@@ -3,8 +3,8 @@
 python tests/kills.py FOLDER --what evolve --kills 200 --seed 7
 
 What is at work is one of LIVES: a life begins, or goes on with, what a folder holds, to its end. Toy flights stand for
-real ones where only the store matters. `workers` kills worker processes of dask under a study. What is done stands in
-FOLDER/WHAT/done.json, so that a run that was cut off goes on.
+real ones where only the store matters. `workers` and `sweep` kill worker processes of dask under a study or a sweep of
+real flights. What is done stands in FOLDER/WHAT/done.json, so that a run that was cut off goes on.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import signal
 import sqlite3
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import toys
@@ -213,12 +214,36 @@ def killed(what, folder, kills, seed):
                      "all ends identical\n")  # fmt: skip
 
 
-def workers(folder, kills, seed):
-    """Kill workers of dask under studies until so many have died."""
+@contextmanager
+def dying_workers(chance, died):
+    """Address of two workers of dask, of which one at random is killed now and then; `died` is told of each."""
     import threading
 
     import distributed
 
+    over = threading.Event()
+    how = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 60}
+    with distributed.LocalCluster(**how) as cluster:
+
+        def killer():
+            while not over.wait(chance.uniform(0.2, 0.6)):
+                worker = chance.choice([*cluster.workers.values(), None])
+                # one at a time: a worker that dies before it has started is given up by its nanny
+                if worker is not None and worker.pid and len(cluster.scheduler_info["workers"]) == 2:
+                    os.kill(worker.pid, signal.SIGKILL)
+                    died.append(worker.pid)
+
+        thread = threading.Thread(target=killer)
+        thread.start()
+        try:
+            yield cluster.scheduler_address
+        finally:
+            over.set()
+            thread.join()
+
+
+def workers(folder, kills, seed):
+    """Kill workers of dask under studies until so many have died."""
     from airflock.evolve.run import run
     from airflock.executors.cluster import Cluster
 
@@ -236,47 +261,48 @@ def workers(folder, kills, seed):
     study, chance = toys.study(population=10, generations=10, seeds=2), random.Random(seed)
     open_folder(folder / "here", study, resume=False)
     run(study, folder / "here", Here(lambda p, s: task(p, s)[0], 2))
-    died = studies = 0
-    while died < kills:
-        over = threading.Event()
-        how = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 60}
-        with distributed.LocalCluster(**how) as cluster:
-
-            def killer(cluster=cluster, over=over):
-                nonlocal died
-                while not over.wait(chance.uniform(0.2, 0.6)):
-                    worker = chance.choice([*cluster.workers.values(), None])
-                    # one at a time: a worker that dies before it has started is given up by its nanny
-                    if worker is not None and worker.pid and len(cluster.scheduler_info["workers"]) == 2:
-                        os.kill(worker.pid, signal.SIGKILL)
-                        died += 1
-
-            thread = threading.Thread(target=killer)
-            place = folder / f"there{studies}"
-            open_folder(place, study, resume=False)
-            executor = Cluster([task], cluster.scheduler_address)
-            thread.start()
-            try:
-                run(study, place, executor)
-            finally:
-                over.set()
-                thread.join()
-        assert rows(place) == rows(folder / "here"), f"study {studies} ended differently after {died} kills"
+    died, studies = [], 0
+    while len(died) < kills:
+        place = folder / f"there{studies}"
+        open_folder(place, study, resume=False)
+        with dying_workers(chance, died) as address:
+            run(study, place, Cluster([task], address))
+        assert rows(place) == rows(folder / "here"), f"study {studies} ended differently after {len(died)} kills"
         studies += 1
-        sys.stderr.write(f"workers: {died} of {kills} kills\n")
-    sys.stdout.write(f"workers: {died} workers killed under {studies} studies: all ends identical\n")
+        sys.stderr.write(f"workers: {len(died)} of {kills} kills\n")
+    sys.stdout.write(f"workers: {len(died)} workers killed under {studies} studies: all ends identical\n")
+
+
+def sweeps(_, kills, seed):
+    """Kill workers of dask under sweeps of real flights until so many have died."""
+    import airflock
+
+    over = {"radio.delay": [0.0, 0.5, 1.0], "agents": [10, 20]}
+    what = airflock.load("vasarhelyi_2018/4ms", {"duration": 300.0})
+    wanted = airflock.sweep(what, over, seeds=range(60))
+    chance, died, done = random.Random(seed), [], 0
+    while len(died) < kills:
+        with dying_workers(chance, died) as address:
+            found = airflock.sweep(what, over, seeds=range(60), scheduler=address)
+        assert found.equals(wanted), f"sweep {done} ended differently after {len(died)} kills"
+        done += 1
+        sys.stderr.write(f"sweep: {len(died)} of {kills} kills\n")
+    sys.stdout.write(f"sweep: {len(died)} workers killed under {done} sweeps: all tables identical\n")
+
+
+CLUSTERS = {"workers": workers, "sweep": sweeps}
 
 
 def main():
     """Exit status 0 if all ends are identical."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=lambda name: Path(name).resolve())
-    parser.add_argument("--what", choices=[*LIVES, "workers"], default="evolve")
+    parser.add_argument("--what", choices=[*LIVES, *CLUSTERS], default="evolve")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
-    if asked.what == "workers":
-        workers(asked.folder / "workers", asked.kills, asked.seed)
+    if asked.what in CLUSTERS:
+        CLUSTERS[asked.what](asked.folder / asked.what, asked.kills, asked.seed)
     else:
         killed(asked.what, asked.folder / asked.what, asked.kills, asked.seed)
 

@@ -22,3 +22,12 @@ def places(mask, cell=20):
     rows, columns = (n // cell * cell for n in mask.shape)
     cells = mask[:rows, :columns].reshape(rows // cell, cell, columns // cell, cell)
     return int(np.any(cells, axis=(1, 3)).sum())
+
+
+def chart(tab, number=0):
+    """Picture of one chart of a live page; nothing while it is being made anew."""
+    box = tab.locator(".uplot canvas").nth(number).bounding_box(timeout=120_000)
+    if box is None:
+        return np.zeros((20, 20, 3), int)
+    left, top = int(box["x"]), int(box["y"])
+    return shot(tab)[top : top + int(box["height"]), left : left + int(box["width"])]

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from pixels import coloured, places, shot
+from pixels import chart, coloured, places, shot
 from test_watch import until
 
 from airflock.core.agent import State
@@ -95,13 +95,5 @@ def test_a_running_fleet_is_seen_with_phases_links_faults_and_silence(browser, t
         until(lambda: page.drawing.shown.name == "battery", "the menu does nothing")
         tab.get_by_text("Measure", exact=True).click()
 
-        def lines():
-            chart = tab.locator(".uplot canvas").nth(1)
-            chart.wait_for(timeout=120_000)
-            box = chart.bounding_box()
-            top, left = int(box["y"]), int(box["x"])
-            part = shot(tab)[top : top + int(box["height"]), left : left + int(box["width"])]
-            return places(coloured(part), cell=10)
-
-        until(lambda: lines() >= 5, "the chart of the smallest distance is empty")
+        until(lambda: places(coloured(chart(tab, 1)), cell=10) >= 5, "the chart of the smallest distance is empty")
         assert not tab.faults and not page.observer.refused

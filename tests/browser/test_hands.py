@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pixels import coloured, places, shot
+from pixels import chart, coloured, places, shot
 from test_watch import flying, opened, until
 
 from airflock.scenarios.files import presets
@@ -238,11 +238,7 @@ def test_an_order_parameter_that_no_paper_reports_is_drawn(browser, tab):
         until(lambda: player.time > 20.0, "it does not fly")
 
         def lines():
-            box = tab.locator(".uplot canvas").first.bounding_box()
-            part = shot(tab)[
-                int(box["y"]) : int(box["y"] + box["height"]), int(box["x"]) : int(box["x"] + box["width"])
-            ]
-            return places(np.abs(part - (0, 114, 178)).max(axis=2) < 60, cell=10)
+            return places(np.abs(chart(tab) - (0, 114, 178)).max(axis=2) < 60, cell=10)
 
         until(lambda: lines() >= 8, "the chart of the order parameter is empty")
         tab.get_by_label("order parameter").first.click()

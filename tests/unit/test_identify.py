@@ -11,8 +11,9 @@ import pytest
 import airflock
 from airflock.core import random
 from airflock.errors import RecordingError, ScenarioError
-from airflock.identify import body, packets, periods, synthetic
+from airflock.identify import body, hills, packets, periods, synthetic
 from airflock.identify import sensors as standing
+from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
 from airflock.identify.run import HARDER, UNITS, Number, identify
@@ -147,33 +148,33 @@ def test_where_a_drone_stands_says_nothing_of_its_sensor():
 
 def hill(numbers, widths):
     """Loss of a normal likelihood of near, far and the two shares."""
-    return lambda z: 0.5 * float((((np.array(packets.unpacked(z)) - numbers) / widths) ** 2).sum())
+    return lambda z: 0.5 * float((((np.array(hills.unpacked(z)) - numbers) / widths) ** 2).sum())
 
 
 def test_the_highest_of_two_hills_of_a_radio_is_found_though_the_other_is_wider():
     low = hill(np.array([28.0, 75.0, 0.91, 0.33]), np.array([3.0, 12.0, 0.03, 0.1]))
     high = hill(np.array([26.0, 58.0, 0.91, 0.45]), np.array([3.0, 3.0, 0.03, 0.1]))
-    best, *others = packets._lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
-    assert packets.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
+    best, *others = hills.lowest(lambda z: min(low(z) + 5.0, high(z)), 300.0)
+    assert hills.unpacked(best) == pytest.approx((26.0, 58.0, 0.91, 0.45), rel=0.01)
     assert not others  # the lower one is not nearly as likely
 
 
 def test_intervals_are_those_of_the_profile():
     numbers, widths = np.array([25.0, 60.0, 0.9, 0.3]), np.array([1.0, 2.0, 0.01, 0.03])
-    top = packets._at(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
-    assert packets.unpacked(top) == pytest.approx(numbers)
+    top = hills.placed(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])
+    assert hills.unpacked(top) == pytest.approx(numbers)
     for (low, high), value, width in zip(
-        packets._intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
+        hills.intervals(hill(numbers, widths), top).values(), numbers, widths, strict=True
     ):
         assert (low, high) == pytest.approx((value - 1.96 * width, value + 1.96 * width), abs=0.05 * width)
 
     # all of 100 packets came: a share p says log(p) each, so that 100 log(p) = -1.92 at the lower end
     def all_came(z):
-        near, far, share, other = packets.unpacked(z)
+        near, far, share, other = hills.unpacked(z)
         return -100.0 * np.log(share) + hill(numbers, np.array([1.0, 2.0, np.inf, 0.03]))(z)
 
     certain = np.array([*top[:2], 9.0, np.log(0.3 / 0.7)])
-    low, high = packets._intervals(all_came, certain)["received_near"]
+    low, high = hills.intervals(all_came, certain)["received_near"]
     assert low == pytest.approx(np.exp(-0.0192), abs=2e-3) and high > 0.9995
 
 
@@ -208,7 +209,7 @@ def test_the_curve_of_reception_comes_back():
     k = links.Parameters(kind="links", near=22.0, far=55.0, received_near=0.95, received_far=0.35)
     found = packets.fit_links(heard_by(k)[0], 0.2, k)
     assert not found.refused
-    for name in packets.LINKS:
+    for name in LINKS:
         low, high = found.interval[name]
         assert low - (high - low) < getattr(k, name) < high + (high - low)
     near = heard_by(k)[0]

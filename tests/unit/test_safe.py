@@ -148,7 +148,7 @@ def test_a_study_without_limits_is_what_it_was_and_one_with_them_says_so():
 @pytest.mark.parametrize(
     ("objective", "search", "words"),
     [
-        ({"limits": ["r_min<3"]}, {}, "says not how rarely; write r_min<3 at 0.01/h"),
+        ({"limits": ["r_min<3"]}, {}, "does not say how rarely; write r_min<3 at 0.01/h"),
         ({"limits": ["r_mim<3 at 1%"]}, {}, "unknown order parameter; did you mean r_min"),
         ({"limits": 3}, {}, "objective.limits = 3 is neither a limit nor a list of limits"),
         ({"limit": NEAR}, {}, "objective.limit: unknown key; did you mean objective.limits"),
@@ -177,5 +177,5 @@ def test_hardening_pays_more_for_a_limit_that_is_not_kept_and_undoes_what_breaks
     found = {step.name: step for step in harden.harden(PAPER, range(50), limit=NEAR)}
     assert found["p_rep up"].kept and found["p_rep up"].cost[0] == pytest.approx(0.14)
     assert not found["c_frict up"].kept and found["on fresh seeds"].verdict == "kept: p_rep up"
-    with pytest.raises(ScenarioError, match="says not how rarely"):
+    with pytest.raises(ScenarioError, match="does not say how rarely"):
         harden.harden(PAPER, range(4), limit="r_min<3")

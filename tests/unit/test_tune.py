@@ -13,13 +13,15 @@ import airflock
 from airflock.certify.seeds import identity
 from airflock.errors import RecordingError, ScenarioError, StudyError
 from airflock.evolve.race import ROUNDS
+from airflock.evolve.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
-from airflock.tune.run import tune
+from airflock.tune.run import tune, usual_limits
 from airflock.tune.start import start_of
 
+SEEDS = "SELECT seed FROM flight WHERE stage=?"
 MINE = {
     "agents": 4, "duration": 20.0, "dt": 0.1, "model": {"kind": "vasarhelyi_2018", "v_flock": 6.0, "p_rep": 0.2},
     "world": {"side": 120.0}, "radio": {"delay": 0.4},
@@ -47,7 +49,8 @@ def test_a_plan_fits_into_its_budget_or_says_what_would(budget, rate):
         return
     q = plan.search
     raced = sum(max(q["top"], round(share * q["pool"])) * seeds for share, seeds in ROUNDS)
-    flown = POPULATION * q["generations"] + raced + (q["top"] + 2) * q["final_seeds"]
+    finalists = q["top"] + 1 + q["averages"]
+    flown = POPULATION * q["seeds"] * q["generations"] + raced + (finalists + 1) * q["final_seeds"]
     assert flown <= SEARCH * budget * rate * 1.05 + 16 and TRIED * plan.seeds <= HARDEN * budget * rate + 1e-6
     assert plan.seconds == CERTIFY * budget and pytest.approx(1.0) == SEARCH + HARDEN + CERTIFY
 
@@ -142,6 +145,29 @@ def test_the_report_plays_the_worst_flights_and_tells_the_card_of_the_next(done)
     assert f"airflock fly prepare {folder / 'tuned.toml'} --site LAT,LON,ALT --members 1-4" in page
     speed = 1.5 * found.scenario.parameters.v_flock
     assert f"{speed:.4g} m/s" in page and "safety.speed_max" in page
+
+
+def test_limits_are_by_default_on_collisions_and_where_there_are_walls_on_contacts():
+    assert usual_limits(make(MINE, "mine")) == ["r_min<3 at 0.01/h", "phi_wall>0 at 0.01/h"]
+    assert usual_limits(make({**MINE, "world": {"arena": "none"}, "start": {"kind": "ball"}}, "mine")) == [
+        "r_min<3 at 0.01/h"
+    ]
+
+
+def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_never_meet(done):
+    found, folder = done
+    study = tomllib.loads((folder / "study" / "study.toml").read_text())
+    assert study["limits"] == ["r_min<0.1 at 10%"] == [limit.text for limit in found.certificate.campaign.limits]
+    assert found.result.limits[0]["keeps"] and found.result.limits[0]["limit"] == "r_min<0.1 at 10%"
+    with Store(folder / "study", write=False) as store:
+        searched = {
+            stage: {s for (s,) in store.rows(SEEDS, (stage,))} for stage in ("search", "race", "final", "score")
+        }
+    with Store(folder / "certificate_flights", write=False) as store:
+        certified = {seed for (seed,) in store.rows("SELECT seed FROM flight")}
+    parts = [*searched.values(), certified]
+    assert all(parts) and sum(map(len, parts)) == len(set().union(*parts))
+    assert min(map(min, parts)) > 2 * tuning.MOST_SEEDS  # hardening has the seeds from 0 on
 
 
 def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):

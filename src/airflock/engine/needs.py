@@ -4,9 +4,9 @@ What grows with the flock is counted: rows of numbers, past states that a delay 
 the radio keeps them, the grid, and the frames of a recording; and looks at pairs, at what stands in the way, at wings.
 """
 
+from airflock.engine.layout import lanes
 from airflock.engine.passes import grid
 from airflock.engine.plan import Plan
-from airflock.engine.state import lanes
 from airflock.errors import FlightError
 from airflock.machine import free_memory
 from airflock.scenarios import cost

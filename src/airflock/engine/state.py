@@ -3,20 +3,19 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories, memories, of_pairs
+from airflock.engine.beginnings import first_memories
 from airflock.engine.drivers import driver_of, flying
+from airflock.engine.layout import aligned_zeros, layout_of
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
-from airflock.engine.stages.decide import NEAR
 from airflock.engine.stages.state import own_row
 from airflock.engine.striking import strike
 from airflock.engine.tables import Tables, tables
@@ -24,8 +23,6 @@ from airflock.engine.totals import combined, goals_reached, samples, sums_of
 from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
 
-LANES = 16  # rows are padded to whole vectors of the widest machine
-LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
 ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
 GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
@@ -47,7 +44,7 @@ class State:
         scratch = scratch_of(plan, tables.row, agents)
         kept = tuple((name, size) for parts in scratch for name, size, spare in parts if not spare)
         counts = (len(driver.ROWS), agents, ring, len(tables.goals), len(tables.later), tables.shapes.shape)
-        layout = _layout(plan, real, *counts, kept)
+        layout = layout_of(plan, real, *counts, kept)
         self.plan, self.driver, self.tables, self.agents = plan, driver, tables, agents
         self.buffer, self.arrays = layout.filled()
         own = self.arrays
@@ -70,7 +67,7 @@ class State:
         self.solvers = tuple(
             tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
         )
-        self.cells = grid.memory(plan, agents, rows)
+        self.cells = grid.memory(plan, agents, aligned_zeros)
         self._given = self._arguments()
 
     def _arguments(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -300,81 +297,3 @@ class State:
         """Begin the sums over time anew. What a metric remembers of each agent stays: contacts go on."""
         self.arrays["sums"][:] = sums_of(self.plan)[1]
         self.arrays["there"][:] = 0.0
-
-
-class Layout(NamedTuple):
-    """Where the arrays of a state lie in its buffer, and what they hold before a flight.
-
-    places : name, first byte, shape and kind of each array, each from a cache line on
-    """
-
-    places: tuple[tuple[str, int, tuple[int, ...], Any], ...]
-    beginning: NDArray[np.uint8]
-
-    def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
-        """A new buffer as it is before a flight, and its arrays by name."""
-        size = len(self.beginning)
-        room = np.empty(size + LINE, np.uint8)
-        first = -room.__array_interface__["data"][0] % LINE
-        buffer = room[first : first + size]
-        buffer[:] = self.beginning
-        arrays = {name: np.ndarray(shape, kind, room, first + place) for name, place, shape, kind in self.places}
-        return buffer, arrays
-
-
-@lru_cache(maxsize=64)
-def _layout(
-    plan: Plan,
-    real: Any,
-    count: int,
-    agents: int,
-    ring: int,
-    goals: int,
-    later: int,
-    shapes: tuple[int, int],
-    kept: tuple[Any, ...],
-) -> Layout:
-    """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
-    m, dims = lanes(agents), plan.dimensions
-    label = np.int32 if plan.bits == 32 else np.int64
-    pairs = (agents, m) if plan.packets else (1, 1)
-    values, sums = sums_of(plan)
-    beginnings = {
-        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
-        "values": values, "sums": sums,
-        "store": of_pairs(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
-    }  # fmt: skip
-    columns = sum(map(len, plan.records.values()))
-    gusts = (5 if plan.dryden else 3,)
-    shaped: dict[str, tuple[tuple[int, ...], Any]] = {
-        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
-        "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
-        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
-        "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
-        "labels": ((2, m), label), "there": ((2,), np.float64),
-    }  # fmt: skip
-    shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
-    shaped |= {name: (size, real) for name, size in kept}
-    places, end = [], 0
-    for name, (shape, kind) in shaped.items():
-        places.append((name, end, shape, np.dtype(kind)))
-        end += -(-math.prod(shape) * np.dtype(kind).itemsize // LINE) * LINE
-    layout = Layout(tuple(places), np.zeros(end, np.uint8))
-    buffer, arrays = layout.filled()
-    for name, array in beginnings.items():
-        arrays[name][...] = array
-    return Layout(layout.places, buffer.copy())
-
-
-def lanes(agents: int) -> int:
-    """Agents of a row, filled up to whole vectors."""
-    return -(-agents // LANES) * LANES
-
-
-def rows(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-    """Zeros whose rows begin on a cache line."""
-    count = math.prod(shape) * np.dtype(kind).itemsize
-    room = np.zeros(count + LINE, np.uint8)
-    first = -room.ctypes.data % LINE
-    found: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
-    return found

@@ -78,7 +78,7 @@ def read_limits(table: Any, scenarios: Sequence[Scenario]) -> tuple[tuple[Limit,
         except ScenarioError as fault:
             faults += [f"objective.limits: {line}" for line in fault.faults]
     faults += [
-        f"objective.limits: limit '{limit.text}': says not how rarely; write {limit.event} at 0.01/h, for instance"
+        f"objective.limits: limit '{limit.text}': does not say how rarely; write {limit.event} at 0.01/h, for instance"
         for limit in found
         if limit.rate is None
     ]

@@ -73,7 +73,8 @@ class Cluster:
         self._warn_of_mixed_processors()
 
     def _warn_of_mixed_processors(self) -> None:
-        models = sorted(set(self.client.run(processor).values()))
+        # a worker may die before it answers
+        models = sorted(set(self.client.run(processor, on_error="ignore").values()))
         if len(models) > 1:
             warnings.warn(
                 f"workers have different processors ({'; '.join(models)}): flights may differ in the last bits, and "

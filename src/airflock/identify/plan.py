@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from airflock.identify.packets import LINKS, OF_TABLE, curve_of
+from airflock.identify.hills import LINKS
+from airflock.identify.packets import OF_TABLE, curve_of
 from airflock.radios.table import ENTRIES
 from airflock.scenarios.scenario import Scenario
 

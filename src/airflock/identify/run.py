@@ -13,6 +13,7 @@ from scipy.stats import norm
 from airflock.body import motion
 from airflock.errors import AirflockError, RecordingError
 from airflock.identify import body, packets, periods, sensors
+from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
@@ -230,7 +231,7 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
     nan = float("nan")
     if heard is None:
         reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
-        for name in ("delay", *packets.LINKS):
+        for name in ("delay", *LINKS):
             tell(f"radio.{name}", nan, (nan, nan), "", reason)
         return None
     table = packets.checked(heard)
@@ -242,7 +243,7 @@ def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets
         return packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
     links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
     lossy = scenario.transceiver.name == "links"
-    for name in packets.LINKS:
+    for name in LINKS:
         why = links.refused.get(name, "") or (
             "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
         )

@@ -68,6 +68,71 @@ def kin(i: int, j: int, flock: Flock, *, plan: Plan) -> Any:
     return (ONE if flock.own("", "group")[j] == flock.own("", "group")[i] else ZERO) if plan.grouped else ONE
 
 
+def oneself(i: int, own: Any, v: Any, h: Any, true: Any, flock: Flock, *, plan: Plan) -> None:
+    """Where agent i believes that it is (own), how it moves (v) and heads (h), and where it is (true)."""
+    axes = range(plan.dimensions)
+    for a in axes:
+        own[a] = flock.measured_position[a][i]
+        v[a] = flock.measured_velocity[a][i]
+    if plan.dimensions == 2:
+        v[Z] = ZERO
+    if plan.perturbed or plan.packets:
+        for a in axes:
+            true[a] = flock.position[a][i]
+    f = ONE / norm(v[X], v[Y], v[Z])
+    for a in (X, Y, Z):
+        h[a] = f * v[a]
+
+
+def away(j: int, true: Any, o: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
+    """True offset o of agent j, m, and the square of its length, m²."""
+    axes = range(plan.dimensions)
+    for a in axes:
+        o[a] = flock.position[a][j] - true[a]
+    if plan.periodic:
+        for a in axes:
+            o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
+    return sum(o[a] * o[a] for a in axes)
+
+
+def as_heard(
+    i: int, j: int, own: Any, v: Any, d: Any, dv: Any, packet: Any, age: Any, time: Any, k: Any, flock: Flock,
+    *, plan: Plan,
+) -> Any:  # fmt: skip
+    """Offset d (m) and relative velocity dv (m/s) of agent j by what agent i has of it, and how old that is, s."""
+    axes = range(plan.dimensions)
+    if plan.packets:
+        age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
+        if plan.turns:
+            at = believed(age, packet, k, plan=plan)
+        for a in axes:
+            d[a] = (at[a] if plan.turns else carried(a, age, packet, plan=plan)) - own[a]
+            dv[a] = packet[a + plan.dimensions] - v[a]
+    else:
+        for a in axes:
+            d[a] = flock.heard_position[a][j] - own[a]
+            dv[a] = flock.heard_velocity[a][j] - v[a]
+    return age
+
+
+def counts(
+    i: int, j: int, ii: Any, part: str, apart2: Any, r2: Any, range2: Any, near2: Any, age: Any, packet: Any,
+    numbers: Any, flock: Flock, *, plan: Plan, model: Model,
+) -> Any:  # fmt: skip
+    """Whether agent i hears agent j, or meets it, as far as distances say: within range, and within the law's reach."""
+    if part == ADD:
+        ok = flock.met[j] > HALF
+    elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
+        ok = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
+    elif plan.perturbed:
+        ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
+    else:
+        ok = (r2 <= range2) & (integer(j) != ii)
+    if model.reach is not None and (part != HEAR or plan.grid):
+        ok = ok & (r2 <= near2)
+    return ok
+
+
 def neighbours(  # noqa: C901 - tests of the plan leave one way through
     agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, whole: Any, n: int, decision: int,
     time: float, late: float, edges: Any, spans: Any, scene: Any, words: Any, draw: Callable[[int], None] | None,
@@ -95,6 +160,8 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     if model.reach is not None and not plan.varies("p"):
         near = least(ask(model.reach, p=numbers.p), LIMIT)
         near2 = near * near + TINY if exact else near * near
+    else:
+        near2 = LIMIT
     fast = sent(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
     slow = sent(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
     for i in agents:
@@ -111,17 +178,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     draw(i)
             lot = words[flock.number[i] & 3]
         own, v, true, h, total = vector(), vector(), vector(), vector(), totals()
-        for a in axes:
-            own[a] = flock.measured_position[a][i]
-            v[a] = flock.measured_velocity[a][i]
-        if plan.dimensions == 2:
-            v[Z] = ZERO
-        if true_range or plan.packets:
-            for a in axes:
-                true[a] = flock.position[a][i]
-        f = ONE / norm(v[X], v[Y], v[Z])
-        for a in (X, Y, Z):
-            h[a] = f * v[a]
+        oneself(i, own, v, h, true, flock, plan=plan)
         for c, how in sums:
             total[c] = START[how]
         if plan.radio.asks("talkers"):  # noqa: SIM108 - a helper of several lines stands where it is assigned
@@ -134,13 +191,10 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             for j in others:
                 d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
                 age = heard_age(i, j, late, flock, plan=plan)
-                if (true_range or plan.packets) and part != ADD:
-                    for a in axes:
-                        o[a] = flock.position[a][j] - true[a]
-                    if plan.periodic:
-                        for a in axes:
-                            o[a] = nearest_image(o[a], getattr(w, SIDES[a]))
-                    apart2 = sum(o[a] * o[a] for a in axes)
+                if (true_range or plan.packets) and part != ADD:  # noqa: SIM108 - as above
+                    apart2 = away(j, true, o, flock, w, plan=plan)
+                else:
+                    apart2 = ZERO
                 if plan.packets and part != ADD:
                     carried2 = carries(i, j, range_ * range_, flock, plan=plan)
                     known = {
@@ -155,17 +209,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     )  # fmt: skip
                 elif plan.packets:
                     newest(i, j, packet, flock, plan=plan)
-                if plan.packets:
-                    age = by_clock(time, i, flock, plan=plan) - packet[2 * plan.dimensions]
-                    if plan.turns:
-                        at = believed(age, packet, k, plan=plan)
-                    for a in axes:
-                        d[a] = (at[a] if plan.turns else carried(a, age, packet, plan=plan)) - own[a]
-                        dv[a] = packet[a + plan.dimensions] - v[a]
-                else:
-                    for a in axes:
-                        d[a] = flock.heard_position[a][j] - own[a]
-                        dv[a] = flock.heard_velocity[a][j] - v[a]
+                age = as_heard(i, j, own, v, d, dv, packet, age, time, k, flock, plan=plan)
                 if images:
                     for a in axes:
                         d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
@@ -180,16 +224,9 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     nh[a] = g * (v[a] + dv[a])
                 if part == HEAR:
                     flock.square[j] = FAR  # and so it stays where an interpreted driver goes on to the next one
-                if part == ADD:
-                    ok = flock.met[j] > HALF
-                elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
-                    ok = (apart2 <= range2) & on_record(age, packet, numbers, plan=plan) & (integer(j) != ii)
-                elif true_range:
-                    ok = (apart2 <= carries(i, j, range2, flock, plan=plan)) & (integer(j) != ii)
-                else:
-                    ok = (r2 <= range2) & (integer(j) != ii)
-                if model.reach is not None and (part != HEAR or plan.grid):
-                    ok = ok & (r2 <= near2)
+                ok = counts(
+                    i, j, ii, part, apart2, r2, range2, near2, age, packet, numbers, flock, plan=plan, model=model
+                )  # fmt: skip
                 if plan.lossy and not plan.packets and part != ADD:
                     distance = math.sqrt(apart2 + TINY) if true_range else r
                     ok = ok & (

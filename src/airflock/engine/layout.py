@@ -1,0 +1,94 @@
+"""Layout: where the arrays of a flight lie in its one buffer, and what they hold before it."""
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.beginnings import first_memories, memories, of_pairs
+from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.stages.decide import NEAR
+from airflock.engine.totals import sums_of
+
+LANES = 16  # rows are padded to whole vectors of the widest machine
+LINE = 64  # bytes of a cache line: a vector that lies across two costs two loads
+
+
+class Layout(NamedTuple):
+    """Where the arrays of a state lie in its buffer, and what they hold before a flight.
+
+    places : name, first byte, shape and kind of each array, each from a cache line on
+    """
+
+    places: tuple[tuple[str, int, tuple[int, ...], Any], ...]
+    beginning: NDArray[np.uint8]
+
+    def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
+        """A new buffer as it is before a flight, and its arrays by name."""
+        size = len(self.beginning)
+        room = np.empty(size + LINE, np.uint8)
+        first = -room.__array_interface__["data"][0] % LINE
+        buffer = room[first : first + size]
+        buffer[:] = self.beginning
+        arrays = {name: np.ndarray(shape, kind, room, first + place) for name, place, shape, kind in self.places}
+        return buffer, arrays
+
+
+@lru_cache(maxsize=64)
+def layout_of(
+    plan: Plan,
+    real: Any,
+    count: int,
+    agents: int,
+    ring: int,
+    goals: int,
+    later: int,
+    shapes: tuple[int, int],
+    kept: tuple[Any, ...],
+) -> Layout:
+    """Layout of the states of a plan with so many rows, agents, past states, goals and shapes."""
+    m, dims = lanes(agents), plan.dimensions
+    label = np.int32 if plan.bits == 32 else np.int64
+    pairs = (agents, m) if plan.packets else (1, 1)
+    values, sums = sums_of(plan)
+    beginnings = {
+        "mem": first_memories(plan, np.zeros(m, int), real), "memory": memories(plan, m, real),
+        "values": values, "sums": sums,
+        "store": of_pairs(plan, *pairs, real), "reached": np.full(goals, -1.0, real),
+    }  # fmt: skip
+    columns = sum(map(len, plan.records.values()))
+    gusts = (5 if plan.dryden else 3,)
+    shaped: dict[str, tuple[tuple[int, ...], Any]] = {
+        "held": ((5,), real), "row": ((columns,), real), "whole": ((len(WHOLE),), np.int64), "gust": (gusts, real),
+        "aim": ((4,), real), "counts": ((2,), np.int64), "later": ((later, 8), real),
+        "shapes": ((shapes[0] if later else 0, shapes[1]), real), "work": ((count, m), real),
+        "past": ((ring, 2 * dims, m), real), "words": ((4, m), np.uint32), "near": ((NEAR,), np.int64),
+        "labels": ((2, m), label), "there": ((2,), np.float64),
+    }  # fmt: skip
+    shaped |= {name: (array.shape, array.dtype) for name, array in beginnings.items()}
+    shaped |= {name: (size, real) for name, size in kept}
+    places, end = [], 0
+    for name, (shape, kind) in shaped.items():
+        places.append((name, end, shape, np.dtype(kind)))
+        end += -(-math.prod(shape) * np.dtype(kind).itemsize // LINE) * LINE
+    layout = Layout(tuple(places), np.zeros(end, np.uint8))
+    buffer, arrays = layout.filled()
+    for name, array in beginnings.items():
+        arrays[name][...] = array
+    return Layout(layout.places, buffer.copy())
+
+
+def lanes(agents: int) -> int:
+    """Agents of a row, filled up to whole vectors."""
+    return -(-agents // LANES) * LANES
+
+
+def aligned_zeros(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
+    """Zeros whose rows begin on a cache line."""
+    count = math.prod(shape) * np.dtype(kind).itemsize
+    room = np.zeros(count + LINE, np.uint8)
+    first = -room.ctypes.data % LINE
+    found: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
+    return found

@@ -1,0 +1,154 @@
+"""Standing: what can be read of an open flight: where it stands, who is there, what has happened."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.engine.beginnings import NEVER
+from airflock.engine.course import Course
+from airflock.engine.moments import Window
+from airflock.engine.state import State
+from airflock.errors import FlightError
+from airflock.scenarios.events import Event, agent_number
+from airflock.scenarios.onsets import told
+from airflock.scenarios.scenario import Scenario
+
+
+class Standing:
+    """A flight on its course, to be read."""
+
+    _course: Course
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario in force, with what was changed so far."""
+        return self._course.scenario
+
+    @property
+    def seed(self) -> int:
+        """Seed of the flight."""
+        return self._course.seed
+
+    @property
+    def world(self) -> int:
+        """Which of the independent streams of random numbers of the seed it meets now."""
+        return self._course.world
+
+    @property
+    def precision(self) -> int:
+        """Bits per number."""
+        return self._course.precision
+
+    @property
+    def device(self) -> str:
+        """On what it flies."""
+        return self._course.device
+
+    @property
+    def origin(self) -> tuple[Scenario, int, int, Any]:
+        """What it was opened with: scenario, seed, precision and start."""
+        return self._course.origin
+
+    @property
+    def records(self) -> bool:
+        """Whether it keeps frames."""
+        return self._course.record
+
+    @property
+    def events(self) -> list[Event]:
+        """What was done to it so far, in order."""
+        return self._course.events
+
+    @property
+    def windows(self) -> list[Window]:
+        """Stretches that changes have ended, each with its scenario and scores."""
+        return self._course.windows
+
+    @property
+    def agents(self) -> int:
+        """Number of agents."""
+        return int(self.scenario.agents)
+
+    @property
+    def step(self) -> int:
+        """Number of motion steps flown, which is that of the next one."""
+        return self._course.step
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self._course.time
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight has reached its duration, or has ended at a collision."""
+        return self._course.step >= self._course.steps or self._state.ended
+
+    @property
+    def state(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) of all agents, (component, agent); a copy."""
+        self._course.begin()
+        return self._state.motion
+
+    @property
+    def measured(self) -> NDArray[Any]:
+        """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
+        self._course.begin()
+        names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
+        return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
+
+    @property
+    def sent(self) -> NDArray[Any]:
+        """Over two lossy links: when the newest packet that each agent has of each other was sent, s; nan: none yet."""
+        stamps = self._state.arrays["store"][2 * self._state.plan.dimensions, :, : self.agents].astype(float)
+        return np.where(stamps > NEVER / 10.0, stamps, np.nan)
+
+    @property
+    def _state(self) -> State:
+        """Of the driver in force."""
+        return self._course.state
+
+    @property
+    def frame_times(self) -> NDArray[Any]:
+        """Times of the samples in `frames`, s."""
+        return self._course.frame_times
+
+    @property
+    def frames(self) -> NDArray[Any]:
+        """Samples flown so far, (time, component, agent): positions, velocities, commands. Needs record=True."""
+        if not self.records:
+            raise FlightError(f"{self.scenario.name}: the flight keeps no frames; open it with record=True")
+        return self._course.frames
+
+    @property
+    def decides(self) -> bool:
+        """Whether the agents decide at the next step to be flown."""
+        return self.step % self._state.whole("decide_every") == 0
+
+    @property
+    def commands(self) -> NDArray[Any]:
+        """Commands of all agents as last decided, (component, agent), in the unit of the law's command; a copy."""
+        return self._state.rows([f"c{axis}" for axis in self._state.plan.axes])
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a change waits for its compiler."""
+        return self._course.waiting
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Of each agent whether it is there."""
+        return self._state.present
+
+    @property
+    def faults(self) -> list[dict[str, Any]]:
+        """Faults that have begun: kind, agent, and when they begin and end (s; None: never)."""
+        return told(self._state.tables.due, self.step, self.scenario.flight.dt)
+
+    def _there(self, agent: Any) -> int:
+        """Number of an agent that is there. Raises FlightError in one line."""
+        number = agent_number(agent, self.agents)
+        if not self.present[number]:
+            raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")
+        return number
