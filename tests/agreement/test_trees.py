@@ -95,7 +95,7 @@ def found_of(name):
         del found["64"]
     if no_cuda(plan, one.agents) is None:
         found["kernel"] = trees_of(kernel.flight, plan, shape, builder=CudaBuilder)
-    alone = not (plan.noisy or plan.delayed or plan.lossy or plan.radio.keeps or plan.sequential)
+    alone = not (plan.noisy or plan.delayed or plan.lossy or plan.radio.keeps or plan.sequential or plan.varies("p"))
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
         found["grid"] = trees_of(driver.flight, plan.built(grid=True))
         if plan.start in ("arena", "ball") and not plan.model.flock:

@@ -14,6 +14,7 @@ from airflock.errors import RecordingError
 from airflock.identify.hills import LINKS, intervals, lowest, unpacked
 from airflock.radios import links, table
 
+OF_TABLE = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
 # half of an interval, relative, beyond which a number is not told
 WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}

@@ -2,7 +2,9 @@
 
 from typing import NamedTuple
 
-from airflock.identify.packets import curve_of
+from airflock.identify.hills import LINKS
+from airflock.identify.packets import OF_TABLE, curve_of
+from airflock.radios.table import ENTRIES
 from airflock.scenarios.scenario import Scenario
 
 
@@ -22,7 +24,9 @@ def flight_card(like: Scenario) -> list[Flight]:
     hold = max(4.0 * tau + step / a_max, 2.0)
     repeats = max(8, round(180.0 / (2.0 * hold)))
     cruise = min(step, 10.0)
-    far = curve_of(like.radio).far
+    tabled = like.transceiver.name == "table"
+    far = 0.5 * (ENTRIES - 1) * like.radio.spacing if tabled else curve_of(like.radio).far  # type: ignore[attr-defined]
+    curve = OF_TABLE if tabled else tuple(f"radio.{name}" for name in LINKS)
     return [
         Flight(
             "stand", 120.0,
@@ -40,7 +44,7 @@ def flight_card(like: Scenario) -> list[Flight]:
             "pairs", max(60.0, 2.0 * 2.0 * far / cruise),
             f"two drones from 5 m to {2.0 * far:.0f} m apart and back at {cruise:.0f} m/s; both log "
             "receiver, sender, own time and stamp of every packet",
-            ("radio.delay", "radio.near", "radio.far", "radio.received_near", "radio.received_far"),
+            ("radio.delay", *curve),
         ),
         Flight(
             "flock", 180.0, "the flock flies its law; decisions logged as they are made",

@@ -15,7 +15,6 @@ from airflock.errors import AirflockError, RecordingError
 from airflock.identify import body, packets, periods, sensors
 from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
-from airflock.radios.table import ENTRIES
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
 from airflock.scenarios.files import loaded
@@ -34,9 +33,8 @@ UNITS = {
     "sensors.damping": "1/s", "sensors.scale": "m", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
     "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
-OF_TABLE = [f"radio.received_{n}" for n in range(ENTRIES)]
-HARDER |= dict.fromkeys(OF_TABLE, False)
-UNITS |= dict.fromkeys(OF_TABLE, "1")
+HARDER |= dict.fromkeys(packets.OF_TABLE, False)
+UNITS |= dict.fromkeys(packets.OF_TABLE, "1")
 LEAST = 1e-6  # share of packets; what nothing was heard of
 WIDE = 0.2  # half of an interval of a share of packets, beyond which it says too little
 NEVER = {

@@ -62,13 +62,13 @@ class Sums(NamedTuple):
 
 
 def reach(p):
-    """Largest distance at which another one matters, m."""
-    return max(p.alpha, p.rho)
+    """Largest distance at which another one matters, m; who is farther is not avoided either, whatever alpha is."""
+    return p.rho
 
 
 def interaction_range(p):
     """Radius within which agents count as one group, m."""
-    return max(p.alpha, p.rho)
+    return p.rho
 
 
 def neighbour(dx, dy, dz, r, nhx, nhy, nhz, p):
