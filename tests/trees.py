@@ -58,10 +58,20 @@ def reached(found, first="fly"):
     return {name: found[name] for name in done}
 
 
+def shown(node):
+    """A tree as text, without what is empty: `ast.dump` writes that in one Python and not in the other."""
+    if isinstance(node, list):
+        return f"[{' '.join(map(shown, node))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    given = [(name, value) for name, value in ast.iter_fields(node) if value is not None and value != []]
+    return f"({type(node).__name__} {' '.join(f'{name}={shown(value)}' for name, value in given)})"
+
+
 def digests(text, rows):
     """Digest of the normalised tree of each stage in a driver's text."""
     found = functions(text, rows)
-    return {name: hashlib.sha256(ast.dump(found[name]).encode()).hexdigest()[:12] for name in STAGES if name in found}
+    return {name: hashlib.sha256(shown(found[name]).encode()).hexdigest()[:12] for name in STAGES if name in found}
 
 
 class _Rows(ast.NodeTransformer):
@@ -163,7 +173,7 @@ class _Lift(ast.NodeTransformer):
 
     def visit_Assign(self, node):
         if _binds(node):
-            self.found[ast.dump(node.value) + ast.unparse(node)] = node
+            self.found[shown(node.value) + ast.unparse(node)] = node
             return None
         return node
 
