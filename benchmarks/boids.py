@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numba
 
 from airflock.engine import cpu, plan_of
-from airflock.engine.passes.slots import EVERY
+from airflock.engine.stages.flight import EVERY
 from airflock.engine.tables import tables
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario

@@ -24,9 +24,9 @@ from c_reference import Reference
 from trial import Trial
 
 from airflock.engine import fly, score_flight, score_flights, vectors
-from airflock.engine.cpu import cores
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.threads import cores
 
 PRESET = "vasarhelyi_2018/4ms"
 SEEDS = (1, 2, 3)  # flights of one round on one thread

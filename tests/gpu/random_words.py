@@ -3,13 +3,16 @@
 import json
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 from numba import cuda
 
-from airflock.core import random
-from airflock.rules.generate import Source
-from inside import Shape, head, load_driver
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from airflock.core import random  # noqa: E402
+from airflock.rules.generate import Source  # noqa: E402
+from inside import Shape, head, load_driver  # noqa: E402
 
 LOOP = """
 @cuda.jit()
