@@ -90,20 +90,26 @@ def crowd(world, side):
     })  # fmt: skip
 
 
+def both(found, seed, start=None):
+    """Final states by all pairs, interpreted, and by cells, compiled."""
+    flown = []
+    for grid, device in ((False, "python"), (True, "cpu")):
+        plan = plan_of(found, precision=64, grid=grid, given_start=start is not None)
+        assert plan.grid == grid
+        flown.append(cpu.fly(plan, tables(found, plan, seed), start, device).state)
+    return flown
+
+
 @pytest.mark.parametrize("world", ["bounce", "periodic"])
 @pytest.mark.parametrize("side", [1.3, 3.0])
 def test_grid_is_all_pairs(world, side, seed):
-    found = crowd(world, side)
-    pairs, cells = (plan_of(found, precision=64, grid=grid) for grid in (False, True))
-    one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
+    one, two = both(crowd(world, side), seed)
     assert np.abs(one[3:]).max() > 0.0
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
 
 
 def test_grid_is_all_pairs_in_a_plane_of_many_lines(seed):
-    found = load("vicsek_1995/transition", {"agents": 500, "world.side": 21.0, "duration": 4.0})
-    pairs, cells = (plan_of(found, precision=64, grid=grid) for grid in (False, True))
-    one, two = (cpu.fly(plan, tables(found, plan, seed)).state for plan in (pairs, cells))
+    one, two = both(load("vicsek_1995/transition", {"agents": 500, "world.side": 21.0, "duration": 4.0}), seed)
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-10)
 
 
@@ -121,8 +127,7 @@ def test_a_flock_along_a_line_or_in_a_plane_is_met_in_full(shape, seed):
     place = rng.uniform(-0.5, 0.5, (300, 3)) * STRETCHED[shape]
     place[1::2] = place[::2] + rng.normal(0.0, 0.1, (150, 3))  # everybody has company
     start = np.concatenate([place.T, rng.normal(0.0, 0.1, (3, 300))])
-    plans = (plan_of(found, precision=64, grid=grid, given_start=True) for grid in (False, True))
-    one, two = (cpu.fly(plan, tables(found, plan, seed), start).state for plan in plans)
+    one, two = both(found, seed, start)
     assert np.abs(one[:3] - start[:3]).max() > 1e-3
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12 * STRETCHED[shape][0])
 
