@@ -32,7 +32,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
             content, format=ending[1:], dpi=resolution, metadata=DATES.get(ending, {}),
             facecolor=figure.get_facecolor(), bbox_inches="tight", pad_inches=0.08,
         )  # fmt: skip
-        temporary.write_bytes(content.getbuffer())
+        temporary.write_bytes(content.getvalue())  # no buffer of it: Python 3.12 crashes where an error holds one
     return Path(path)
 
 

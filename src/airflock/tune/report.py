@@ -47,7 +47,7 @@ def save(found: "Tuned") -> None:
     with PdfPages(content, metadata={"CreationDate": None}) as pdf:
         for figure in figures.values():
             pdf.savefig(figure, bbox_inches="tight")
-    atomic.write(found.folder / FIGURES, content.getbuffer())
+    atomic.write(found.folder / FIGURES, content.getvalue())
 
 
 def _figures(found: "Tuned") -> dict[str, Figure]:
