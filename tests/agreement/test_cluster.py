@@ -132,7 +132,7 @@ def test_schedulers_that_do_not_answer_are_one_line():
 
 def test_workers_with_different_processors_are_named(cluster, monkeypatch):
     executor = Cluster(tasks_of(toys.study()), cluster.scheduler_address)
-    monkeypatch.setattr(executor.client, "run", lambda _: {"a": "Epyc", "b": "Xeon"})
+    monkeypatch.setattr(executor.client, "run", lambda _, **_given: {"a": "Epyc", "b": "Xeon"})
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         executor._warn_of_mixed_processors()
