@@ -458,11 +458,20 @@ def test_a_group_measures_by_numbers_of_its_own():
     assert alone.errs and not alone.unerring.errs
 
 
+@pytest.mark.parametrize(("agents", "few"), [(4, 1), (7, 1), (30, 6), (100, 20)])
+def test_a_group_may_be_a_share_of_any_flock(agents, few):
+    keys = {"agents": agents, "start.separation": 0.0, "groups": [{"name": "few", "agents": "20 %"}, {"name": "rest"}]}
+    sizes = {group.name: len(group.agents) for group in load(PAPER, keys).groups}
+    assert sizes == {"few": few, "rest": agents - few}
+
+
 @pytest.mark.parametrize(
     ("groups", "said"),
     [
-        ([{"agents": float("inf")}], "groups.0..agents = inf is neither a list of agents nor a number of them"),
-        ([{"agents": 101}], "is neither a list of agents nor a number of them up to 100"),
+        ([{"agents": float("inf")}], "groups.0..agents = inf is neither a list of agents"),
+        ([{"agents": "0 %"}], "groups.0..agents = '0 %' is neither a list of agents, a share such as '20 %', nor"),
+        ([{"agents": "120%"}, {}], "groups.0..agents = '120%' is neither a list of agents"),
+        ([{"agents": 101}], "is neither a list of agents, a share such as .20 %., nor a number of them up to 100"),
         ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
         ([{"agents": [100]}], "there is no agent 100"),
         ([{"agents": 60}, {"agents": 60}], "up to 40, as many as are left of 100"),

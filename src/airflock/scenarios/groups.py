@@ -1,6 +1,7 @@
 """The groups of a scenario file: agents that share numbers or a law, and how far each agent is off these numbers."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from inspect import signature
@@ -18,6 +19,7 @@ LETTERS = {
     "sensors": "s",
 }  # sections of which numbers may differ, and what drivers call them
 KEYS = ("name", "agents", *LETTERS)
+SHARE = re.compile(r"\s*([0-9]{1,3}(?:\.[0-9]{1,6})?)\s*%\s*")  # of a flock
 ONE = {"body": "one body carries all", "sensors": "all measure by one sensor"}
 
 
@@ -52,6 +54,14 @@ def members(where: str, given: Any, agents: int) -> tuple[tuple[int, ...] | None
     if wrong:
         return None, [f"{where}: there is no agent {wrong[0]}; this flock has the agents 0 to {agents - 1}"]
     return tuple(sorted(set(given))), []
+
+
+def counted(given: Any, agents: int) -> Any:
+    """A number of agents out of a share of the flock such as "20 %", at least one; anything else as it is."""
+    share = SHARE.fullmatch(given) if isinstance(given, str) else None
+    if share is None or not 0.0 < float(share[1]) <= 100.0:
+        return given
+    return max(1, round(float(share[1]) / 100.0 * agents))
 
 
 def groups_of(
@@ -107,15 +117,15 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
     left = [agent for agent in range(agents) if agent not in taken]
     rest = []
     for number, table in enumerate(given):
-        count = table.get("agents")
+        count = counted(table.get("agents"), agents)
         if count is None:
             rest.append(number)
         elif not isinstance(count, (list, tuple)):
             whole = isinstance(count, (int, float)) and not isinstance(count, bool) and count % 1 == 0
             if not whole or not 1 <= count <= len(left):
                 faults.append(
-                    f"groups[{number}].agents = {count!r} is neither a list of agents nor a number of them up to "
-                    f"{len(left)}, as many as are left of {agents}"
+                    f"groups[{number}].agents = {count!r} is neither a list of agents, a share such as '20 %', nor a "
+                    f"number of them up to {len(left)}, as many as are left of {agents}"
                 )
                 continue
             found[number], left = tuple(left[: int(count)]), left[int(count) :]

@@ -36,7 +36,9 @@ WHOLE_KEYS: Mapping[str, Mapping[str, Whole]] = {
     },
     "groups": {
         "name": Whole("text", "of the group"),
-        "agents": Whole("list", "numbers of its agents, or how many; left out, all who are in no other group"),
+        "agents": Whole(
+            "list", 'numbers of its agents, how many, or a share ("20 %"); left out, all who are in no other group'
+        ),
         "model": Whole("table", "kind, choices, numbers of its law; { value, spread } for a tolerance"),
         "body": Whole("table", "numbers of the body that its agents have; { value, spread } for a tolerance"),
         "sensors": Whole("table", "numbers of the sensor that its agents have; likewise"),
