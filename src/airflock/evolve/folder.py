@@ -6,14 +6,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
-from airflock import atomic
+from airflock import __version__, atomic
 from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.study import same_or_refuse
 from airflock.machine import processor
 
 STUDY = "study.toml"
-PACKAGES = ("airflock", "numpy", "numba", "cma", "pymoo")
+PACKAGES = ("numpy", "numba", "cma", "pymoo")
 
 
 class Documented(Protocol):
@@ -103,7 +103,7 @@ def plain(value: Any) -> Any:
 
 def versions() -> dict[str, str]:
     """Versions that the last bits of a study depend on, and the processor."""
-    found = {"python": platform.python_version(), "cpu": processor()}
+    found = {"python": platform.python_version(), "cpu": processor(), "airflock": __version__}
     for name in PACKAGES:
         try:
             found[name] = version(name)
