@@ -61,6 +61,20 @@ def test_an_instant_in_flight_is_scored_as_in_its_recording():
     assert scores["present"] < 1.0
 
 
+@pytest.mark.parametrize(("gone", "apart"), [(10, 30.0), (0, 30.0), (0, 4.0)])
+def test_a_flight_that_ends_at_a_collision_counts_that_instant(gone, apart):
+    """Two fly into each other, the third leaves at a step; with 4 m between the two it ends where it begins."""
+    stops = {"metrics.stop": "collision", "metrics.r_coll": 5.0, "sensors.noise": 0.0, **SMALL, **OPEN, "agents": 3}
+    leaves = [{"kind": "fails", "agents": [2], "at": 0.02 * gone}]
+    scenario = load(PAPER, stops | {"dt": 0.02, "body.noise": 0.0, "model.p_rep": 0.0, "faults": leaves})
+    start = np.array([[0.0, apart, 0.0], [0.0, 0.0, 900.0], [4.0, -4.0, 0.0], [0.0, 0.0, 0.0]])
+    flight = airflock.open(scenario, 1, start=start, device="python", record=True)
+    there = flight.finish()["present"]
+    instants = flight.step + 1  # 0 to the one of the collision
+    assert flight.time < 6.0 and (apart > 5.0 or instants == 1)
+    assert there == pytest.approx((3 * gone + 2 * (instants - gone)) / (3 * instants), rel=1e-12)
+
+
 @pytest.mark.parametrize("name", [*sorted(presets()), "lossy"])
 def test_every_preset_flies_with_agents_that_come_and_go(name):
     keys = {"radio.loss": 0.5} if name == "lossy" else {}

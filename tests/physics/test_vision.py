@@ -94,6 +94,13 @@ def test_gains_of_a_long_silence_believe_the_picture_alone():
     assert (lasts(2.1, k), lasts(2.11, k)) == (1.0, 0.0)
 
 
+def test_after_a_clock_was_put_back_everybody_is_seen_anew():
+    """Found by a draw: the gains of a picture from before the last one grew without bound."""
+    k = Parameters(bearing_sd=0.0, range_sd=0.0, smoothing=0.001)
+    found = see(3.0, 4.0, 0.0, 50.0, 50.0, 0.0, 9.0, 9.0, 0.0, 1.0, 2.0, 0.0, -0.5, 0.0, 0.0, 0.0, k)
+    assert found == (3.0, 4.0, 0.0, 1.0, 2.0, 0.0)
+
+
 def test_errors_of_the_own_position_do_not_come_between_two_who_see_each_other(seed):
     """A receiver that is 40 m off; what it makes of the others stays where they are, seen from it."""
     gnss = {"sensors.kind": "gnss", "sensors.bias": 40.0, "sensors.sd": 3.0}

@@ -138,8 +138,9 @@ class State:
         )
         if kept is not None:
             self.arrays["sums"][:] = kept
-        if self.plan.absence and done > first and not half & 2:
-            self.arrays["there"] += np.array([self.here, self.agents]) * (done - first)
+        if self.plan.absence and not half & 2:
+            instants = max(done - first, 0) + int(self.ended)  # that of a collision, too, at which the flight ends
+            self.arrays["there"] += np.array([self.here, self.agents]) * instants
         return done
 
     @property

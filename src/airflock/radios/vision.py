@@ -84,7 +84,7 @@ def receive(dx, dy, dz, vx, vy, clear, u0, packet, k):
 
 def gains(since, smoothing):
     """Shares of a surprise that correct a position (1) and a velocity (1/s), this long (s) after the last picture."""
-    kept = math.exp(-since / smoothing)
+    kept = math.exp(-max(since, 0.0) / smoothing)
     return 1.0 - kept * kept, (1.0 - kept) * (1.0 - kept) / max(since, 1e-6)
 
 
@@ -92,7 +92,7 @@ def see(dx, dy, dz, ex, ey, ez, evx, evy, evz, vx, vy, vz, since, g0, g1, g2, k)
     """Offset (m) and velocity (m/s) at which a neighbour is believed after a picture.
 
     Of two axes across the line of sight the first is horizontal. Who is seen for the first time, or again after `hold`,
-    is believed to fly as the observer does.
+    is believed to fly as the observer does; so is everybody after the observer's clock was put back.
     """
     level = math.sqrt(dx * dx + dy * dy)
     r = math.sqrt(level * level + dz * dz)
@@ -107,7 +107,7 @@ def see(dx, dy, dz, ex, ey, ez, evx, evy, evz, vx, vy, vz, since, g0, g1, g2, k)
     mx = size * (dx + one * ax - two * uz * ay)
     my = size * (dy + one * ay + two * uz * ax)
     mz = size * (dz + two * (ux * ay - uy * ax))
-    anew = since > k.hold + EARLY
+    anew = (since > k.hold + EARLY) | (since < 0.0)
     g, h = gains(since, k.smoothing)
     x = mx if anew else ex + g * (mx - ex)
     y = my if anew else ey + g * (my - ey)

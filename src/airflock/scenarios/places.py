@@ -10,6 +10,7 @@ from airflock.errors import SceneError
 from airflock.scenarios.scenario import Scenario
 from airflock.scenes.build import Scene, clearance, in_mesh, scene_of
 from airflock.world import scenery, start
+from airflock.world.edges import wrap
 from airflock.world.place import half_sizes
 
 CROWDED = 0.9  # share of a start region inside obstacles that is worth a word; less is redrawn in silence
@@ -74,8 +75,8 @@ def start_in_box(scenario: Scenario, given: NDArray[Any]) -> NDArray[Any]:
         return given
     put = given.copy()
     for axis, half in enumerate(half_sizes(scenario.world)[: scenario.dimensions]):
-        beyond = np.abs(given[axis]) > half
-        put[axis, beyond] -= 2.0 * half * np.floor((given[axis, beyond] + half) / (2.0 * half))
+        for agent in np.flatnonzero(np.abs(given[axis]) > half):
+            put[axis, agent], _ = wrap(float(given[axis, agent]), 0.0, half)
     return put
 
 
