@@ -7,6 +7,7 @@ in software the ether tells, too, who hears whom and which faults hold; real rad
 from collections import deque
 from typing import NamedTuple
 
+from airflock.core.radio import forward
 from airflock.errors import LinkError
 from airflock.fleet.teller import NUMBERS
 from airflock.mavlink import orders, status, witness
@@ -138,7 +139,7 @@ class Observer:
         if peer.state is None:
             return None
         s, ahead = peer.state, min(max(now - peer.at, 0.0), FRESH)
-        return s.x + s.vx * ahead, s.y + s.vy * ahead, s.z + s.vz * ahead
+        return forward(*s, ahead)
 
     def links(self, now: float) -> dict[tuple[int, int], bool]:
         """Pairs of members between whom packets arrive, and whether they do so both ways; nothing of real radios."""
