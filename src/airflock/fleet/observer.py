@@ -139,7 +139,8 @@ class Observer:
         if peer.state is None:
             return None
         s, ahead = peer.state, min(max(now - peer.at, 0.0), FRESH)
-        return forward(*s, ahead)
+        x, y, z = forward(*s, ahead)
+        return x, y, z
 
     def links(self, now: float) -> dict[tuple[int, int], bool]:
         """Pairs of members between whom packets arrive, and whether they do so both ways; nothing of real radios."""
