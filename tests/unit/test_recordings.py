@@ -1,5 +1,6 @@
 """Recordings: layout, scores of flights and logs, and what is refused."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import xarray as xr
 
 import airflock
-from airflock.errors import RecordingError
+from airflock.errors import AirflockError, RecordingError
 from airflock.recordings.attributes import name_of
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.scores import measure, over_time
@@ -118,6 +119,22 @@ def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flow
         fly_again(again)
     assert fly_again(again, law=tmp_path / "sub" / "mine.py") == (True, [])
     assert scenario.document["model"]["kind"] == "mine.py"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [{"faults": 5}, {"groups": 7}, {"groups": [3, "four"]}, {"groups": [{"model": 1}]}],
+    ids=str,
+)
+def test_a_damaged_scenario_in_a_recording_is_refused_in_lines_of_its_own(damage):
+    """Fuzzed recording 9338 of seed 2 had a number in place of its list of faults, and ended in a TypeError."""
+    short = airflock.load("vasarhelyi_2018/4ms", {"agents": 3, "duration": 1.0})
+    flight = airflock.simulate(short, 1, device="python")
+    told = json.loads(flight.attrs["airflock_scenario"])
+    broken = flight.assign_attrs(airflock_scenario=json.dumps(told | damage))
+    with pytest.raises(AirflockError) as refused:
+        airflock.score(broken)
+    assert refused.value.__cause__ is None
 
 
 def test_one_agent_has_no_nearest_neighbour():

@@ -105,17 +105,23 @@ def flown_with_own_law(recording: xr.Dataset) -> bool:
     document = scenario_document(recording)
     if document is None:
         return False
-    kind, faults = document.get("model", {}).get("kind"), document.get("faults", [])
-    own = [entry for entry in faults if isinstance(entry, Mapping) and entry.get("kind") not in KINDS]
-    return LAW in recording.attrs or kind not in MODELS or bool(own or own_laws_of_groups(document))
+    laws = [str(law.get("kind")) for law in tables_of(document, "model")] or [""]
+    faults = [str(fault.get("kind")) for fault in tables_of(document, "faults")]
+    own = any(kind not in MODELS for kind in laws) or any(kind not in KINDS for kind in faults)
+    return LAW in recording.attrs or own or bool(own_laws_of_groups(document))
 
 
 def own_laws_of_groups(document: Mapping[str, Any]) -> list[str]:
     """Names of laws of groups that were the user's own."""
-    groups = document.get("groups", ())
-    tables = [group.get("model", {}) for group in groups if isinstance(group, Mapping)]
-    kinds = [table.get("kind") for table in tables if isinstance(table, Mapping)]
-    return [str(kind) for kind in kinds if kind is not None and kind not in MODELS]
+    laws = [law for group in tables_of(document, "groups") for law in tables_of(group, "model")]
+    return [kind for kind in (str(law["kind"]) for law in laws if "kind" in law) if kind not in MODELS]
+
+
+def tables_of(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:
+    """Tables under a key of a scenario that nobody has checked yet: one, those of a list, or none."""
+    found = document.get(key)
+    entries = found if isinstance(found, list) else [found]
+    return [entry for entry in entries if isinstance(entry, Mapping)]
 
 
 def checksum(recording: xr.Dataset) -> str:

@@ -263,8 +263,10 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
     stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
     if isinstance(document.get("groups"), list):  # who is in which is told even where nobody knows how they fly
-        told = [{key: group[key] for key in ("name", "agents") if key in group} for group in document["groups"]]
-        stand_in["groups"] = told
+        stand_in["groups"] = [
+            {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
+            for group in document["groups"]
+        ]
     return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
 
 
