@@ -52,7 +52,7 @@ PAIRS = [
     (("local_density", "phi_coll", "n_coll"), (loose, 5.0 * alike), (loose * 0.15, 5.0 * alike)),
     (("n_min", "n_groups", "share_largest", "extension_groups_cm"), (halves, 5.0 * alike), (loose * 0.6, 5.0 * alike)),
     (("n_disc", "share_alone"), (loose * 0.6, 5.0 * alike), (alone, 5.0 * alike)),
-    (("phi_wall",), (loose, 5.0 * alike), (loose + 35.0, 5.0 * alike)),
+    (("phi_wall", "clearance"), (loose, 5.0 * alike), (loose + 35.0, 5.0 * alike)),
     (("phi_lap", "phi_lap_abs"), (beside, north), (beside, east)),
     (("milling",), (round_, 5.0 * alike), (round_, 5.0 * along)),
     (("elongation",), (round_, 5.0 * alike), (round_ * (1.5, 0.25), 5.0 * alike)),

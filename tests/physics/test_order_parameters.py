@@ -88,6 +88,19 @@ def test_an_agent_inside_an_obstacle_is_out_by_its_depth():
     assert found["phi_wall"] == pytest.approx(2.0)
 
 
+def test_clearance_is_the_least_distance_to_walls_and_obstacles_over_time():
+    """The arena's walls at 50 m; the second island ends 2 m from (16, 10); nothing stands in an open field."""
+    near, far = (0.0, 46.5, 1.0, 0.0), (5.0, -20.0, 1.0, 0.0)
+    assert measured(flock(), film([far, near], [far, far]))["clearance"] == pytest.approx(3.5)
+    outside = measured(flock(), film([far, near], [far, (0.0, -54.0, 1.0, 0.0)]))
+    assert outside["clearance"] == pytest.approx(-4.0) and outside["phi_wall"] == pytest.approx(4.0)
+    island = flock(world__obstacles=ISLANDS)
+    assert measured(island, instant(far, (16.0, 10.0, 1.0, 0.0)))["clearance"] == pytest.approx(-2.0)
+    assert measured(island, instant(far, (16.0, 5.0, 1.0, 0.0)))["clearance"] == pytest.approx(3.0)
+    nothing = flock(world__arena="none", world__walls="every_edge", start__kind="ball", start__radius=5.0)
+    assert math.isnan(measured(nothing, instant(near, far))["clearance"])
+
+
 def test_rotation_has_the_sign_of_its_direction():
     def ring(turn):
         # a flock that stays in one place of a circle flies tangentially; phi_LAP takes the centre of mass

@@ -109,6 +109,23 @@ def test_agents_brake_earlier_where_they_touch_walls_and_that_helps(monkeypatch)
     assert found[0].contacts == 1.0 and found[-1].contacts < 0.1
 
 
+def test_walls_come_first_where_their_limit_is_short_though_nobody_touched_one(monkeypatch):
+    """Clearance is 4 +- 2 m: a contact in some 45 flights, and the limit allows one in 100 of a reserve of ten."""
+
+    def score(p, chance):
+        room = 4.0 + 0.8 * p.r0_shill + 2.0 * min(abs(chance), 1.9) * (1.0 if chance > 0.0 else -1.0)
+        return {
+            "fitness": 0.9, "r_min": 30.0 + p.p_rep + 0.01 * chance, "n_coll": 0.0, "f_wall": 1.0, "phi_wall": 0.0,
+            "clearance": room, "f_coll": 1.0,
+        }  # fmt: skip
+
+    flown_by(monkeypatch, score)
+    limits = ["r_min<3 at 1%", "clearance<0 at 1%"]
+    found = harden.harden(load("vasarhelyi_2018/6ms", {"model.r0_shill": 0.0}), range(40), limit=limits)
+    assert found[0].contacts == 0.0 and found[1].name == "v_shill down, r0_shill up" and found[1].kept
+    assert found[-1].clearance > found[0].clearance + 4.0  # three steps of 3 m at 0.8 m a metre
+
+
 def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):
     """On the seeds of the steps all is well; on those after them more repulsion makes agents collide."""
     lucky = {np.random.default_rng(seed).normal() for seed in range(20)}

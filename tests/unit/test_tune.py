@@ -148,7 +148,7 @@ def test_the_report_plays_the_worst_flights_and_tells_the_card_of_the_next(done)
 
 
 def test_limits_are_by_default_on_collisions_and_where_there_are_walls_on_contacts():
-    assert usual_limits(make(MINE, "mine")) == ["r_min<3 at 0.01/h", "phi_wall>0 at 0.01/h"]
+    assert usual_limits(make(MINE, "mine")) == ["r_min<3 at 0.01/h", "clearance<0 at 0.01/h"]
     assert usual_limits(make({**MINE, "world": {"arena": "none"}, "start": {"kind": "ball"}}, "mine")) == [
         "r_min<3 at 0.01/h"
     ]

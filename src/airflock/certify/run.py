@@ -55,7 +55,7 @@ def certify(
     scenario : Scenario, str or path
         What is flown.
     limit : str or list of str
-        "r_min<1 at 1e-3/h", "n_coll>=1 at 1e-2/drone-h", "phi_wall>0 at 1%", "phi_vel>=3 in 99%"; without a rate the
+        "r_min<1 at 1e-3/h", "n_coll>=1 at 1e-2/drone-h", "clearance<0 at 1%", "phi_vel>=3 in 99%"; without a rate the
         event is bounded as well as the flights allow. All limits hold together.
     confidence : float
         Of all that is shown, in (0, 1).

@@ -22,7 +22,7 @@ Limits = Annotated[
     list[str] | None,
     typer.Option(
         "--limit", "-l", metavar="LIMIT", show_default=False,
-        help="'r_min<1 at 1e-3/h' (per flock hour), '.../drone-h', 'phi_wall>0 at 1%' (of flights), "
+        help="'r_min<1 at 1e-3/h' (per flock hour), '.../drone-h', 'clearance<0 at 1%' (of flights: a contact), "
         "'phi_vel>=3 in 99%'; without a rate: bound it. Repeatable; all hold together.",
     ),
 ]  # fmt: skip

@@ -140,15 +140,27 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
     from rich.table import Table
 
     table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
-    for column in ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)", "n_coll", "f_wall", "contacts", ""):
+    for column in (
+        "step",
+        "fitness",
+        "cost (95 %)",
+        "r_min, m",
+        "gain, m (95 %)",
+        "n_coll",
+        "f_wall",
+        "contacts",
+        "clearance, m",
+        "",
+    ):
         table.add_column(column, justify="left" if column in ("step", "") else "right")
     for step in steps:
         cost, gain = (f"{m:.3g} ({low:.3g} … {high:.3g})" for m, low, high in (step.cost, step.gain))
         first = step is steps[0]
         walls = f"{step.parts['f_wall']:.3g}" if "f_wall" in step.parts else ""
         contacts = f"{100.0 * step.contacts:.0f} %" if step.contacts == step.contacts else ""
+        room = f"{step.clearance:.3g}" if step.clearance == step.clearance else ""
         table.add_row(
             step.name, f"{step.fitness:.4f}", "" if first else cost, f"{step.r_min:.3g}", "" if first else gain,
-            f"{step.n_coll:.3g}", walls, contacts, step.verdict,
+            f"{step.n_coll:.3g}", walls, contacts, room, step.verdict,
         )  # fmt: skip
     Console().print(table)

@@ -36,6 +36,7 @@ from airflock.scenarios.scenario import Scenario
 SAFETY = ("f_coll", "f_disc", "f_cluster", "f_wall")  # partial fitnesses that are constraints; the others are its price
 SLACK = 0.02  # by which the mean of one may fall, and the share of flights with a contact may rise
 COST = 0.05  # of fitness, at most
+WALLS = ("clearance", "phi_wall", "n_contacts")  # scores of what flies into walls and obstacles
 RESERVE = Search().reserve  # how many times rarer than allowed an event is to look, as in a search
 
 
@@ -101,7 +102,8 @@ def harden(
     hit = float((together(trial.optimum)["n_coll"] > 0.0).mean())
     touched = trial.touches()
     order = [*steps, *ROOM] if touched else list(steps)
-    if trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0):
+    at_walls = trial.first.contacts > hit or trial.first.parts.get("f_wall", 1.0) < trial.first.parts.get("f_coll", 1.0)
+    if at_walls or trial.short_at_walls():
         order.sort(key=lambda step: not step.earlier)
     for step in order:
         found += trial.tried(step)
@@ -142,8 +144,16 @@ class _Trial:
         return [flown(each, [parameters], seeds, self.threads, self.done)[0] for each in self.scenarios]
 
     def touches(self) -> bool:
-        """Whether agents touch walls or obstacles in some flight of what was kept so far."""
-        return any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
+        """Whether what was kept so far touches walls or obstacles in some flight, or more often than a limit allows."""
+        walls = [limit for limit in self.limits if limit.score in WALLS]
+        seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
+        return seen or self._excess(self.table, walls) > 0.0
+
+    def short_at_walls(self) -> bool:
+        """Whether limits of walls and obstacles are farther from being kept than the others."""
+        walls = [limit for limit in self.limits if limit.score in WALLS]
+        others = [limit for limit in self.limits if limit not in walls]
+        return self._excess(self.table, walls) > self._excess(self.table, others)
 
     def tried(self, step: Step) -> list[Measured]:
         """The step and, where it breaks something or costs too much, half of it."""
@@ -155,7 +165,7 @@ class _Trial:
             self.seen.append(parameters)
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
-            gains = _gains(together(self.table), together(table)) or self._excess(table) < self._excess(self.table)
+            gains = _gains(together(self.table), together(table)) or self._short(table) < self._short(self.table)
             verdict = broken or ("kept" if gains else "undone: gains neither distance nor room at walls")
             kept = verdict == "kept"
             named = replace(step, name=name)
@@ -192,7 +202,7 @@ class _Trial:
         for scenario, was, now in zip(self.scenarios, before, after, strict=True):
             if found := _broken(was, now) or self._limit_broken(scenario, was, now):
                 return f"{found}, in {scenario.name}" if len(self.scenarios) > 1 else found
-        if self._excess(after) < self._excess(before):
+        if self._short(after) < self._short(before):
             return ""
         price = float((together(before)["fitness"] - together(after)["fitness"]).mean())
         return f"undone: costs {price:.3g} of fitness, more than {self.cost:g}" if price > self.cost else ""
@@ -206,10 +216,13 @@ class _Trial:
                 return f"undone: {limit.event} in about {now:.2g} of flights, before {was:.2g}; allowed are {most:.2g}"
         return ""
 
-    def _excess(self, tables: Sequence[Table]) -> float:
+    def _short(self, tables: Sequence[Table]) -> float:
         """How far flights are from keeping all limits in all scenarios; 0: they keep them."""
+        return self._excess(tables, self.limits)
+
+    def _excess(self, tables: Sequence[Table], limits: Sequence[Limit]) -> float:
         return math.fsum(
-            float(excess(self.limits, scenario, [_rows(table)], RESERVE)[0])
+            float(excess(limits, scenario, [_rows(table)], RESERVE)[0])
             for scenario, table in zip(self.scenarios, tables, strict=True)
         )
 
@@ -244,13 +257,15 @@ def _broken(before: Table, after: Table) -> str:
 
 
 def _gains(before: Table, after: Table) -> bool:
-    """Whether distances grew or excursions shrank, both with 95 % confidence."""
+    """Whether distances or clearances grew or excursions shrank, each with 95 % confidence."""
     wider = interval((after["r_min"] - before["r_min"]).tolist())[2] > 0.0
     if "phi_wall" not in before:
         return wider
     fewer = 1.0 * (before["phi_wall"] > 0.0) - 1.0 * (after["phi_wall"] > 0.0)
-    smaller = before["phi_wall"] - after["phi_wall"]
-    return wider or any(interval(change.tolist())[2] > 0.0 for change in (smaller, fewer))
+    changes = [fewer, before["phi_wall"] - after["phi_wall"]]
+    if "clearance" in before:
+        changes.append(after["clearance"] - before["clearance"])
+    return wider or any(interval(change.tolist())[2] > 0.0 for change in changes)
 
 
 def document(scenario: Scenario, step: Measured) -> dict[str, Any]:

@@ -53,6 +53,7 @@ class Measured:
     cost, gain : fitness lost and smallest distance won (m) against the first step: mean, and 95 % interval
     parts    : mean of each partial fitness
     contacts : share of flights in which somebody left the arena or entered an obstacle; nan where nobody looked
+    clearance : mean over seeds of the smallest distance to walls and obstacles, m; nan where nobody looked
     kept     : whether the step stays; verdict: why, or why not
     """
 
@@ -66,6 +67,7 @@ class Measured:
     gain: tuple[float, float, float]
     parts: Mapping[str, float] = field(default_factory=dict)
     contacts: float = math.nan
+    clearance: float = math.nan
     kept: bool = True
     verdict: str = ""
 
@@ -82,6 +84,7 @@ class Measured:
             "gain": list(self.gain),
             "parts": dict(self.parts),
             "contacts": self.contacts,
+            "clearance": self.clearance,
             "kept": self.kept,
             "verdict": self.verdict,
         }
@@ -166,6 +169,7 @@ def against(
     won, _, least, most = interval((after["r_min"] - before["r_min"]).tolist())
     parts = {name: float(values.mean()) for name, values in after.items() if name.startswith("f_")}
     contacts = float((after["phi_wall"] > 0.0).mean()) if "phi_wall" in after else math.nan
+    room = float(after["clearance"].mean()) if "clearance" in after else math.nan
     fitness, near, hits = (float(after[name].mean()) for name in ("fitness", "r_min", "n_coll"))
     cost, gain = (mean, low, high), (won, least, most)
-    return Measured(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts)
+    return Measured(step.name, step.reason, parameters, fitness, near, hits, cost, gain, parts, contacts, room)

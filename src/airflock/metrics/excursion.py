@@ -1,36 +1,53 @@
-"""Excursion beyond walls and into obstacles (Vásárhelyi et al. 2018, Eq. 15): mean over those out; 0 if nobody is."""
+"""Excursion beyond walls and into obstacles (Vásárhelyi et al. 2018, Eq. 15), and clearance, the room that is left.
 
+phi_wall is the mean over those outside, and 0 if nobody is: it tells nothing of flights that stayed inside. The
+smallest clearance tells how near the nearest of them came; it is below 0 where somebody was outside.
+"""
+
+import math
 from typing import NamedTuple
 
-REPORTS = {"phi_wall": ("m", "mean excursion of those outside")}
+from airflock.core.maths import FAR
 
-OVER_TIME = {"out": "sum", "outside": "sum"}
+REPORTS = {
+    "phi_wall": ("m", "mean excursion of those outside"),
+    "clearance": ("m", "smallest distance to walls and obstacles; below 0: outside"),
+}
+
+REDUCE = {"clearance": "min"}
+OVER_TIME = {"out": "sum", "outside": "sum", "clearance": "min"}
 
 
 class Agent(NamedTuple):
-    """Distance outside, m; 1.0 if outside."""
+    """Distance outside, m; 1.0 if outside; distance to the nearest wall or obstacle, m."""
 
     out: float
     outside: float
+    clearance: float
 
 
 class Sample(NamedTuple):
-    """Sum of the distances outside, m; number of agents outside."""
+    """Sum of the distances outside, m; number of agents outside; smallest clearance, m."""
 
     out: float
     outside: float
+    clearance: float
 
 
 def agent(excursion):
-    """Distance outside (m) of one agent."""
-    return Agent(max(excursion, 0.0), 1.0 if excursion > 0.0 else 0.0)
+    """Distance outside (m) of one agent, and its clearance (m)."""
+    return Agent(max(excursion, 0.0), 1.0 if excursion > 0.0 else 0.0, -excursion)
 
 
 def sample(agents):
-    """Numerator and denominator of Eq. 15 at one instant."""
-    return Sample(agents.out, agents.outside)
+    """Numerator and denominator of Eq. 15 at one instant, and the smallest clearance."""
+    return Sample(agents.out, agents.outside, agents.clearance)
 
 
 def total(over_time):
-    """phi_wall, m, from the sums over time."""
-    return {"phi_wall": over_time["out"] / over_time["outside"] if over_time["outside"] > 0.0 else 0.0}
+    """phi_wall and clearance, m, from the sums and the least over time; nan where nothing stands."""
+    outside, clearance = over_time["outside"], over_time["clearance"]
+    return {
+        "phi_wall": over_time["out"] / outside if outside > 0.0 else 0.0,
+        "clearance": clearance if clearance < 0.5 * math.sqrt(FAR) else math.nan,
+    }

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 
 from airflock.core.parameters import Quantity, declarations
 from airflock.errors import AirflockError
+from airflock.metrics.registry import METRICS
 from airflock.plots import style
 from airflock.plots.scene import name_of
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 
-UNITS = {"phi_vel": "m/s", "r_min_mean": "m", "r_min": "m", "phi_wall": "m"}
+UNITS = {name: unit or "1" for metric in METRICS.values() for name, (unit, _) in metric.reports.items()}
 WRITTEN = 120  # cells; in a larger map the numbers would not be legible
 
 

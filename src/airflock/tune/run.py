@@ -211,7 +211,7 @@ def usual_limits(scenario: Scenario) -> list[str]:
     """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each."""
     known = numbers_of(scenario.measures, scenario.metrics)
     walls = scenario.world.arena != "none" or bool(scenario.world.obstacles)
-    contacts = ["phi_wall>0 at 0.01/h"] if walls and "phi_wall" in known else []
+    contacts = ["clearance<0 at 0.01/h"] if walls and "clearance" in known else []
     return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
 
 
@@ -340,7 +340,7 @@ def _measured(told: Mapping[str, Any]) -> Measured:
         name=str(told["name"]), reason=str(told["reason"]), parameters=table("parameters"),
         fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
         cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
-        kept=bool(told["kept"]), verdict=str(told["verdict"]),
+        clearance=float(told.get("clearance", "nan")), kept=bool(told["kept"]), verdict=str(told["verdict"]),
     )  # fmt: skip
 
 
