@@ -61,7 +61,9 @@ def test_a_change_sets_or_multiplies_what_a_scenario_has() -> None:
 
 @pytest.mark.parametrize("name", airflock_papers.PAPERS)
 def test_every_change_is_of_keys_that_scenarios_have(name: str) -> None:
-    presets = {"kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms"}
+    presets = {
+        "kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms", "zapotecatl_2016": "zapotecatl_2016/best",
+    }  # fmt: skip
     for found in breaks.load(f"airflock_papers.{name}").values():
         if found.breaks and found.breaks != breaks.EXCHANGED:
             before = airflock.load(presets[name])

@@ -49,4 +49,4 @@ def test_a_trend_and_its_opposite_are_told_apart(column):
         right, wrong = (rising, falling) if sign > 0 else (falling, rising)
         assert trend(column, axis, sign, right).value.ours == 0.0
         assert trend(column, axis, sign, wrong).value.ours == 1.0
-        assert trend(column, axis, sign, grid(lambda *_: 1.0)).value.ours == 0.0  # no step is no wrong step
+        assert trend(column, axis, sign, grid(lambda *_: 1.0)).value.ours == 1.0  # what changes nothing is no trend

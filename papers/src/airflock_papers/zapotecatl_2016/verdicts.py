@@ -89,14 +89,15 @@ def minimum(column: str, at: tuple[int, int], value: float, flown: pd.DataFrame,
 
 
 def trend(column: str, axis: int, sign: int, flown: pd.DataFrame) -> Measured:
-    """Share of the steps from one radius to the next whose sign is wrong beyond the 95 % interval."""
+    """Share of the steps from one radius to the next that are wrong beyond the 95 % interval, or change nothing."""
     places = sorted(set(flown.index.droplevel(2)))
     wrong = []
     for place in places:
         following = (place[0] + 10, place[1]) if axis == 0 else (place[0], place[1] + 10)
         if following in places:
             gap = _gap(flown, column, following, place)
-            wrong.append(bool((gap.high or 0.0) < 0.0 if sign > 0 else (gap.low or 0.0) > 0.0))
+            against = (gap.high or 0.0) < 0.0 if sign > 0 else (gap.low or 0.0) > 0.0
+            wrong.append(bool(against or gap.ours == 0.0))
     name = ("r_s", "r_a")[axis]
     note = f"{sum(wrong)} of {len(wrong)} steps"
     share = statistics.one(float(np.mean(wrong)), len(flown))
