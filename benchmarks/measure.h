@@ -7,13 +7,13 @@
 typedef struct {
     double samples, checks;
     double speed, correlation, smallest, spacing, least, disconnected, contacts, events, out, outside, lap, lap_abs;
-    double polarisation;
+    double polarisation, clearance;
 } sums;
 
 /* Mean speed, polarisation, lap and excursion: everything that needs no pairs. */
 PASS void measure_agents(flock *f, int n, const parameters *p, sums *t)
 {
-    real speed = 0, sx = 0, sy = 0, svx = 0, svy = 0, shx = 0, shy = 0, out = 0, outside = 0;
+    real speed = 0, sx = 0, sy = 0, svx = 0, svy = 0, shx = 0, shy = 0, out = 0, outside = 0, room = FAR;
     const real half = p->half_side;
     for (int i = 0; i < n; i++) {
         real x = f->now.x[i], y = f->now.y[i], vx = f->now.vx[i], vy = f->now.vy[i];
@@ -22,13 +22,15 @@ PASS void measure_agents(flock *f, int n, const parameters *p, sums *t)
         speed += v2 * per_v;
         shx += vx * per_v, shy += vy * per_v;
         sx += x, sy += y, svx += vx, svy += vy;
-        real ox = most(size(x) - half, 0), oy = most(size(y) - half, 0);
+        real ex = size(x) - half, ey = size(y) - half, ox = most(ex, 0), oy = most(ey, 0);
         out += TRIAL ? ox + oy : root(ox * ox + oy * oy);
         outside += TRIAL ? (real)(ox > 0) + (real)(oy > 0) : (real)((ox > 0) | (oy > 0));
+        if (!TRIAL) room = least(room, -root(ox * ox + oy * oy) - least(most(ex, ey), 0));
     }
     t->speed += speed / n;
     t->out += out, t->outside += outside;
     if (TRIAL) return;
+    t->clearance = room < t->clearance ? room : t->clearance;
     real lap = (svy * sx - svx * sy) / n / (p->v_flock * n * length(sx / n, sy / n));
     t->lap += lap, t->lap_abs += size(lap);
     t->polarisation += length(shx / n, shy / n);

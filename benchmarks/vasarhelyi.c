@@ -18,6 +18,7 @@ static void conclude(const sums *t, int n, score *out)
         .phi_coll = t->contacts / (t->checks * n * (n - 1.0)),
         .n_coll = t->events,
         .phi_wall = t->outside > 0 ? t->out / t->outside : 0,
+        .clearance = t->clearance,
         .phi_lap = t->lap / t->samples,
         .phi_lap_abs = t->lap_abs / t->samples,
         .polarisation = t->polarisation / t->samples,
@@ -36,7 +37,7 @@ int evaluate(const parameters *p, const schedule *s, real *frames, score *out)
     const int n = (int)s->agents;
     flock flying, *f = &flying;
     state ring[s->delay + 1];
-    sums t = {.least = (double)FAR};
+    sums t = {.least = (double)FAR, .clearance = (double)FAR};
     real packet[s->links ? 5 * n * ROOM : 1] __attribute__((aligned(64)));
     for (int i = 0; i < (s->links ? 5 * n * ROOM : 0); i++) packet[i] = i < 4 * n * ROOM ? 0 : (real)-1e9;
     real gap = 0, travelled = 0; /* no pair can have met before it has travelled this gap */

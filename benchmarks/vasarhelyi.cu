@@ -18,7 +18,7 @@
 typedef unsigned int word;
 
 enum { SENSOR = 1, OUTER = 2, START = 3, ATTEMPTS = 20000 };
-enum { NUMBERS = 28, SCORES = 12 };
+enum { NUMBERS = 28, SCORES = 13 };
 
 struct parameters {
     float v_flock, r0_rep, p_rep, r0_frict, c_frict, v_frict, p_frict, a_frict, r0_shill, v_shill, p_shill, a_shill;
@@ -137,7 +137,7 @@ extern "C" __global__ void __launch_bounds__(PER_AGENT * ROOM)
         }
     float x = truth[i].x, y = truth[i].y, vx = 0, vy = 0, cx = 0, cy = 0;
     float qx = 0, qy = 0, ux = 0, uy = 0, sqx = 0, sqy = 0, sux = 0, suy = 0;
-    float total[9] = {}, least = 1e30f, smallest = 0, correlation = 0, lap = 0, lap_abs = 0, polar = 0;
+    float total[9] = {}, least = 1e30f, room = 1e30f, smallest = 0, correlation = 0, lap = 0, lap_abs = 0, polar = 0;
     float gap = 0, moved = 0, danger = 0;
     uint4 w = make_uint4(0, 0, 0, 0);
     float2 g0 = make_float2(0, 0), g1 = g0;
@@ -227,16 +227,17 @@ extern "C" __global__ void __launch_bounds__(PER_AGENT * ROOM)
             float v2 = vx * vx + vy * vy + TINY, per = rsqrtf(v2), near = sqrtf(near2);
             float hx = vx * per, hy = vy * per, ox = fabsf(x) - p.half_side, oy = fabsf(y) - p.half_side;
             float px = fmaxf(ox, 0.0f), py = fmaxf(oy, 0.0f), out = sqrtf(px * px + py * py);
-            float v[12] = {x, y, vx, vy, hx, hy, v2 * per, near, near > p.range ? 1.0f : 0.0f, out, out > 0 ? 1.0f : 0.0f, near};
+            float v[13] = {x, y, vx, vy, hx, hy, v2 * per, near, near > p.range ? 1.0f : 0.0f, out, out > 0 ? 1.0f : 0.0f, near,
+                           -out - fminf(fmaxf(ox, oy), 0.0f)};
 #pragma unroll
             for (int c = 0; c < 11; c++) v[c] = counts ? v[c] : 0;
-            v[11] = on ? near : 1e30f;
-            over_block<12, 1>(v, shared);
+            v[11] = on ? near : 1e30f, v[12] = on ? v[12] : 1e30f;
+            over_block<13, 2>(v, shared);
             const float m = 1.0f / n;
             float now = (v[3] * v[0] - v[2] * v[1]) * m * m / (p.v_flock * length(v[0] * m, v[1] * m));
             lap += now, lap_abs += fabsf(now), polar += length(v[4] * m, v[5] * m);
             total[2] += v[6] * m, total[3] += v[7] * m, total[4] += v[8], total[5] += v[9], total[6] += v[10];
-            least = fminf(least, v[11]);
+            least = fminf(least, v[11]), room = fminf(room, v[12]);
             /* clusters, one after another: all agents look at once who is linked to the one that grows */
             bool earlier = false;
             float found = 0, fewest = n;
@@ -289,7 +290,7 @@ extern "C" __global__ void __launch_bounds__(PER_AGENT * ROOM)
     if (tid == 0) {
         const float m = 1.0f / samples, pairs = (float)n * (n - 1.0f) * (steps + 1.0f);
         const float score[SCORES] = {total[2] * m, correlation * m, smallest * m, total[3] * m, least, total[4] * m,
-                                     total[0] / pairs, total[1], total[6] > 0 ? total[5] / total[6] : 0, lap * m,
+                                     total[0] / pairs, total[1], total[6] > 0 ? total[5] / total[6] : 0, room, lap * m,
                                      lap_abs * m, polar * m};
         for (int c = 0; c < SCORES; c++) scores[flock * SCORES + c] = score[c];
     }

@@ -39,7 +39,7 @@ typedef struct {
 } schedule;
 
 typedef struct {
-    double phi_vel, phi_corr, n_min, r_min_mean, r_min, n_disc, phi_coll, n_coll, phi_wall, phi_lap, phi_lap_abs,
+    double phi_vel, phi_corr, n_min, r_min_mean, r_min, n_disc, phi_coll, n_coll, phi_wall, clearance, phi_lap, phi_lap_abs,
         polarisation;
 } score;
 
