@@ -61,7 +61,3 @@ sphinx_gallery_conf = {
     "image_scrapers": ("figures",),
     "reset_modules": (),
 }
-
-linkcheck_timeout = 30
-linkcheck_retries = 2
-linkcheck_ignore = [r"https?://(localhost|127\.0\.0\.1|192\.168\.)"]

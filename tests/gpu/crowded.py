@@ -57,6 +57,7 @@ def differ(name, seed):
 
 
 if __name__ == "__main__":
+    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
     warnings.simplefilter("ignore", RuntimeWarning)
     seed, *names = sys.argv[1:]
     json.dump({name: differ(name, int(seed)) for name in names or CASES}, sys.stdout)

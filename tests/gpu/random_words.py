@@ -29,6 +29,7 @@ def fill(counters, words, uniforms, normals):
 """
 
 if __name__ == "__main__":
+    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
     warnings.simplefilter("ignore", RuntimeWarning)
     rng, n = np.random.default_rng(int(sys.argv[1])), 200
     counters = rng.integers(0, 2**32, (6, n))

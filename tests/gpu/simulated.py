@@ -143,6 +143,7 @@ def differ(name, seed):
 
 
 if __name__ == "__main__":
+    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
     warnings.simplefilter("ignore", RuntimeWarning)  # the simulator's 32-bit words overflow on purpose
     seed, *names = sys.argv[1:]
     json.dump({name: differ(name, int(seed)) for name in names}, sys.stdout)

@@ -9,18 +9,14 @@ import pytest
 from typer.main import get_command
 
 from airflock.cli.main import app
-from processes import hear_interrupts
+from processes import called, hear_interrupts
 
 SHORT = ["--duration", "2", "--agents", "10"]
 
 
-def airflock(*arguments, **options):
-    command = [sys.executable, "-m", "airflock", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
-
-
 def test_run_prints_one_json_object_with_the_published_keys():
-    done = airflock("run", "vasarhelyi_2018/4ms", "--seeds", 2, "--json", *SHORT)
+    command = [sys.executable, "-m", "airflock", "run", "vasarhelyi_2018/4ms", "--seeds", "2", "--json", *SHORT]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     keys = [
@@ -52,8 +48,8 @@ def test_run_prints_one_json_object_with_the_published_keys():
 
 
 def test_first_seed_flies_the_same_flight_as_the_same_seed_among_many():
-    many = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--seeds", 3, "--json", *SHORT).stdout)["runs"]
-    one = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--first-seed", 2, "--json", *SHORT).stdout)["runs"]
+    many = json.loads(called("run", "vasarhelyi_2018/4ms", "--seeds", 3, "--json", *SHORT).stdout)["runs"]
+    one = json.loads(called("run", "vasarhelyi_2018/4ms", "--first-seed", 2, "--json", *SHORT).stdout)["runs"]
     assert one == many[2:]
 
 
@@ -73,7 +69,7 @@ def test_first_seed_flies_the_same_flight_as_the_same_seed_among_many():
     ],
 )
 def test_bad_input_ends_with_one_line_that_names_it_and_status_2(arguments, words):
-    done = airflock(*arguments)
+    done = called(*arguments)
     assert done.returncode == 2
     assert done.stdout == ""
     lines = done.stderr.strip().splitlines()
@@ -89,7 +85,7 @@ def test_all_faults_of_a_file_are_reported_together(tmp_path):
         '[world]\narena = "polygon"\ncorners = [[0, 0], [10, 0], [0, 10], [10, 10]]\n'
         '[radio]\nrange = { value = 80, unit = "kg" }\n'
     )
-    done = airflock("validate", file)
+    done = called("validate", file)
     assert done.returncode == 2
     crossed = "crosses or touches itself"
     for word in ("agents", "duratoin", "model.kind", "sensors.period = -1 s", crossed, "the unit is m"):
@@ -100,11 +96,11 @@ def test_all_faults_of_a_file_are_reported_together(tmp_path):
 def test_a_recording_scores_like_its_flight_and_flies_again_to_the_same_bits(tmp_path):
     file = tmp_path / "flight.nc"
     same = ["--set", "metrics.collision_period=0.2", "--precision", "64", *SHORT]
-    flown = json.loads(airflock("run", "vasarhelyi_2018/4ms", "--json", "--save", file, *same).stdout)["runs"][0]
-    scored = json.loads(airflock("score", file, "--json").stdout)["runs"][0]
+    flown = json.loads(called("run", "vasarhelyi_2018/4ms", "--json", "--save", file, *same).stdout)["runs"][0]
+    scored = json.loads(called("score", file, "--json").stdout)["runs"][0]
     for key in flown.keys() & scored.keys() - {"seed"}:
         assert scored[key] == pytest.approx(flown[key], abs=1e-9), key
-    again = airflock("validate", file)
+    again = called("validate", file)
     assert again.returncode == 0 and "same bits" in again.stdout
     assert list(tmp_path.iterdir()) == [file]
 
@@ -112,16 +108,16 @@ def test_a_recording_scores_like_its_flight_and_flies_again_to_the_same_bits(tmp
 def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
     folder = tmp_path / "folder.nc"
     folder.mkdir()
-    done = airflock("run", "vasarhelyi_2018/4ms", "--save", folder, *SHORT)
+    done = called("run", "vasarhelyi_2018/4ms", "--save", folder, *SHORT)
     assert done.returncode == 2 and "folder.nc" in done.stderr
     assert list(tmp_path.iterdir()) == [folder] and list(folder.iterdir()) == []
 
 
 def test_a_cut_off_recording_is_refused(tmp_path):
     file = tmp_path / "flight.nc"
-    assert airflock("run", "vasarhelyi_2018/4ms", "--save", file, *SHORT).returncode == 0
+    assert called("run", "vasarhelyi_2018/4ms", "--save", file, *SHORT).returncode == 0
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
-    done = airflock("score", file)
+    done = called("score", file)
     assert done.returncode == 2 and "is not a netCDF recording" in done.stderr
 
 
@@ -130,11 +126,11 @@ def test_starting_set_is_a_valid_scenario_and_table_s1_at_its_own_speeds(tmp_pat
 
     for speed in ("4", "16"):
         file = tmp_path / f"{speed}.toml"
-        file.write_text(airflock("presets", "--for-speed", speed).stdout)
+        file.write_text(called("presets", "--for-speed", speed).stdout)
         ours, published = load(file).parameters, load(f"vasarhelyi_2018/{speed}ms").parameters
         for name in ("r0_rep", "p_rep", "r0_frict", "c_frict", "v_frict", "v_shill", "a_shill"):
             assert getattr(ours, name) == pytest.approx(getattr(published, name), rel=1e-3)
-    file.write_text(airflock("presets", "--for-speed", "12").stdout)
+    file.write_text(called("presets", "--for-speed", "12").stdout)
     between = load(file).parameters
     assert between.v_shill >= 2.0 * 12.0
     assert (
@@ -144,11 +140,11 @@ def test_starting_set_is_a_valid_scenario_and_table_s1_at_its_own_speeds(tmp_pat
 
 def test_every_verb_has_help_with_an_example():
     verbs = list(get_command(app).commands)
-    listing = airflock("--help").stdout
+    listing = called("--help").stdout
     assert {"run", "evolve", "harden", "display"} < set(verbs)
     for verb in verbs:
         assert verb in listing
-        help_text = airflock(verb, "--help").stdout
+        help_text = called(verb, "--help").stdout
         assert f"airflock {verb}" in " ".join(help_text.split()) and "Example" in help_text
 
 

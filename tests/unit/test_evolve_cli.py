@@ -8,7 +8,7 @@ import sys
 import time
 import tomllib
 
-from processes import hear_interrupts
+from processes import called, hear_interrupts
 
 SHORT = ["--duration", "5", "--agents", "8", "--set", "dt=0.05"]
 NAME = "vasarhelyi_2018/4ms"
@@ -16,10 +16,6 @@ NAME = "vasarhelyi_2018/4ms"
 
 def command(*arguments):
     return [sys.executable, "-m", "airflock", *map(str, arguments)]
-
-
-def airflock(*arguments):
-    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
 
 
 def landed(folder):
@@ -35,25 +31,25 @@ def landed(folder):
 
 def test_evolve_prints_json_its_best_flies_and_hardens(tmp_path):
     asked = ["evolve", NAME, "--population", 4, "--generations", 2, *SHORT, "--json", "--out", tmp_path / "a"]
-    done = airflock(*asked)
+    done = called(*asked)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["working_ranges"]["candidates"] == 8 and found["fitness"]["seeds"] == 100
     assert tomllib.loads((tmp_path / "a" / "result.toml").read_text())["parameters"] == found["parameters"]
-    flown = airflock("run", tmp_path / "a" / "best.toml", "--json", "--first-seed", 3)
+    flown = called("run", tmp_path / "a" / "best.toml", "--json", "--first-seed", 3)
     assert flown.returncode == 0 and "fitness" in json.loads(flown.stdout)["runs"][0]
-    again = airflock(*asked)
+    again = called(*asked)
     assert again.returncode == 2 and "continue it with --resume" in again.stderr
-    resumed = json.loads(airflock(*asked, "--resume").stdout)
+    resumed = json.loads(called(*asked, "--resume").stdout)
     assert resumed["parameters"] == found["parameters"] and resumed["fitness"] == found["fitness"]
     out = tmp_path / "flyable.toml"
-    hardened = airflock("harden", tmp_path / "a", "--out", out, "--seeds", 5, "--json")
+    hardened = called("harden", tmp_path / "a", "--out", out, "--seeds", 5, "--json")
     steps = json.loads(hardened.stdout)["steps"]
     assert hardened.returncode == (0 if steps[-1]["kept"] else 1), hardened.stderr
     assert (
         steps[0]["name"] == "optimum" and steps[0]["cost"] == [0.0, 0.0, 0.0] and steps[-1]["name"] == "on fresh seeds"
     )
-    assert airflock("validate", out).returncode == 0
+    assert called("validate", out).returncode == 0
 
 
 def test_ctrl_c_ends_with_one_line_and_keeps_what_has_landed(tmp_path):

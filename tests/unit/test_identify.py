@@ -1,8 +1,6 @@
 """Identify: truths that come back, and what logs cannot say is refused with the reason."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
@@ -19,6 +17,7 @@ from airflock.identify.plan import flight_card
 from airflock.identify.run import HARDER, UNITS, Number, identify
 from airflock.radios import links
 from airflock.sensors import langevin
+from processes import called
 
 STEP = 0.05
 
@@ -328,13 +327,13 @@ def test_the_flight_card_lists_every_number_and_takes_ten_minutes():
 
 def test_all_faults_of_the_command_are_told_at_once(tmp_path):
     (tmp_path / "a.csv").write_text("t,x,y\n0,1,2\n1,2,3\n")
-    command = [sys.executable, "-m", "airflock", "identify", str(tmp_path / "a.csv")]
+    command = ["identify", tmp_path / "a.csv"]
     wrong = ["--like", "vasarhelyi_2018/real_5ms", "--standing", "5", "--conservative", "2", "--out", "mine.txt"]
-    done = subprocess.run([*command, *wrong], capture_output=True, text=True)
+    done = called(*command, *wrong)
     lines = done.stderr.splitlines()
     assert done.returncode == 2 and len(lines) == 4 and all(line.startswith("airflock: ") for line in lines)
     assert any("did you mean vasarhelyi_2018/real_" in line for line in lines)
-    done = subprocess.run([*command, "--like", "vasarhelyi_2018/real_6ms"], capture_output=True, text=True)
+    done = called(*command, "--like", "vasarhelyi_2018/real_6ms")
     assert done.returncode == 2 and "has no velocity" in done.stderr and len(done.stderr.splitlines()) == 1
 
 
@@ -345,8 +344,7 @@ def test_the_command_prints_one_json_object(tmp_path):
         columns |= {f"v{name}": logs.velocity[:, axis], f"c{name}": logs.command[:, axis]}
     pd.DataFrame(columns).assign(id=logs.who).to_csv(tmp_path / "log.csv", index=False)
     arguments = ["--like", "vasarhelyi_2018/real_6ms", "--check", "0", "--json", "--accept", "jumps"]
-    command = [sys.executable, "-m", "airflock", "identify", str(tmp_path / "log.csv"), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = called("identify", tmp_path / "log.csv", *arguments)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["numbers"]["body.tau"]["value"] == pytest.approx(0.5, rel=0.1)

@@ -1,8 +1,6 @@
 """Infer: the law that made the tracks is found, walks at random are nobody's law, and bad input is one line."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,6 +12,7 @@ from airflock.infer import bootstrap, candidates, search, select
 from airflock.infer.found import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
+from processes import called
 
 PERIOD, SIDE, RADIUS, SPEED = 0.1, 5.0, 1.2, 1.0
 BOX = {"world.arena": "square", "world.side": SIDE, "world.edges": "periodic"}
@@ -175,10 +174,10 @@ def test_the_best_is_named_with_its_doubts():
     assert verdict_of([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance
 
 
-def test_the_command_says_all_that_is_wrong_in_lines(tmp_path):
-    command = [sys.executable, "-c", "from airflock.cli import main; main()", "infer"]
-    bad = [*command, str(tmp_path / "none.nc"), "--models", "", "--out", "best.txt", "--plot", "nowhere/forces.png"]
-    told = subprocess.run(bad, capture_output=True, text=True, cwd=tmp_path)
+def test_the_command_says_all_that_is_wrong_in_lines(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bad = [tmp_path / "none.nc", "--models", "", "--out", "best.txt", "--plot", "nowhere/forces.png"]
+    told = called("infer", *bad)
     assert told.returncode == 2 and "Traceback" not in told.stderr
     for part in ("no such file", "--models names no law", "best.txt", "nowhere"):
         assert part in told.stderr

@@ -1,7 +1,5 @@
 """The Python names as a notebook uses them: names instead of scenarios, laws by name, seeds that can be one."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +7,7 @@ import pytest
 
 import airflock
 from airflock.errors import ParameterError, ScenarioError
+from processes import called
 
 NAME = "vasarhelyi_2018/4ms"
 
@@ -85,7 +84,6 @@ def test_a_score_of_no_flight_is_refused(short, seeds, said):
 
 
 def test_the_command_refuses_seeds_that_are_none():
-    command = [sys.executable, "-m", "airflock", "run", NAME, "--duration", "1", "--first-seed", "9" * 23]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = called("run", NAME, "--duration", "1", "--first-seed", "9" * 23)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == f"airflock: seed = {'9' * 23} lies outside [0, 2^64 - 1]\n"

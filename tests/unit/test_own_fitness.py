@@ -1,14 +1,12 @@
 """Fitness functions of the user's own: a fault in one is a line that names its place, before a generation is flown."""
 
-import subprocess
-import sys
-
 import pytest
 
 import airflock
 import toys
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.study import load_study
+from processes import called
 
 
 def study_file(folder, law, objective):
@@ -56,7 +54,6 @@ def test_a_file_of_functions_that_no_objective_names_is_refused(tmp_path):
 def test_a_time_limit_in_which_nothing_can_fly_is_refused_before_the_folder_is_made(tmp_path, timeout):
     with pytest.raises(StudyError, match=f"timeout = {timeout:g} s must be above 0"):
         airflock.evolve(toys.study(), tmp_path / "a", timeout=timeout)
-    command = [sys.executable, "-m", "airflock", "evolve", "vasarhelyi_2018/4ms", "--timeout", str(timeout)]
-    done = subprocess.run([*command, "--out", tmp_path / "a"], capture_output=True, text=True, timeout=120)
+    done = called("evolve", "vasarhelyi_2018/4ms", "--timeout", timeout, "--out", tmp_path / "a")
     assert done.returncode == 2 and done.stderr == f"airflock: timeout = {timeout:g} s must be above 0\n"
     assert not (tmp_path / "a").exists()

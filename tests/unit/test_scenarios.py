@@ -3,6 +3,7 @@
 import copy
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -170,3 +171,20 @@ def test_presets_are_sound_and_every_number_has_a_source(name):
         for key, value in table.items() if isinstance(table, dict) else [(section, table)]:
             if isinstance(value, dict) and section != "published":
                 assert value.get("source"), f"{name}: {section}.{key} has no source"
+
+
+def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():
+    found = load("vasarhelyi_2018/4ms", {
+        "agents": np.int64(3), "model.v_flock": np.float32(5), "world.arena": "polygon", "world.walls": "every_edge",
+        "world.corners": np.array([[0.0, 0.0], [200.0, 0.0], [0.0, 200.0]]),
+    })  # fmt: skip
+    assert (found.agents, found.parameters.v_flock, type(found.parameters.v_flock)) == (3, 5.0, float)
+    assert found.world.corners == ((0.0, 0.0), (200.0, 0.0), (0.0, 200.0))
+    for key, value in {"model.v_flock": np.True_, "agents": True, "model.p_rep": "1", "body.tau": 10**400}.items():
+        assert len(faults_of({key: value})) == 1, key
+    texts = {
+        "world.arena": "polygon",
+        "world.walls": "every_edge",
+        "world.corners": [[0.0, 0.0], [200.0, 0.0], ["2", 1.0]],
+    }
+    assert "world.corners is not a list of points [east, north] in m" in faults_of(texts)[0]

@@ -25,6 +25,7 @@ from airflock.executors import Flight
 from airflock.executors.here import Here
 from airflock_papers.dimock_2003.units import gains
 from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
+from processes import called
 
 
 def finished(folder, study=None, score=toys.bowl, **options):
@@ -251,13 +252,9 @@ def test_shipped_studies_hold_the_published_optima_and_table_s6():
 
 
 def test_command_tells_bad_input_in_lines_with_status_2(tmp_path):
-    def airflock_evolve(*arguments):
-        command = [sys.executable, "-m", "airflock", "evolve", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120)
-
-    asked = airflock_evolve("vasarhelyi_2018/4m", "--out", tmp_path / "a")
+    asked = called("evolve", "vasarhelyi_2018/4m", "--out", tmp_path / "a")
     assert asked.returncode == 2 and "did you mean vasarhelyi_2018/4ms?" in asked.stderr
-    asked = airflock_evolve("vasarhelyi_2018/4ms", "--out", tmp_path / "a", "--scheduler", "tcp://127.0.0.1:9")
+    asked = called("evolve", "vasarhelyi_2018/4ms", "--out", tmp_path / "a", "--scheduler", "tcp://127.0.0.1:9")
     assert asked.returncode == 2 and asked.stderr.count("\n") == 1
     assert "--scheduler tcp://127.0.0.1:9: does not answer" in asked.stderr
     assert not (tmp_path / "a" / FILE).exists()

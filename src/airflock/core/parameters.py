@@ -258,7 +258,7 @@ def points_fault(value: Any, declared: Points) -> str:
     """What is wrong with a list of points or polygons, as the rest of a sentence; empty if nothing is."""
     try:
         sound = _are_points(_frozen(value), declared.depth, declared.axes)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, RecursionError):
         sound = False
     what = f"{'polygons, each a list of ' if declared.depth == 3 else ''}points of {declared.axes} finite numbers"
     return "" if sound else f"is not a list of {what}"

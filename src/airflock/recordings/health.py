@@ -15,7 +15,7 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import cores
 
-PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "pydantic", "matplotlib", "cma")
+PACKAGES = ("numba", "llvmlite", "numpy", "xarray", "h5netcdf", "h5py", "typer", "matplotlib", "cma")
 EXTRAS = ("numba-cuda", "trimesh", "pymoo", "SALib", "pyarrow", "distributed")  # of extras: cuda, scenes, evolve, ...
 
 

@@ -1,39 +1,28 @@
 """Validation: from a nested dict to records, with every fault found at once.
 
-One pydantic schema per section is derived from the parameters' declarations; its complaints become one line each:
-file, key, value, unit, allowed range, and the nearest right key for a wrong one.
+The declarations of the parameters are the schema. Each complaint is one line: file, key, value, unit, allowed range,
+and the nearest right key for a wrong one.
 """
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from functools import cache
-from typing import Annotated, Any, Literal
+from math import inf, isfinite
+from numbers import Real
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
-
-from airflock.core.parameters import Choice, Points, Quantity, Text, declarations, with_unit
+from airflock.core.parameters import (
+    Choice,
+    Declaration,
+    Quantity,
+    Text,
+    choice_fault,
+    declarations,
+    points_fault,
+    quantity_fault,
+    with_unit,
+)
 
 LONG_FORM = {"value", "unit", "source", "note", "interval"}
-
-
-@cache
-def schema(record: type) -> type[BaseModel]:
-    """Pydantic schema of one record of parameters."""
-    fields: dict[str, Any] = {}
-    for name, declared, default in declarations(record):
-        if isinstance(declared, Quantity):
-            number: Any = Annotated[float, Field(ge=declared.low, le=declared.high, allow_inf_nan=False, strict=True)]
-            number = Annotated[number, Field(multiple_of=1.0)] if declared.whole else number
-            fields[name] = (number | None if declared.optional else number, default)
-        elif isinstance(declared, Choice):
-            fields[name] = (Literal[declared.options], default)
-        elif isinstance(declared, Text):
-            fields[name] = (str, default)
-        else:
-            inner = Annotated[float, Field(allow_inf_nan=False)]
-            shape: Any = list[Annotated[list[inner], Field(min_length=declared.axes, max_length=declared.axes)]]
-            fields[name] = (list[shape] if declared.depth == 3 else shape, [])
-    return create_model(f"{record.__module__}.{record.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
 
 
 def plain(section: str, given: Mapping[str, Any], record: type) -> tuple[dict[str, Any], list[str]]:
@@ -79,34 +68,50 @@ def check(
     if not isinstance(given, Mapping):
         return None, [f"{section} = {given!r} is not a table of keys"]
     values, faults = plain(section, given, record)
-    try:
-        clean = schema(record)(**values)
-    except ValidationError as error:
-        for item in error.errors():
-            line = _line(section, item, record, beside, kinds or {})
-            if line not in faults:
-                faults.append(line)
-        return None, faults
-    return (None if faults else record(**clean.model_dump())), faults
+    known = {name: declared for name, declared, _ in declarations(record)}
+    values = {key: _python(value, known.get(key)) for key, value in values.items()}
+    for name, declared in known.items():
+        if name in values and _is_wrong(values[name], declared):
+            faults.append(_line(f"{section}.{name}".lstrip("."), values[name], declared))
+    faults += [_unknown(section, str(key), (*known, *beside), kinds or {}) for key in values if key not in known]
+    return (None if faults else record(**values)), faults
 
 
-def _line(section: str, item: Any, record: type, beside: Sequence[str], kinds: Mapping[str, type]) -> str:
-    """One complaint of pydantic in our words; `beside`, `kinds`: as of `check`."""
-    key = str(item["loc"][0]) if item["loc"] else ""
-    name = f"{section}.{key}".lstrip(".")
-    known = {n: d for n, d, _ in declarations(record)}
-    if item["type"] == "extra_forbidden":
-        may = [*known, *beside]
-        near = get_close_matches(key, may, n=1, cutoff=0.5)
-        of = [kind for kind, other in kinds.items() if key in {known for known, _, _ in declarations(other)}]
-        hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(may)}"
-        hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
-        return f"{name}: unknown key; {hint}"
-    declared, value = known[key], item["input"]
+def _python(value: Any, declared: Declaration | None) -> Any:
+    """A value in the types that records hold: NumPy's and tomlkit's become Python's own, whole numbers floats."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(declared, Quantity) and isinstance(value, Real) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            return value  # beyond what a float can hold: told with the range
+    return str(value) if isinstance(value, str) else value
+
+
+def _is_wrong(value: Any, declared: Declaration) -> bool:
+    """Whether a value of Python's own types is not what was declared."""
     if isinstance(declared, Quantity):
-        if item["type"] == "multiple_of":
+        return value in (inf, -inf) or bool(quantity_fault(value, declared))
+    if isinstance(declared, Choice):
+        return bool(choice_fault(value, declared))
+    return not isinstance(value, str) if isinstance(declared, Text) else bool(points_fault(value, declared))
+
+
+def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, type]) -> str:
+    """The line for a key that a section does not have; `kinds` as of `check`."""
+    near = get_close_matches(key, may, n=1, cutoff=0.5)
+    of = [kind for kind, other in kinds.items() if key in {name for name, _, _ in declarations(other)}]
+    hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(may)}"
+    hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
+    return f"{f'{section}.{key}'.lstrip('.')}: unknown key; {hint}"
+
+
+def _line(name: str, value: Any, declared: Declaration) -> str:
+    """The line for a value that is not what was declared."""
+    if isinstance(declared, Quantity):
+        if isinstance(value, float) and isfinite(value) and declared.whole and not value.is_integer():
             return f"{name} = {value:g} is not a whole number; give one in {declared.span}"
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if isinstance(value, Real) and not isinstance(value, bool):
             return f"{name} = {with_unit(_number(value), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
@@ -115,7 +120,6 @@ def _line(section: str, item: Any, record: type, beside: Sequence[str], kinds: M
         return f"{name} = {value!r} is none of {', '.join(declared.options)}{hint}"
     if isinstance(declared, Text):
         return f"{name} = {value!r} is not text"
-    assert isinstance(declared, Points)
     if declared.axes > 3:
         return (
             f"{name} is not a list of rows of {declared.axes} numbers in {declared.unit}; it holds {declared.meaning}"
@@ -128,7 +132,7 @@ def _line(section: str, item: Any, record: type, beside: Sequence[str], kinds: M
     return f"{name} is not {what} in {declared.unit}"
 
 
-def _number(value: float) -> str:
+def _number(value: Real) -> str:
     """A number for a person; a whole number may be too large to be a float."""
     try:
         return f"{value:g}"
