@@ -17,11 +17,6 @@ def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
 
 
-def samples(plan: Plan, sums: NDArray[np.float64]) -> int:
-    """Number of samples that the sums hold."""
-    return int(sums[len(columns(plan.metrics))])
-
-
 def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     """Named order parameters from the sums over time."""
     found = columns(plan.metrics)

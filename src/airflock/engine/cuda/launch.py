@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
@@ -118,11 +119,14 @@ def arrays(
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
     own["all_reached"] = cuda.to_device(np.full((len(jobs), *size["all_reached"]), -1.0, real))
     own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
-    own["stores"] = cuda.to_device(_silent(len(jobs), size["stores"], real))
-    model = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
-    kept = [s for metric in plan.metrics for s in getattr(metric.Memory, "_field_defaults", {}).values()]
-    for name, begin in (("all_mem", model), ("all_memory", kept)):
-        own[name] = cuda.to_device(_memories(len(jobs), size[name], begin, real))
+    lanes = size["all_mem"][1]
+    beginning = {
+        "stores": of_pairs(plan, size["stores"][1], size["stores"][2], real),
+        "all_mem": first_memories(plan, np.zeros(lanes, int), real),
+        "all_memory": memories(plan, lanes, real),
+    }
+    for name, one in beginning.items():
+        own[name] = cuda.to_device(np.repeat(one[None, : size[name][0]], len(jobs), axis=0))
     if not shape.registers:
         own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {
@@ -176,17 +180,3 @@ def _padded(arrays: Sequence[NDArray[Any]], fill: float = 0.0) -> NDArray[Any]:
 
 def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
     return np.stack([np.ascontiguousarray(start, real) for start in starts])
-
-
-def _silent(flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
-    """Packets of every pair before any was received."""
-    found = np.zeros((flocks, *size), real)
-    found[:, -1] = -1e9
-    return found
-
-
-def _memories(flocks: int, size: tuple[int, ...], begin: list[float], real: Any) -> NDArray[Any]:
-    found = np.zeros((flocks, *size), real)
-    for c, value in enumerate(begin[: size[0]]):
-        found[:, c] = value
-    return found

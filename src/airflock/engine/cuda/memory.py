@@ -31,10 +31,9 @@ def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tupl
     n, table = whole["agents"], not shape.registers
     model = len(getattr(plan.model.Memory, "_fields", ()))
     kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    heard = plan.noisy or plan.delayed
     return {
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
-        "pasts": (whole["ring"], 2 * dims, lanes) if heard else (1, 1, 1),
+        "pasts": (whole["ring"], 2 * dims, lanes) if plan.late else (1, 1, 1),
         "stores": (2 * dims + 1, lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
         "works": (rows, lanes) if table else (1, 1),
         "all_words": (4, lanes) if table else (1, 1),

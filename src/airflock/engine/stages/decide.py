@@ -55,6 +55,18 @@ def offset(i: int, a: int, flock: Flock, scene: Any, *, plan: Plan) -> Any:
     )
 
 
+def add(
+    i: int, own: Own, shared: Any, percept: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model
+) -> None:  # fmt: skip
+    """Add what the law's added rule asks for to the command of agent i."""
+    more = ask(
+        model.added.decide, own=own, shared=shared, percept=percept, period=numbers.c.period, wing=numbers.wing,  # type: ignore[union-attr]
+        aero=numbers.aero,
+    )  # fmt: skip
+    for a in range(plan.dimensions):
+        flock.command[a][i] += more[a]
+
+
 def decide(
     agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, decision: int, time: float, mem: Any,
     edges: Any, spans: Any, scene: Any, percept_of: Callable[..., Any],
@@ -105,12 +117,7 @@ def decide(
         for a in axes:
             flock.command[a][i] = o[a]
         if model.added is not None:
-            more = ask(
-                model.added.decide, own=own, shared=shared, percept=percept if perceives else None,
-                period=numbers.c.period, wing=numbers.wing, aero=numbers.aero,
-            )  # fmt: skip
-            for a in axes:
-                flock.command[a][i] += more[a]
+            add(i, own, shared, percept if perceives else None, flock, numbers, plan=plan, model=model)
         if asks(model, "memory"):
             for c in fields(model.Memory):
                 mem[c, i] = o[3][c]
