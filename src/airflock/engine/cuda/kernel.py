@@ -11,6 +11,7 @@ from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.schedule import ORDER, in_turn, order
 from airflock.engine.stages.flight import SLACK
+from airflock.engine.stages.words import START, ZERO
 
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
@@ -40,8 +41,7 @@ def _time(build: CudaBuilder) -> list[str]:
     plan = build.plan
     heard = plan.late
     count = len(columns(plan.metrics))
-    starts = {"min": "FAR", "max": "-FAR"}
-    first = [starts.get(how, "ZERO") for _, how, _ in columns(plan.metrics)]
+    first = [START.get(how, ZERO).spelled for _, how, _ in columns(plan.metrics)]
     lines = branch(
         "tid == 0", [f"totals[{c}, 0] = {s}; totals[{c}, 1] = ZERO" for c, s in enumerate(first)] or ["pass"]
     )

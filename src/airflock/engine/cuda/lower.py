@@ -16,8 +16,9 @@ from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, 
 from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.dead import read, written
+from airflock.engine.stages.words import START
 
-NEUTRAL = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
+NEUTRAL = {how: start.spelled for how, start in START.items()}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
 
 

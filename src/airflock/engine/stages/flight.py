@@ -40,13 +40,17 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
                 memory[one.row + c, i] = float(start)
 
 
-def record(flock: Flock, frames: Any, frame: int, n: int, *, plan: Plan) -> None:
-    """Keep positions, velocities and commands as a frame: frames[frame, component, agent]."""
-    rows = (flock.position, flock.velocity, flock.command)
-    for i in range(n):
-        for part, row in enumerate(rows):
-            for a in range(plan.dimensions):
-                frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
+def record(step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan) -> None:
+    """Keep positions, velocities and commands as a frame, where a plan records: frames[frame, component, agent].
+
+    The first frame is that of the first sample at or after the step `first`.
+    """
+    if plan.record:
+        frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
+        for i in range(n):
+            for part, row in enumerate((flock.position, flock.velocity, flock.command)):
+                for a in range(plan.dimensions):
+                    frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
 
 
 def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
@@ -154,9 +158,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         if (order["sample"] or plan.record) and step % whole.sample_every == 0:
             for name in order["sample"]:
                 take(name, time, values, sums, stages=stages, sampled=sampled)
-            if plan.record:
-                frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
-                record(flock, frames, frame, n, plan=plan)
+            record(step, first, flock, frames, whole, n, plan=plan)
         if step < whole.steps:
             fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.words import NOTHING
+from airflock.engine.stages.words import NOTHING, fields
 
 Row = Any  # one number per agent: row[i]
 # The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
@@ -138,6 +138,16 @@ def fault_row(kind: str, what: str) -> str:
 def own_row(letter: str, name: str) -> str:
     """Name of the row with a number that differs among agents; without a letter it is of no record."""
     return f"number_{letter}_{name}" if letter else name
+
+
+def column_of(i: int, record: Any, rows: Columns) -> Any:
+    """A record of what rows hold of agent i, by field; None where there is no such record."""
+    return record(*[rows[c][i] for c in fields(record)]) if record else None
+
+
+def entry_of(i: int, record: Any, table: Any, first: int) -> Any:
+    """A record of what a table holds of agent i, from row `first` on."""
+    return record(*[table[first + c, i] for c in fields(record)])
 
 
 def numbers_of(i: int, letter: str, flock: Flock, numbers: Any, *, plan: Plan) -> Any:
