@@ -15,7 +15,7 @@ from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import columns
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached
@@ -68,7 +68,7 @@ def fly_many(
 
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
-    whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
+    whole = tables.integers
     frames = whole["steps"] // whole["sample_every"] if plan.record else 0
     scene = hashlib.sha256(tables.shapes.tobytes() + tables.nodes.tobytes()).digest() if len(tables.nodes) else b""
     return whole["agents"], frames, len(tables.goals), len(tables.later), scene
@@ -88,12 +88,12 @@ def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables])
 
 def _largest(jobs: Sequence[Tables]) -> Tables:
     """That of flights of one launch whose ring of past states is the longest."""
-    return max(jobs, key=lambda tables: int(tables.whole[WHOLE.index("ring")]))
+    return max(jobs, key=lambda tables: tables.integers["ring"])
 
 
 def too_large(plan: Plan, tables: Tables) -> str | None:
     """Why one such flock does not fit into the GPU's free memory; None if it does."""
-    layout = layout_of(plan, int(tables.whole[WHOLE.index("agents")]), 1)
+    layout = layout_of(plan, tables.integers["agents"], 1)
     rows = 0 if layout.registers else flight_driver(plan, layout).ROWS  # making a driver's text takes a while
     return lacking(plan, rows, tables, free_memory())
 
@@ -155,7 +155,7 @@ def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flo
     count = len(columns(plan.metrics))
     found = []
     for flock, tables in enumerate(jobs):
-        n = int(tables.whole[WHOLE.index("agents")])
+        n = tables.integers["agents"]
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
