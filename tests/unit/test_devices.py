@@ -3,16 +3,17 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from airflock import gpu as gpu
 from airflock.engine import picked, plan_of, score_flights
-from airflock.errors import DeviceError, ScenarioError
+from airflock.errors import DeviceError, FlightError, ScenarioError
 from airflock.scenarios import cost
 from airflock.scenarios.files import load
 from flocks import scenario
 from gpus import runtime
-from inside import MOST_THREADS, shape_of
+from inside import MOST_THREADS, Flown, shape_of, simulate
 
 SMALL = scenario(agents=3, duration=0.2, world__side=60.0)
 
@@ -91,6 +92,25 @@ def test_all_rules_of_a_kernel_are_the_rules_of_the_cpu(name):
     assert len(rules) > 20
     text = kernel(plan, shape_of(5, 1000))
     assert [block for block in rules if block not in text] == []
+
+
+@pytest.mark.parametrize("wrong", [1, 2, 13, 19, 20])
+def test_the_step_at_which_a_closed_flight_left_the_finite_numbers_is_found(wrong, monkeypatch):
+    """A GPU flies closed flights: shorter ones tell from which step on agent 1 is nowhere."""
+    steps = round(SMALL.flight.duration / SMALL.flight.dt)
+    flown = []
+
+    def fly_one(scenario, *_):
+        flown.append(round(scenario.flight.duration / scenario.flight.dt))
+        state = np.zeros((4, 3))
+        state[:, 1] = np.nan if flown[-1] >= wrong else 0.0
+        return Flown({}, None, state, 0)
+
+    monkeypatch.setattr(simulate.devices, "fly_one", fly_one)
+    with pytest.raises(FlightError, match=f"agent 1 left the finite numbers at step {wrong} "):
+        simulate.checked(SMALL, 0, fly_one(SMALL), "cuda")
+    assert steps == 20
+    assert len(flown) <= 1 + 5  # by halves
 
 
 def test_the_command_ends_with_one_line_and_status_2_without_a_gpu():

@@ -1,5 +1,6 @@
 """Beginnings: what agents and pairs carry before they have flown or heard anything."""
 
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,13 @@ def memories(plan: Plan, m: int, real: Any) -> NDArray[Any]:
     return np.concatenate(blocks) if blocks else np.zeros((1, m), real)
 
 
+def rows_of_metrics(plan: Plan) -> dict[tuple[str, Any], slice]:
+    """Where what each metric remembers lies among what all of them do, by its name and record."""
+    counts = [len(defaults(metric.Memory)) for metric in plan.metrics]
+    rows = (slice(end - count, end) for end, count in zip(accumulate(counts), counts, strict=True))
+    return {(metric.name, metric.Memory): own for metric, own in zip(plan.metrics, rows, strict=True)}
+
+
 def first_memories(plan: Plan, laws: NDArray[Any], real: Any) -> NDArray[Any]:
     """What laws remember at the start, (field, lane): of each lane what its law does; laws : number of each lane's."""
     found = [beginning(record, 1, real)[:, 0] for record in plan.memories]
@@ -26,8 +34,12 @@ def first_memories(plan: Plan, laws: NDArray[Any], real: Any) -> NDArray[Any]:
 
 def beginning(record: Any, m: int, real: Any) -> NDArray[Any]:
     """The defaults of a Memory for each of m lanes: (field, lane)."""
-    starts = list(getattr(record, "_field_defaults", {}).values()) or [0.0]
-    return np.repeat(np.array(starts, real)[:, None], m, axis=1)
+    return np.repeat(np.array(defaults(record) or (0.0,), real)[:, None], m, axis=1)
+
+
+def defaults(record: Any) -> tuple[float, ...]:
+    """What the fields of a Memory hold before an agent has flown; empty where nothing is remembered."""
+    return tuple(getattr(record, "_field_defaults", {}).values())
 
 
 def of_pairs(plan: Plan, receivers: int, senders: int, real: Any) -> NDArray[Any]:

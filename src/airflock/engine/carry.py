@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories
+from airflock.engine.beginnings import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
@@ -58,11 +58,10 @@ def _rows(old: State, new: State, lanes: NDArray[np.int64]) -> None:
     """Rows of the work table, whole lanes."""
     work, before, had = new.arrays["work"], old.arrays["work"], old.driver.ROWS
     other = {name for name in new.plan.beginnings if not _goes_on(name, old.plan, new.plan)}
-    truth = {*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)}
     for name, place in new.driver.ROWS.items():
         if name in other:  # another body or sensor begins to remember anew
             continue
-        source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in truth else None
+        source = name if name in had else name[1:] if name[0] in "mh" and name[1:] in new.plan.motion else None
         if source is not None:
             work[place] = before[had[source]][lanes]
     if new.has_slots and "order" not in had:
@@ -93,8 +92,7 @@ def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> N
     past, every = old.arrays["past"][..., lanes], old.whole("decide_every")
     made = np.empty_like(new.arrays["past"])
     if not old.plan.late or every != new.whole("decide_every"):
-        names = [*new.plan.axes, *(f"v{axis}" for axis in new.plan.axes)]
-        made[:] = new.arrays["work"][[new.driver.ROWS[name] for name in names]]
+        made[:] = new.arrays["work"][[new.driver.ROWS[name] for name in new.plan.motion]]
         return made
     coming, newest = -(-step // every), (step - 1 + old.whole("delay")) // every
     for k in range(coming, coming + len(made)):
@@ -104,27 +102,16 @@ def _under_way(old: State, new: State, step: int, lanes: NDArray[np.int64]) -> N
 
 def _remembered(old: State, new: State, lanes: NDArray[np.int64]) -> None:
     """What metrics of both plans remember of each agent."""
-    places, first = {}, 0
-    for metric in old.plan.metrics:
-        places[metric.name, metric.Memory] = first
-        first += len(getattr(metric.Memory, "_fields", ()))
-    first = 0
-    for metric in new.plan.metrics:
-        count = len(getattr(metric.Memory, "_fields", ()))
-        place = places.get((metric.name, metric.Memory))
-        if count and place is not None:
-            new.arrays["memory"][first : first + count] = old.arrays["memory"][place : place + count][:, lanes]
-        first += count
+    before = rows_of_metrics(old.plan)
+    for metric, rows in rows_of_metrics(new.plan).items():
+        if metric in before:
+            new.arrays["memory"][rows] = old.arrays["memory"][before[metric]][:, lanes]
 
 
 def _solved(old: State, new: State) -> list[str]:
     """What rules of the whole flock carry from call to call, where wings are what they were; else it is found anew."""
-    first = 0
-    for letter, names in new.plan.records.items():
-        if letter == "wing" and old.plan == new.plan:
-            wing = slice(first, first + len(names))
-            if np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
-                scratch = scratch_of(new.plan, new.tables.row, new.agents)
-                return [name for parts in scratch for name, _, spare in parts if not spare]
-        first += len(names)
-    return []
+    wing = new.plan.spans["wing"]
+    if old.plan != new.plan or not np.array_equal(old.arrays["row"][wing], new.arrays["row"][wing]):
+        return []
+    scratch = scratch_of(new.plan, new.tables.row, new.agents)
+    return [name for parts in scratch for name, _, spare in parts if not spare]

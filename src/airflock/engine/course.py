@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Future
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -218,8 +219,7 @@ class Course:
 
     def twin(self) -> "Course":
         """Another course that goes on from here."""
-        twin = object.__new__(Course)
-        twin.__dict__.update(self.__dict__)
+        twin = copy(self)
         twin.state, twin._coming = self.state.twin(), None
         twin.events, twin.windows = list(self.events), list(self.windows)
         twin._frames, twin._sampled = list(self._frames), list(self._sampled)

@@ -110,14 +110,13 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
     return None if fault is None else f"{agents} agents are more than one block flies ({MOST_TOGETHER}), and {fault}"
 
 
-def fly_one(
-    scenario: Scenario, plan: Plan, seed: int, device: str, start: Any = None
-) -> Flown:  # plan: with or without recorded frames
-    """Fly one world on a named device other than the CPU."""
+def fly_one(scenario: Scenario, plan: Plan, seed: int, device: str, start: Any = None) -> Flown:
+    """Fly one world on a named device; plan: with or without recorded frames."""
+    if device == "cuda":
+        return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
     if device == "python":
         plan = plan.built(grid=False, bits=64)
-        return cpu.fly(plan, tables(scenario, plan, seed), start, device)
-    return fly_on_gpu([scenario], [plan], [seed], None if start is None else [start])[0]
+    return cpu.fly(plan, tables(scenario, plan, seed), start, device)
 
 
 def fly_on_gpu(

@@ -1,6 +1,7 @@
 """Flight: a flight that can be advanced, looked at, changed, kept and branched. Whatever the cuts, the same bits."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any, NoReturn
 
 import numpy as np
@@ -192,7 +193,7 @@ class Flight(Acting):
 
         world : the same (default) meets the same noise, another one an independent future
         """
-        twin = object.__new__(Flight)
+        twin = copy(self)
         twin._course, twin._planned = self._course.twin(), list(self._planned)
         if world is not None and world != self.world:
             twin._course.to_world(world)

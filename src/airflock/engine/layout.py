@@ -1,6 +1,7 @@
 """Layout: where the arrays of a flight lie in its one buffer, and what they hold before it."""
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -27,12 +28,9 @@ class Layout(NamedTuple):
 
     def filled(self) -> tuple[NDArray[np.uint8], dict[str, NDArray[Any]]]:
         """A new buffer as it is before a flight, and its arrays by name."""
-        size = len(self.beginning)
-        room = np.empty(size + LINE, np.uint8)
-        first = -room.__array_interface__["data"][0] % LINE
-        buffer = room[first : first + size]
+        buffer = aligned(np.empty, len(self.beginning))
         buffer[:] = self.beginning
-        arrays = {name: np.ndarray(shape, kind, room, first + place) for name, place, shape, kind in self.places}
+        arrays = {name: np.ndarray(shape, kind, buffer, place) for name, place, shape, kind in self.places}
         return buffer, arrays
 
 
@@ -86,9 +84,14 @@ def lanes(agents: int) -> int:
 
 
 def aligned_zeros(shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-    """Zeros whose rows begin on a cache line."""
-    count = math.prod(shape) * np.dtype(kind).itemsize
-    room = np.zeros(count + LINE, np.uint8)
-    first = -room.ctypes.data % LINE
-    found: NDArray[Any] = room[first : first + count].view(kind).reshape(shape)
+    """Zeros that begin on a cache line."""
+    found: NDArray[Any] = aligned(np.zeros, math.prod(shape) * np.dtype(kind).itemsize).view(kind).reshape(shape)
+    return found
+
+
+def aligned(make: Callable[..., NDArray[Any]], size: int) -> NDArray[Any]:
+    """So many bytes, as `make` makes them, from a cache line on."""
+    room = make(size + LINE, np.uint8)
+    first = -room.__array_interface__["data"][0] % LINE
+    found: NDArray[Any] = room[first : first + size]
     return found

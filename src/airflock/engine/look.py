@@ -85,7 +85,7 @@ def _parameters(scenario: Scenario, state: State, agent: int) -> Any:
 def motion(state: State, prefix: str) -> list[Motion]:
     """States of all agents from the rows with a prefix, or the true ones where the plan keeps no such rows."""
     axes, had = state.plan.axes, state.driver.ROWS
-    names = [f"{prefix}{name}" for name in (*axes, *(f"v{axis}" for axis in axes))]
+    names = [f"{prefix}{name}" for name in state.plan.motion]
     rows = state.rows([name if name in had else name[len(prefix) :] for name in names]).astype(float)
     flat = [0.0] * (3 - len(axes))
     half = len(axes)

@@ -44,7 +44,7 @@ def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     times, real, width, states = clock(scenario), plan.bits // 8, lanes(agents), 2 * plan.dimensions
     kept = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    past = times["ring"] * states if plan.noisy or plan.delayed else 0
+    past = times["ring"] * states if plan.late else 0
     numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
     cells = 8 * grid.CHUNKS * (grid.CELLS * agents + grid.SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)

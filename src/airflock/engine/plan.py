@@ -1,21 +1,16 @@
 """Plan: what of a scenario is fixed when its driver is generated. Everything else is a number at run time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from itertools import accumulate
+from typing import Any
 
-from airflock.body.registry import BODIES
-from airflock.core.contract import Body, Metric, Model
 from airflock.core.fault import Fault
-from airflock.core.radio import Radio, forward
-from airflock.core.sensor import Sensor
-from airflock.core.topology import Topology
+from airflock.core.radio import forward
 from airflock.core.vectors import vectors_of
-from airflock.radios.registry import RADIOS
-from airflock.radios.registry import USUAL as USUAL_RADIO
-from airflock.sensors.registry import SENSORS, USUAL
-from airflock.world import arena, edges, rays
+from airflock.engine.facts import Facts
+from airflock.world import edges
 
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
@@ -26,117 +21,11 @@ NEVER = -1e9  # s; time stamp of a packet that has not come
 GONE = -1.0  # s; when what is not under way is due
 
 
-class OwnLaw(NamedTuple):
-    """A law that groups of a flock fly by, beside that of the others.
-
-    choices : its compile-time constants, by name
-    varied  : its numbers that differ among those who fly by it, as (letter, name)
-    """
-
-    model: Model
-    choices: tuple[tuple[str, str | float], ...]
-    varied: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True)
-class Build:
-    """How a driver is built, whatever the scenario says.
-
-    bits        : 32 or 64 per number
-    record      : keep every sample (position, velocity, command) besides the running sums
-    given_start : the flight starts from positions and velocities that are handed over
-    grid        : neighbours by cells, all cores for one flock; else all pairs, one core
-    absence     : agents may be absent: they lie behind those who are there (`engine.presence`)
-    """
-
-    bits: int = 32
-    record: bool = False
-    given_start: bool = False
-    grid: bool = False
-    absence: bool = False
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Compile-time side of a flight: what the scenario says, and how it is built.
+class Plan(Facts):
+    """The facts of a flight, and what follows from them.
 
     It is made by `engine.plan_of` alone; whoever needs the same flight built otherwise asks for `built`.
-
-    build     : how it is built; bits, record, given_start and grid read it
-    numbers   : letter of each record of numbers and its fields: the columns of a driver's row, in order
-    surfaces  : surface function of each family of walls, in the order of the faces table
-    dryden    : gusts are those of the Dryden spectrum
-    polygon   : the arena is a polygon, whose edges are walls; raised: the middle of its heights is not 0
-    obstacle  : surface function of an obstacle
-    excursion : how far outside a position is
-    ray       : free distance along a direction
-    body      : what turns commands into motion; body_choices its compile-time constants
-    sensor    : what agents measure of themselves by; sensor_choices its compile-time constants
-    noisy     : it errs
-    edge      : what happens to a coordinate beyond the arena's faces, if anything
-    start     : region in which agents start
-    scene     : something stands in the world that agents see with rays, feel, or must not touch
-    goals     : the flock has goals; herd: the goal is a shepherd
-    own       : each agent has a goal of its own
-    stop      : the flight ends at its first collision
-    wing_choices : compile-time constants of the wing, where a rule solves for the whole flock
-    aero_choices : those of drag descent, where it is added to the model
-    radio     : which packets arrive; radio_choices its compile-time constants. lossy: some are lost by radio.loss
-    few       : each of its rates sends at most `core.radio.FEW` packets in a decision
-    silent    : an agent stops while a neighbour that it has lost could be near
-    sequential: one agent after another perceives, decides and moves
-    faults    : kinds of fault that may occur
-    varied    : numbers that differ among agents, as (letter, name); each is a row
-    topology  : which of those whom an agent hears it meets; None: all. fading: signals differ by chance
-    laws      : laws of groups, beside `model`; the numbers of the first have the letter p1, and so on
-    law       : which of all laws the stages are made for that ask one: 0 is `model`; None where there is no other
-    grouped   : a rule asks for the groups of agents
     """
-
-    model: Model
-    model_choices: tuple[tuple[str, str | float], ...]
-    numbers: tuple[tuple[str, tuple[str, ...]], ...]
-    metrics: tuple[Metric, ...]
-    surfaces: tuple[Callable[..., Any], ...]
-    excursion: Callable[..., float]
-    ray: Callable[..., float] = rays.to_nothing
-    body: Body = BODIES["multirotor"]
-    body_choices: tuple[tuple[str, str], ...] = ()
-    sensor: Sensor = SENSORS[USUAL]
-    sensor_choices: tuple[tuple[str, str], ...] = ()
-    edge: Callable[..., Any] | None = None
-    start: str = "arena"
-    scene: bool = False
-    meshed: bool = False
-    goals: bool = False
-    stop: bool = False
-    wing_choices: tuple[tuple[str, str], ...] = ()
-    aero_choices: tuple[tuple[str, str], ...] = ()
-    herd: bool = False
-    own: bool = False
-    sequential: bool = False
-    dimensions: int = 2
-    noisy: bool = True
-    delayed: bool = True
-    lossy: bool = False
-    radio: Radio = RADIOS[USUAL_RADIO]
-    radio_choices: tuple[tuple[str, str], ...] = ()
-    few: bool = True
-    silent: bool = False
-    windy: bool = False
-    dryden: bool = False
-    obstacles: bool = False
-    obstacle: Callable[..., Any] = arena.convex_obstacle
-    polygon: bool = False
-    raised: bool = False
-    faults: tuple[Fault, ...] = ()
-    varied: tuple[tuple[str, str], ...] = ()
-    topology: Topology | None = None
-    fading: bool = False
-    laws: tuple[OwnLaw, ...] = ()
-    law: int | None = None
-    grouped: bool = False
-    build: Build = Build()
 
     def __hash__(self) -> int:
         return self._hash
@@ -314,14 +203,18 @@ class Plan:
         return ("x", "y", "z")[: self.dimensions]
 
     @property
+    def motion(self) -> tuple[str, ...]:
+        """Rows of positions and velocities: x y vx vy, or x y z vx vy vz."""
+        return (*self.axes, *(f"v{axis}" for axis in self.axes))
+
+    @property
     def constants(self) -> dict[str, dict[str, str | float]]:
         """Choices and usual numbers by record name, inlined as constants."""
-        wing: dict[str, str | float] = dict(self.wing_choices)
-        aero: dict[str, str | float] = dict(self.aero_choices)
-        body: dict[str, str | float] = dict(self.body_choices)
-        sensor: dict[str, str | float] = dict(self.sensor_choices)
-        radio: dict[str, str | float] = dict(self.radio_choices)
-        return {"p": dict(self.model_choices), "b": body, "s": sensor, "k": radio, "wing": wing, "aero": aero}
+        chosen: dict[str, tuple[tuple[str, str | float], ...]] = {
+            "p": self.model_choices, "b": self.body_choices, "s": self.sensor_choices, "k": self.radio_choices,
+            "wing": self.wing_choices, "aero": self.aero_choices,
+        }  # fmt: skip
+        return {letter: dict(found) for letter, found in chosen.items()}
 
     @property
     def vectors(self) -> dict[str, dict[str, int]]:
@@ -353,3 +246,9 @@ class Plan:
     def records(self) -> dict[str, tuple[str, ...]]:
         """Columns of the parameter row, by record name, in order."""
         return dict(self.numbers)
+
+    @cached_property
+    def spans(self) -> dict[str, slice]:
+        """Where the numbers of each record stand in the parameter row."""
+        ends = accumulate(len(names) for _, names in self.numbers)
+        return {letter: slice(end - len(names), end) for (letter, names), end in zip(self.numbers, ends, strict=True)}

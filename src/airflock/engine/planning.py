@@ -8,7 +8,8 @@ from airflock.core.contract import Metric, Model
 from airflock.core.parameters import choices
 from airflock.core.radio import FEW
 from airflock.core.vocabulary import asks
-from airflock.engine.plan import Build, OwnLaw, Plan
+from airflock.engine.facts import Build, OwnLaw
+from airflock.engine.plan import Plan
 from airflock.errors import ScenarioError
 from airflock.rules.probe import probe, probe_fault, probe_radio, probe_sensor, probe_topology
 from airflock.scenarios.cells import by_cells, has_room, takes_all_cores
@@ -37,17 +38,8 @@ def plan_of(
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
-    laws = scenario.laws
-    for law in laws:
-        _probed(law.model, tuple(choices(law.parameters).items()))
-    wind, kinds = scenario.wind, scenario.fault_kinds
-    for kind in kinds:
-        probe_fault(kind)
-    if scenario.errs:
-        probe_sensor(scenario.sensor)
-    probe_radio(scenario.transceiver)
-    if scenario.own_topology is not None:
-        probe_topology(scenario.own_topology)
+    _probe_rules(scenario)
+    laws, kinds = scenario.laws, scenario.fault_kinds
     return make_plan(
         scenario.model,
         scenario.parameters,
@@ -62,41 +54,74 @@ def plan_of(
             absence=absence or any(kind.leaves is not None for kind in kinds),
         ),
         body=scenario.vehicle,
-        body_choices=tuple(sorted(choices(scenario.body).items())),
-        **_sensing(scenario),
-        start=scenario.start.kind,
-        scene=scenario.scenic,
-        meshed=scenario.scene.kind == "mesh",
-        goals=scenario.goals.kind in ("points", "scene"),
-        herd=scenario.goals.kind in ("points", "scene") and scenario.goals.role == "herd",
-        own=scenario.goals.kind == "own",
+        body_choices=_chosen(scenario.body),
         sequential=scenario.flight.update == "sequential",
-        delayed=clock(scenario)["delay"] > 0,
-        lossy=scenario.radio.loss > 0.0,
         stop=scenario.metrics.stop == "collision",
         wing_choices=_wing_choices(scenario, metrics),
-        aero_choices=tuple(sorted(choices(scenario.aero).items())) if scenario.descends else (),
-        radio=scenario.transceiver,
-        radio_choices=_radio_choices(scenario),
-        few=_few_packets(scenario),
-        silent=scenario.silence.rule == "stop",
+        aero_choices=_chosen(scenario.aero) if scenario.descends else (),
         faults=kinds,
         varied=scenario.varied,
-        topology=scenario.meets if any(law.model.neighbour is not None for law in laws) else None,
         laws=tuple(OwnLaw(law.model, constants_of(*law[:2], law.varied), law.varied) for law in laws[1:]),
         grouped=bool(scenario.groups) and any(law.asks_for_groups for law in laws),
-        fading=scenario.own_topology is not None or scenario.topology.fading > 0.0,
-        windy=wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
-        dryden=wind.kind == "dryden",
+        **_sensing(scenario),
+        **_hearing(scenario),
+        **_surroundings(scenario),
     )
+
+
+def _probe_rules(scenario: Scenario) -> None:
+    """Call every rule of a scenario once, but those of its order parameters. Raises RuleError."""
+    for law in scenario.laws:
+        _probed(law.model, tuple(choices(law.parameters).items()))
+    for kind in scenario.fault_kinds:
+        probe_fault(kind)
+    if scenario.errs:
+        probe_sensor(scenario.sensor)
+    probe_radio(scenario.transceiver)
+    if scenario.own_topology is not None:
+        probe_topology(scenario.own_topology)
+
+
+def _chosen(record: Any) -> tuple[tuple[str, str], ...]:
+    """Choices of a record, in the order of their names."""
+    return tuple(sorted(choices(record).items()))
+
+
+def _surroundings(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of start, scene, goals and wind."""
+    kind, wind = scenario.goals.kind, scenario.wind
+    return {
+        "start": scenario.start.kind,
+        "scene": scenario.scenic,
+        "meshed": scenario.scene.kind == "mesh",
+        "goals": kind in ("points", "scene"),
+        "herd": kind in ("points", "scene") and scenario.goals.role == "herd",
+        "own": kind == "own",
+        "windy": wind.kind == "dryden" or any((wind.east, wind.north, wind.up, wind.gust)),
+        "dryden": wind.kind == "dryden",
+    }
+
+
+def _hearing(scenario: Scenario) -> dict[str, Any]:
+    """What a plan says of the radio, and of whom agents meet of those whom they hear."""
+    return {
+        "radio": scenario.transceiver,
+        # the kind of radios that share a record is none of the choices that rules can read
+        "radio_choices": tuple(pair for pair in _chosen(scenario.radio) if pair[0] != "kind"),
+        "few": _few_packets(scenario),
+        "delayed": clock(scenario)["delay"] > 0,
+        "lossy": scenario.radio.loss > 0.0,
+        "silent": scenario.silence.rule == "stop",
+        "topology": scenario.meets if any(law.model.neighbour is not None for law in scenario.laws) else None,
+        "fading": scenario.own_topology is not None or scenario.topology.fading > 0.0,
+    }
 
 
 def _sensing(scenario: Scenario) -> dict[str, Any]:
     """What a plan says of a sensor: nothing of one that tells the truth, so that all such flights share a driver."""
     if not scenario.errs:
         return {"noisy": False}
-    chosen = tuple(sorted(choices(scenario.sensors).items()))
-    return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": chosen}
+    return {"noisy": True, "sensor": scenario.sensor, "sensor_choices": _chosen(scenario.sensors)}
 
 
 def _few_packets(scenario: Scenario) -> bool:
@@ -106,18 +131,13 @@ def _few_packets(scenario: Scenario) -> bool:
     return max(rates, default=0.0) * period <= FEW - 0.1  # rounding may make it one packet more
 
 
-def _radio_choices(scenario: Scenario) -> tuple[tuple[str, str], ...]:
-    """Choices of the radio that its rules can read: the kind of those that share a record is none of them."""
-    return tuple(sorted((k, v) for k, v in choices(scenario.radio).items() if k != "kind"))
-
-
 def _wing_choices(scenario: Scenario, metrics: tuple[Metric, ...] | None) -> tuple[tuple[str, str], ...]:
     """Choices of the wing where a rule solves for the whole flock; elsewhere they are nobody's business."""
     found = scenario.order_parameters if metrics is None else metrics
     used = scenario.model.flock is not None or any(
         "wing" in asks(metric.survey, "survey") for metric in found if metric.survey
     )
-    return tuple(sorted(choices(scenario.wing).items())) if used else ()
+    return _chosen(scenario.wing) if used else ()
 
 
 @lru_cache

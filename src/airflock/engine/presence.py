@@ -35,8 +35,8 @@ def join(state: "State", agent: int, position: list[float], velocity: list[float
     before = sum(other < agent for other in order[:here])  # agents stay in the order of their numbers
     _put(state, [*range(before), lane, *(k for k in range(before, state.agents) if k != lane)])
     _set(state, here + 1)
-    axes, work, rows = state.plan.axes, state.arrays["work"], state.driver.ROWS
-    motion = {**dict(zip(axes, position, strict=True)), **dict(zip((f"v{a}" for a in axes), velocity, strict=True))}
+    work, rows = state.arrays["work"], state.driver.ROWS
+    motion = dict(zip(state.plan.motion, [*position, *velocity], strict=True))
     for name, value in motion.items():
         for prefix in ("", "m", "h", "before_", "from_"):
             if prefix + name in rows:

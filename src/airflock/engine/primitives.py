@@ -5,6 +5,16 @@ of the C library, whose scalar calls would stop vectorisation; they agree with t
 """
 
 from airflock.engine import vectors
+from airflock.engine.stages.words import CONSTANTS
+
+
+def _written(number: float) -> str:
+    """A number as driver text: 0.5, 1e30."""
+    short, power = repr(float(number)), f"{number:.0e}".replace("e+0", "e").replace("e+", "e")
+    return min(short, power, key=len)
+
+
+DECLARED = "\n".join(f"{constant.spelled} = real({_written(constant)})" for constant in CONSTANTS)
 
 INTEGERS = """
 u32 = np.uint32

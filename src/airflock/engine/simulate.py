@@ -1,5 +1,6 @@
 """Simulate: scenarios in, recordings or order parameters out, on all devices."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,6 @@ from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan
 from airflock.engine.planning import plan_of
 from airflock.engine.state import State
-from airflock.engine.tables import tables
 from airflock.errors import FlightError
 from airflock.scenarios.cells import takes_all_cores
 from airflock.scenarios.places import start_fault, start_in_box
@@ -50,7 +50,8 @@ def fly(
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     if chosen != "cuda":
         needs.check(scenario, plan)
-    return checked(scenario, seed, _route(chosen)(scenario, plan, seed, start), chosen, precision, start)
+    flown = devices.fly_one(scenario, plan, seed, chosen, start)
+    return checked(scenario, seed, flown, chosen, precision, start)
 
 
 def picked(
@@ -77,13 +78,6 @@ def _choice(
     return choice.device
 
 
-def _route(device: str) -> Callable[[Scenario, Plan, int, Any], cpu.Flown]:
-    """How one world is flown on a device."""
-    if device == "cpu":
-        return lambda scenario, plan, seed, start: cpu.fly(plan, tables(scenario, plan, seed), start)
-    return lambda scenario, plan, seed, start: devices.fly_one(scenario, plan, seed, device, start)
-
-
 def checked(
     scenario: Scenario, seed: int, flown: cpu.Flown, device: str = "cpu", precision: int = 32, start: Any = None
 ) -> cpu.Flown:
@@ -108,18 +102,16 @@ def _first_bad(flown: cpu.Flown) -> int | None:
 
 def _first_bad_step(scenario: Scenario, seed: int, precision: int, start: Any, device: str) -> int:
     """First step after which a state is not finite: flights are deterministic, so another one finds it by halves."""
-    low, high = 0, clock(scenario)["steps"]
+    last = clock(scenario)["steps"]
     if device != "cuda":
-        return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), low, high)
+        return failure.first_bad_step(opened(scenario, seed, precision, False, start, device=device), 0, last)
     plan = plan_of(scenario, precision=precision).built(given_start=start is not None)
-    while high - low > 1:
-        middle = (low + high) // 2
-        shorter = replace(scenario, flight=replace(scenario.flight, duration=middle * scenario.flight.dt))
-        if _first_bad(_route(device)(shorter, plan, seed, start)) is None:
-            low = middle
-        else:
-            high = middle
-    return high
+
+    def bad(steps: int) -> bool:
+        shorter = replace(scenario, flight=replace(scenario.flight, duration=steps * scenario.flight.dt))
+        return _first_bad(devices.fly_one(shorter, plan, seed, device, start)) is not None
+
+    return bisect_left(range(1, last), True, key=bad) + 1
 
 
 def opened(
@@ -159,7 +151,7 @@ def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
     """
     import numpy as np
 
-    names = [*plan.axes, *(f"v{axis}" for axis in plan.axes)]
+    names = plan.motion
     shape, said = (len(names), scenario.agents), f"{scenario.name}: start: "
     try:
         given = np.asarray(start, np.float32 if plan.bits == 32 else np.float64)
@@ -212,19 +204,14 @@ def score_flights(
             together = zip(scenarios, seeds, flown, strict=True)
             return [s.judged(checked(s, seed, f, device, precision).values) for s, seed, f in together]
     if device == "python":
-        return list(in_threads([_plainly(*pair) for pair in zip(scenarios, seeds, strict=True)], 1, done))
-    for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
-        compile_for(scenario, precision=precision)  # once, before threads ask for it
+        precision, threads = 64, 1
+    else:
+        for scenario in {plan_of(scenario, precision=precision): scenario for scenario in scenarios}.values():
+            compile_for(scenario, precision=precision)  # once, before threads ask for it
+        if any(takes_all_cores(scenario) for scenario in scenarios):
+            threads = 1  # each flight takes all cores by itself
 
     def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
-        return lambda: score_flight(scenario, seed, precision=precision)
+        return lambda: scenario.judged(fly(scenario, seed, precision=precision, device=device).values)
 
-    jobs = [job(scenario, seed) for scenario, seed in zip(scenarios, seeds, strict=True)]
-    if any(takes_all_cores(scenario) for scenario in scenarios):
-        threads = 1  # each flight takes all cores by itself
-    return list(in_threads(jobs, threads, done))
-
-
-def _plainly(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
-    """A flight in plain Python, yet to be flown."""
-    return lambda: scenario.judged(fly(scenario, seed, precision=64, device="python").values)
+    return list(in_threads([job(*pair) for pair in zip(scenarios, seeds, strict=True)], threads, done))

@@ -95,8 +95,8 @@ class Standing:
     def measured(self) -> NDArray[Any]:
         """Positions (m) and velocities (m/s) as agents last measured their own, (component, agent); a copy."""
         self._course.begin()
-        names = [*self._state.plan.axes, *(f"v{axis}" for axis in self._state.plan.axes)]
-        return self._state.rows([f"m{name}" if f"m{name}" in self._state.driver.ROWS else name for name in names])
+        had, names = self._state.driver.ROWS, self._state.plan.motion
+        return self._state.rows([f"m{name}" if f"m{name}" in had else name for name in names])
 
     @property
     def sent(self) -> NDArray[Any]:

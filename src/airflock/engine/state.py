@@ -19,7 +19,7 @@ from airflock.engine.presence import leave
 from airflock.engine.stages.state import own_row
 from airflock.engine.striking import strike
 from airflock.engine.tables import Tables, tables
-from airflock.engine.totals import combined, goals_reached, samples, sums_of
+from airflock.engine.totals import combined, goals_reached
 from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
 
@@ -58,7 +58,7 @@ class State:
         own["mem"][:] = first_memories(plan, self.laws, real)
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
-        self._motion = [driver.ROWS[name] for name in (*plan.axes, *(f"v{axis}" for axis in plan.axes))]
+        self._motion = [driver.ROWS[name] for name in plan.motion]
         components = plan.dimensions
         self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
         self.no_frames = np.zeros((0, 3 * components, agents), real)
@@ -87,7 +87,7 @@ class State:
 
     @property
     def scene(self) -> tuple[NDArray[Any], ...]:
-        """What stands in the world and what is noted of it on the way, as `passes.scene` takes it."""
+        """What stands in the world and what is noted of it on the way, as `stages.scene` takes it."""
         own, tables = self.arrays, self.tables
         shapes = own["shapes"] if len(tables.later) else tables.shapes
         return (
@@ -167,12 +167,7 @@ class State:
     @property
     def dt(self) -> float:
         """Motion step as the driver reads it, s."""
-        first = 0
-        for letter, names in self.plan.records.items():
-            if letter == "c":
-                return float(self.arrays["row"][first + names.index("dt")])
-            first += len(names)
-        raise KeyError("c")
+        return float(self.arrays["row"][self.plan.spans["c"]][self.plan.records["c"].index("dt")])
 
     def fill_own(self) -> None:
         """Write the numbers that differ among agents, each to its agent."""
@@ -289,12 +284,3 @@ class State:
             there, of = self.arrays["there"].tolist()
             found["present"] = there / of if of else 1.0
         return found
-
-    def samples(self) -> int:
-        """Number of samples that the sums hold."""
-        return samples(self.plan, self.arrays["sums"])
-
-    def reset_sums(self) -> None:
-        """Begin the sums over time anew. What a metric remembers of each agent stays: contacts go on."""
-        self.arrays["sums"][:] = sums_of(self.plan)[1]
-        self.arrays["there"][:] = 0.0

@@ -53,8 +53,12 @@ class Tables:
 
     def changed(self, **whole: int) -> "Tables":
         """The same world with other integers, by their names in `plan.WHOLE`."""
-        known = dict(zip(WHOLE, self.whole.tolist(), strict=True))
-        return replace(self, whole=np.array([(known | whole)[name] for name in WHOLE], np.int64))
+        return replace(self, whole=np.array([(self.integers | whole)[name] for name in WHOLE], np.int64))
+
+    @property
+    def integers(self) -> dict[str, int]:
+        """Integers of this world by name."""
+        return dict(zip(WHOLE, self.whole.tolist(), strict=True))
 
 
 def extents(scenario: Scenario) -> tuple[float, float, float]:

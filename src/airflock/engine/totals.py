@@ -8,18 +8,13 @@ from numpy.typing import NDArray
 
 from airflock.engine.passes.build import columns
 from airflock.engine.plan import Plan
+from airflock.engine.stages.words import START, ZERO
 
 
 def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Values of an instant and sums over time at their start; the sums end with the counts of both clocks."""
-    start = {"min": 1e30, "max": -1e30}
-    found = [start.get(how, 0.0) for _, how, _ in columns(plan.metrics)]
+    found = [float(START.get(how, ZERO)) for _, how, _ in columns(plan.metrics)]
     return np.zeros(len(found)), np.array([*found, 0.0, 0.0])
-
-
-def samples(plan: Plan, sums: NDArray[np.float64]) -> int:
-    """Number of samples that the sums hold."""
-    return int(sums[len(columns(plan.metrics))])
 
 
 def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:

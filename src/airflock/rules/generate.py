@@ -18,7 +18,7 @@ from typing import Any
 from airflock.core import random as random_streams
 from airflock.errors import RuleError
 from airflock.rules import law
-from airflock.rules.integers import tree_of
+from airflock.rules.integers import free, tree_of
 from airflock.rules.unrolled import Unrolled
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
@@ -227,7 +227,7 @@ class _Rewrite(Unrolled):
 
     def _hand_on(self, node: ast.Call) -> None:
         """Name all arguments of a call; a plain function that is handed a choice is called by its text for this one."""
-        called = self._found(node.func.id) if isinstance(node.func, ast.Name) else None
+        called = free(node.func.id, self.rule) if isinstance(node.func, ast.Name) else None
         if isinstance(called, types.FunctionType) and not node.keywords:  # a driver knows no defaults
             usual = called.__defaults__ or ()
             missing = called.__code__.co_argcount - len(node.args)
@@ -272,7 +272,7 @@ class _Rewrite(Unrolled):
             return ast.Constant(self.chosen[node.id])
         if node.id in GIVEN or node.id in self.source.names() or node.id.startswith("percept_"):
             return node
-        value = self._found(node.id)
+        value = free(node.id, self.rule)
         if isinstance(value, bool):
             return ast.Constant(value)
         if isinstance(value, float):
@@ -287,14 +287,6 @@ class _Rewrite(Unrolled):
             f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
             "a plain function nor a NamedTuple" + ("; it is not defined" if value is None else "")
         )
-
-    def _found(self, name: str) -> Any:
-        """What a free name of the rule stands for; None if for nothing."""
-        return self.rule.__globals__.get(name, self._closure().get(name))
-
-    def _closure(self) -> dict[str, Any]:
-        cells = self.rule.__closure__ or ()
-        return dict(zip(self.rule.__code__.co_freevars, (c.cell_contents for c in cells), strict=True))
 
 
 def _end_at_return(node: ast.FunctionDef) -> None:

@@ -127,10 +127,15 @@ def _called(node: ast.AST) -> str:
     return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
 
 
+def free(name: str, rule: Callable[..., Any]) -> Any:
+    """What a free name of a rule stands for; None if for nothing."""
+    closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
+    return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
+
+
 def _function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
     """The plain function that a rule calls by this name; None for itself."""
-    closure = dict(zip(rule.__code__.co_freevars, rule.__closure__ or (), strict=True))
-    found = rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
+    found = free(name, rule)
     return found if isinstance(found, types.FunctionType) and found is not rule else None
 
 

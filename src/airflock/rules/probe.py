@@ -38,27 +38,18 @@ def probe(model: Model, parameters: Any) -> None:
                 record = model.Sums if kind == "neighbour" else model.Walls
                 _same_length(rule, answer, record, model.name)
                 given["sums" if kind == "neighbour" else "walls"] = answer
-    for word, record in (("sums", model.Sums), ("walls", model.Walls), ("memory", model.Memory)):
+    for word, record in (("sums", model.Sums), ("walls", model.Walls)):
         if word not in given and record is not None:
-            given[word] = (
-                record(*getattr(record, "_field_defaults", {}).values())
-                if word == "memory"
-                else record(
-                    *([0.0] * len(record._fields))  # type: ignore[attr-defined]
-                )
-            )
+            given[word] = record(*([0.0] * len(record._fields)))  # type: ignore[attr-defined]
+    if model.Memory is not None:
+        given["memory"] = model.Memory()
     if model.flock is not None:
         law.check(model.flock)
         given["shared"] = _shared(model, given)
     if model.added is not None:
         law.check(model.added.decide)
         _call(model.added.decide, "decide", given, model.added.name)
-    law.check(model.decide)
-    answer = _call(model.decide, "decide", given, model.name)
-    expected = 4 if model.Memory is not None else 3
-    if not isinstance(answer, tuple) or len(answer) != expected:
-        shape = "x, y, z, Memory(...)" if expected == 4 else "x, y, z"
-        raise RuleError(f"{_place(model.decide)}: {model.name}.decide must return {shape}")
+    _answer(model.decide, "decide", given, model.name, "x", "y", "z", *["Memory(...)"] * (model.Memory is not None))
 
 
 @cache
@@ -82,13 +73,10 @@ def probe_sensor(sensor: Sensor) -> None:
     kind = "measure" if sensor.error is None else "error"
     rule = sensor.measure or sensor.error
     assert rule is not None
-    law.check(rule)
     given: dict[str, Any] = {name: 0.5 + 0.01 * k for k, name in enumerate(VOCABULARY[kind])}
     given["s"], given["memory"] = sensor.Parameters(), sensor.Memory() if sensor.Memory is not None else None
-    answer = _call(rule, kind, given, sensor.name)
-    shape = "dx, dv" if kind == "error" else ", ".join((*COMPONENTS, *(["Memory(...)"] if sensor.Memory else [])))
-    if not isinstance(answer, tuple) or len(answer) != len(shape.split(", ")):
-        raise RuleError(f"{_place(rule)}: {sensor.name}.{kind} must return {shape}")
+    parts = ("dx", "dv") if kind == "error" else (*COMPONENTS, *["Memory(...)"] * (sensor.Memory is not None))
+    answer = _answer(rule, kind, given, sensor.name, *parts)
     if sensor.Memory is not None:
         _same_length(rule, answer[-1], sensor.Memory, sensor.name)
 
@@ -100,17 +88,12 @@ def probe_radio(radio: Radio) -> None:
         rule = getattr(radio, kind)
         if rule is None:
             continue
-        law.check(rule)
         given: dict[str, Any] = {name: 0.5 + 0.01 * place for place, name in enumerate(VOCABULARY[kind])}
         given |= {"fast": 2, "slow": 1, "k": radio.Parameters()}
         given["packet"] = radio.Packet() if radio.Packet is not None else None
-        answer = _call(rule, kind, given, radio.name)
-        receives = "1.0 or 0.0, Packet(...)" if radio.Packet is not None else "1.0 or 0.0"
-        vectors = {"see": ", ".join(COMPONENTS), "carry": "x, y, z"}
-        wanted = {"receive": receives, **vectors}.get(kind, "one number")
-        count = len(wanted.split(", "))
-        if (len(answer) if isinstance(answer, tuple) else 1) != count:
-            raise RuleError(f"{_place(rule)}: {radio.name}.{kind} must return {wanted}")
+        receives = ("1.0 or 0.0", *["Packet(...)"] * (radio.Packet is not None))
+        wanted = {"receive": receives, "see": COMPONENTS, "carry": ("x", "y", "z")}.get(kind, ("one number",))
+        answer = _answer(rule, kind, given, radio.name, *wanted)
         if kind == "receive" and radio.Packet is not None:
             _same_length(rule, answer[1], radio.Packet, radio.name)
 
@@ -145,6 +128,15 @@ def shapes_of(workspace: Callable[..., Any], agents: int, records: Mapping[str, 
     """Shapes of the scratch for so many agents: what `workspace` returns for those of n and the records it asks for."""
     given = {**records, "n": agents}
     return workspace(*(given[name] for name in signature(workspace).parameters))
+
+
+def _answer(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str, *parts: str) -> Any:
+    """What a rule says on a probe; it must be of these parts, of which a single one is no tuple."""
+    law.check(rule)
+    answer = _call(rule, kind, given, owner)
+    if (len(answer) if isinstance(answer, tuple) else 1) != len(parts):
+        raise RuleError(f"{_place(rule)}: {owner}.{kind} must return {', '.join(parts)}")
+    return answer
 
 
 def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str) -> Any:

@@ -137,15 +137,10 @@ class CudaBuilder(Builder):
 
     def columns(self) -> dict[str, tuple[str, int]]:
         """Shared tables: `truth`, what agents are, and `said`, what the others hear; by row."""
-        axes, plan = self.plan.axes, self.plan
-        found = {a: ("truth", c) for c, a in enumerate(axes)}
-        if plan.noisy or plan.delayed:
-            found |= {f"h{a}": ("said", c) for c, a in enumerate(axes)}
-            found |= {f"hv{a}": ("said", len(axes) + c) for c, a in enumerate(axes)}
-        else:
-            found |= {f"h{a}": ("truth", c) for c, a in enumerate(axes)}
-            found |= {f"hv{a}": ("truth", len(axes) + c) for c, a in enumerate(axes)}
-        return found
+        plan = self.plan
+        found = {a: ("truth", c) for c, a in enumerate(plan.axes)}
+        table = "said" if plan.late else "truth"
+        return found | {f"h{name}": (table, c) for c, name in enumerate(plan.motion)}
 
     def cells(self) -> tuple[str, ...]:
         """Lines around a pair loop that runs over cells; none where it runs over all pairs."""
@@ -153,8 +148,7 @@ class CudaBuilder(Builder):
 
     def prepared(self, name: str, lines: list[str]) -> list[str]:
         """Text of a stage before it is lowered."""
-        heard = self.plan.noisy or self.plan.delayed
-        if name == "snapshot" or (name == "perceive" and heard):
+        if name == "snapshot" or (name == "perceive" and self.plan.late):
             return must_replace(lines, "ring[", "past[")
         if name.startswith("measure_") and any("j in range(m)" in line for line in lines):
             return must_replace(lines, " & (integer(j) < nn)", "")  # its pair loops end with the last agent

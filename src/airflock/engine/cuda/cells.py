@@ -8,13 +8,15 @@ loss.
 
 from typing import Any
 
-from airflock.engine.cuda.build import CudaBuilder, reciprocal_lines
+from airflock.engine.beginnings import defaults
+from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.cuda.start import heading_off, tried
+from airflock.engine.cuda.state import numbers
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.driver import MADE
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
 from airflock.engine.schedule import order
 from airflock.engine.stages import start
@@ -118,16 +120,8 @@ def _kernel(options: str, name: str, *arguments: str, body: list[str]) -> list[s
 
 def _common(build: CellBuilder) -> list[str]:
     """What every kernel of a flock knows."""
-    wide = {"seed_low": "u32", "seed_high": "u32"}
-    lines = [f"{w if w != 'ring' else 'slots'} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
-    offset = 0
-    for letter, fields in build.plan.records.items():
-        kind = build.source.record(letter.upper() * 2, fields)
-        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
-        offset += len(fields)
-    lines += reciprocal_lines(build.reciprocals)
-    local = f"np.float{build.plan.bits}"
-    lines += ["n = agents; sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
+    lines, local = numbers(build), f"np.float{build.plan.bits}"
+    lines += ["sub = integer(0); tid = integer(0); slot = integer(cuda.grid(1)); late = ZERO"]
     lines += [f"gust = cuda.local.array({GUSTS}, {local})", f"aim = cuda.local.array(4, {local})"]
     lines += [f"near_ = cuda.local.array({GATHERED}, np.int32)", "counts = cuda.local.array(2, np.int32)"]
     names = {"near": "near_", "goals": "edges", "reached": "aim", "later": "edges"}
@@ -144,8 +138,7 @@ def _begin(build: CellBuilder) -> list[str]:
     body += [*loop(f"attempt in range({start.ATTEMPTS})", draw), *branch("row_w.speed > ZERO", turn)]
     put = ("s_x", "s_y", "s_z", "real(i if placed else -1 - i)", "vx", "vy", "vz", "ZERO")
     body += [f"near[i, {c}] = {value}" for c, value in enumerate(put)]
-    starts = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
-    values = ["ZERO"] * 3 + [f"real({s})" for s in starts]
+    values = ["ZERO"] * 3 + [f"real({start})" for start in defaults(plan.model.Memory)]
     body += [f"rest[i, {c}] = {v}" for c, v in enumerate(values + ["ZERO"] * (rest_columns(plan) - len(values)))]
     return [*_common(build), *branch("slot < n", body)]
 

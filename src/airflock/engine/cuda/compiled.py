@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from airflock.engine.cuda.kernel import ARGUMENTS
@@ -24,19 +24,12 @@ def signature(bits: int) -> tuple[Any, ...]:
     return tuple(types.Array(scalar[kind[1]], int(kind[0]), "C") for kind in KINDS.values())
 
 
-class _Absent:
-    """Stands for a GPU of some compute capability where there is none."""
-
-    def __init__(self, capability: tuple[int, int]):
-        self.compute_capability = capability
-
-
 @contextmanager
 def pretending(capability: tuple[int, int]) -> Iterator[None]:
     """Device functions are compiled for this compute capability instead of the present GPU's."""
     dispatcher: Any = import_module("numba.cuda.dispatcher")
     kept = dispatcher.get_current_device
-    dispatcher.get_current_device = lambda: _Absent(capability)
+    dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=capability)
     try:
         yield
     finally:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import defaults
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
 from airflock.engine.cuda.memory import SHARE, unfit
@@ -135,7 +136,7 @@ class Crowd:
         near[:, :dims], near[:, 4 : 4 + dims] = np.asarray(start)[:dims].T, np.asarray(start)[dims:].T
         near[:, 3] = np.arange(self.agents)
         rest = np.zeros((self.agents, self.driver.REST), near.dtype)
-        for c, value in enumerate(getattr(self.plan.model.Memory, "_field_defaults", {}).values()):
+        for c, value in enumerate(defaults(self.plan.model.Memory)):
             rest[:, 3 + c] = value
         self.near, self.rest = runtime().to_device(near), runtime().to_device(rest)
 

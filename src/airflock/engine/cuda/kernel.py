@@ -1,5 +1,6 @@
 """Kernel: a whole flight of one flock per block, as the order in which the stages run."""
 
+from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
@@ -10,6 +11,7 @@ from airflock.engine.passes.measure import measured
 from airflock.engine.plan import Plan
 from airflock.engine.schedule import ORDER, in_turn, order
 from airflock.engine.stages.flight import SLACK
+from airflock.engine.stages.words import START, ZERO
 
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
@@ -39,8 +41,7 @@ def _time(build: CudaBuilder) -> list[str]:
     plan = build.plan
     heard = plan.late
     count = len(columns(plan.metrics))
-    starts = {"min": "FAR", "max": "-FAR"}
-    first = [starts.get(how, "ZERO") for _, how, _ in columns(plan.metrics)]
+    first = [START.get(how, ZERO).spelled for _, how, _ in columns(plan.metrics)]
     lines = branch(
         "tid == 0", [f"totals[{c}, 0] = {s}; totals[{c}, 1] = ZERO" for c, s in enumerate(first)] or ["pass"]
     )
@@ -139,7 +140,7 @@ def _forget(build: CudaBuilder) -> list[str]:
     """Memories of the collision metrics back at their start values."""
     lines = []
     for metric, _, first, _ in measured(build.plan, "collision"):
-        for c, start in enumerate(getattr(metric.Memory, "_field_defaults", {}).values()):
+        for c, start in enumerate(defaults(metric.Memory)):
             own = f"kept{first + c}_i" if build.shape.registers else f"memory[{first + c}, i]"
             lines += agents(build, [f"{own} = real({start})"])
     return lines
@@ -183,12 +184,12 @@ def _looked(build: CudaBuilder) -> list[str]:
 
 def _taken(build: CudaBuilder) -> list[str]:
     """One sample: order parameters and, where they are kept, positions, velocities and commands."""
-    plan, axes = build.plan, build.plan.axes
+    plan = build.plan
     lines = ["to_sample = sample_every", "count_sample = integer(count_sample + 1)"]
     if order(plan)["sample"]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
-        names = [*axes, *(f"v{a}" for a in axes), *(f"c{a}" for a in axes)]
+        names = [*plan.motion, *(f"c{a}" for a in plan.axes)]
         body = [f"all_frames[block, frame, {c}, i] = {own(build, name)}" for c, name in enumerate(names)]
         lines += [*agents(build, body), "frame = integer(frame + 1)"]
     return lines
@@ -219,9 +220,7 @@ def _advance(build: CudaBuilder) -> list[str]:
 
 def _end(build: CudaBuilder) -> list[str]:
     """What a flight leaves behind."""
-    axes = build.plan.axes
-    names = [*axes, *(f"v{a}" for a in axes)]
-    lines = agents(build, [f"states[block, {c}, i] = {own(build, name)}" for c, name in enumerate(names)])
+    lines = agents(build, [f"states[block, {c}, i] = {own(build, name)}" for c, name in enumerate(build.plan.motion)])
     count = len(columns(build.plan.metrics))
     last = [f"all_sums[block, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
     last += [

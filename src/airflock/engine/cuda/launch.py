@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import columns
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver
 from airflock.engine.tables import Tables
 from airflock.engine.totals import combined, goals_reached
@@ -67,7 +68,7 @@ def fly_many(
 
 def _alike(plan: Plan, tables: Tables) -> tuple[Any, ...]:
     """Flights with the same key go into one launch: flock size, recorded frames, goals and scene."""
-    whole = dict(zip(WHOLE, tables.whole.tolist(), strict=True))
+    whole = tables.integers
     frames = whole["steps"] // whole["sample_every"] if plan.record else 0
     scene = hashlib.sha256(tables.shapes.tobytes() + tables.nodes.tobytes()).digest() if len(tables.nodes) else b""
     return whole["agents"], frames, len(tables.goals), len(tables.later), scene
@@ -87,12 +88,12 @@ def _batch(plan: Plan, driver: ModuleType, shape: Shape, jobs: Sequence[Tables])
 
 def _largest(jobs: Sequence[Tables]) -> Tables:
     """That of flights of one launch whose ring of past states is the longest."""
-    return max(jobs, key=lambda tables: int(tables.whole[WHOLE.index("ring")]))
+    return max(jobs, key=lambda tables: tables.integers["ring"])
 
 
 def too_large(plan: Plan, tables: Tables) -> str | None:
     """Why one such flock does not fit into the GPU's free memory; None if it does."""
-    layout = layout_of(plan, int(tables.whole[WHOLE.index("agents")]), 1)
+    layout = layout_of(plan, tables.integers["agents"], 1)
     rows = 0 if layout.registers else flight_driver(plan, layout).ROWS  # making a driver's text takes a while
     return lacking(plan, rows, tables, free_memory())
 
@@ -118,11 +119,14 @@ def arrays(
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
     own["all_reached"] = cuda.to_device(np.full((len(jobs), *size["all_reached"]), -1.0, real))
     own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
-    own["stores"] = cuda.to_device(_silent(len(jobs), size["stores"], real))
-    model = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
-    kept = [s for metric in plan.metrics for s in getattr(metric.Memory, "_field_defaults", {}).values()]
-    for name, begin in (("all_mem", model), ("all_memory", kept)):
-        own[name] = cuda.to_device(_memories(len(jobs), size[name], begin, real))
+    lanes = size["all_mem"][1]
+    beginning = {
+        "stores": of_pairs(plan, size["stores"][1], size["stores"][2], real),
+        "all_mem": first_memories(plan, np.zeros(lanes, int), real),
+        "all_memory": memories(plan, lanes, real),
+    }
+    for name, one in beginning.items():
+        own[name] = cuda.to_device(np.repeat(one[None, : size[name][0]], len(jobs), axis=0))
     if not shape.registers:
         own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {
@@ -151,7 +155,7 @@ def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flo
     count = len(columns(plan.metrics))
     found = []
     for flock, tables in enumerate(jobs):
-        n = int(tables.whole[WHOLE.index("agents")])
+        n = tables.integers["agents"]
         exact = left["all_sums"][flock].astype(np.float64)
         sums = exact[:, 0].copy()
         sums[:count] -= exact[:count, 1]  # what Kahan's sum has lost so far
@@ -176,17 +180,3 @@ def _padded(arrays: Sequence[NDArray[Any]], fill: float = 0.0) -> NDArray[Any]:
 
 def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
     return np.stack([np.ascontiguousarray(start, real) for start in starts])
-
-
-def _silent(flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
-    """Packets of every pair before any was received."""
-    found = np.zeros((flocks, *size), real)
-    found[:, -1] = -1e9
-    return found
-
-
-def _memories(flocks: int, size: tuple[int, ...], begin: list[float], real: Any) -> NDArray[Any]:
-    found = np.zeros((flocks, *size), real)
-    for c, value in enumerate(begin[: size[0]]):
-        found[:, c] = value
-    return found

@@ -11,13 +11,14 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 
 import ast
 import re
-from collections.abc import Iterable
 
 from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, Registers, parse
 from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
+from airflock.engine.specialise.dead import read, written
+from airflock.engine.stages.words import START
 
-NEUTRAL = {"sum": "ZERO", "min": "FAR", "max": "-FAR"}
+NEUTRAL = {how: start.spelled for how, start in START.items()}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
 
 
@@ -44,7 +45,7 @@ class _Totals:
         done: list[ast.stmt] = []
         for statement in statements:
             agents = _over_agents(statement)
-            if self.waiting and (_of_one_thread(statement) or _names(statement, ast.Load) & set(self.waiting)):
+            if self.waiting and (_of_one_thread(statement) or read([statement]) & set(self.waiting)):
                 done += self.flush()
             if agents is not None:
                 done += self.agents(agents)
@@ -199,20 +200,7 @@ def _target(loop: ast.For) -> str:
     return loop.target.id if isinstance(loop.target, ast.Name) else ""
 
 
-def _names(node: ast.AST, context: type) -> set[str]:
-    return {item.id for item in ast.walk(node) if isinstance(item, ast.Name) and isinstance(item.ctx, context)}
-
-
-def used(statements: Iterable[ast.stmt]) -> tuple[set[str], set[str]]:
-    """Names that statements read, and names that they store."""
-    read: set[str] = set()
-    stored: set[str] = set()
-    for statement in statements:
-        read |= _names(statement, ast.Load)
-        stored |= _names(statement, ast.Store)
-        read |= {
-            item.target.id
-            for item in ast.walk(statement)
-            if isinstance(item, ast.AugAssign) and isinstance(item.target, ast.Name)
-        }
-    return read, stored
+def used(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
+    """Names that statements read, those among them that they add to, and names that they write."""
+    sums = [item.target for s in statements for item in ast.walk(s) if isinstance(item, ast.AugAssign)]
+    return read(statements) | written(sums), written(statements)

@@ -1,6 +1,5 @@
 """Memory: how much of a GPU's memory the flocks of one launch need, and how many agents fit."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from airflock.engine.cuda.shape import Shape, shape_of
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners, scratch_sizes
-from airflock.engine.plan import WHOLE, Plan
+from airflock.engine.plan import Plan
 from airflock.engine.tables import Tables
 from airflock.scenarios.cost import most_below
 
@@ -20,21 +19,15 @@ def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> Sh
     return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=bool(owners(plan)))
 
 
-def integers(tables: Tables) -> dict[str, int]:
-    """Integers of a world by name."""
-    return dict(zip(WHOLE, tables.whole.tolist(), strict=True))
-
-
 def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays that a launch works on, for one flock, by argument name; rows: of the table of states."""
-    whole, dims, lanes = integers(tables), plan.dimensions, shape.lanes
+    whole, dims, lanes = tables.integers, plan.dimensions, shape.lanes
     n, table = whole["agents"], not shape.registers
     model = len(getattr(plan.model.Memory, "_fields", ()))
     kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
-    heard = plan.noisy or plan.delayed
     return {
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
-        "pasts": (whole["ring"], 2 * dims, lanes) if heard else (1, 1, 1),
+        "pasts": (whole["ring"], 2 * dims, lanes) if plan.late else (1, 1, 1),
         "stores": (2 * dims + 1, lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
         "works": (rows, lanes) if table else (1, 1),
         "all_words": (4, lanes) if table else (1, 1),
@@ -50,7 +43,7 @@ def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tupl
 
 def scratch_of(plan: Plan, tables: Tables) -> tuple[tuple[int, int], list[int]]:
     """One table that holds all scratch arrays of a flock below each other: its shape, and the first row of each."""
-    found = scratch_sizes(plan, tables.row, integers(tables)["agents"])
+    found = scratch_sizes(plan, tables.row, tables.integers["agents"])
     first, width = [0], 1
     for height, breadth in (size for sizes in found for size in sizes):
         first.append(first[-1] + height)
@@ -68,12 +61,10 @@ def needed(plan: Plan, rows: int, shape: Shape, tables: Tables) -> int:
 
 def lacking(plan: Plan, rows: int, tables: Tables, free: int) -> str | None:
     """Why one such flock does not fit into this many free bytes: what it needs and how many agents fit; or None."""
-    agents, room = integers(tables)["agents"], int(SHARE * free)
+    agents, room = tables.integers["agents"], int(SHARE * free)
 
     def bytes_of(n: int) -> int:
-        whole = tables.whole.copy()
-        whole[WHOLE.index("agents")] = n
-        return needed(plan, rows, layout_of(plan, n, 1), replace(tables, whole=whole))
+        return needed(plan, rows, layout_of(plan, n, 1), tables.changed(agents=n))
 
     if bytes_of(agents) <= room:
         return None

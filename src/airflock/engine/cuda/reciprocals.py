@@ -11,6 +11,8 @@ import ast
 from collections.abc import Callable, Iterable
 from copy import deepcopy
 
+from airflock.engine.specialise.dead import written
+
 PREFIX = "per_"
 
 
@@ -49,8 +51,7 @@ class Forms:
         return self._keys[name]
 
     def _make(self, rule: ast.FunctionDef) -> None:
-        stored = {n.id for n in ast.walk(rule) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-        given = {argument.arg for argument in rule.args.args} - stored
+        given = {argument.arg for argument in rule.args.args} - written([rule])
 
         def known(expression: ast.expr) -> str | None:
             text = ast.unparse(expression)

@@ -55,13 +55,6 @@ def cell_of(x, y, z, box, count):
 
 
 @cuda.jit({options})
-def clear(counts):
-    c = cuda.grid(1)
-    if c < counts.shape[0]:
-        counts[c] = 0
-
-
-@cuda.jit({options})
 def count_agents(near, box, count, counts, cell, rank):
     a = cuda.grid(1)
     if a < near.shape[0]:

@@ -36,9 +36,8 @@ def begin(build: CudaBuilder) -> list[str]:
     if plan.beginnings:
         lines += agents(build, [f"{own(build, name)} = real({start})" for name, start in plan.beginnings.items()])
     lines += ["cuda.syncthreads()"]
-    names = [*axes, *(f"v{a}" for a in axes)]
     if plan.given_start:
-        given = [f"{own(build, name)} = starts[block, {c}, i]" for c, name in enumerate(names)]
+        given = [f"{own(build, name)} = starts[block, {c}, i]" for c, name in enumerate(plan.motion)]
         return [*lines, *agents(build, given), "cuda.syncthreads()", *_heard_at_start(build)]
     if plan.start in FORMATIONS:
         lines_, _ = by_stage(build, start.in_formation, s=Components("s", "vector"))
@@ -96,7 +95,6 @@ def agents(build: CudaBuilder, body: Iterable[str]) -> list[str]:
 
 
 def _heard_at_start(build: CudaBuilder) -> list[str]:
-    plan = build.plan
-    if not (plan.noisy or plan.delayed):
+    if not build.plan.late:
         return []
     return loop("slot in range(slots)", [build.stages["snapshot"].call()])

@@ -2,6 +2,7 @@
 
 import re
 
+from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.start import tables
 from airflock.engine.passes import flock
@@ -20,10 +21,7 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += ["faces = all_faces[block]; edges = all_edges[block]; spans = all_spans[block]"]
     lines += ["goals = all_goals[block]; reached = all_reached[block]; past = pasts[block]; store = stores[block]"]
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
-    wide = {"seed_low": "u32", "seed_high": "u32"}
-    names = {"ring": "slots"}
-    lines += [f"{names.get(w, w)} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
-    lines += ["n = agents", *_records(build), "late = real(delay) * row_c.dt"]
+    lines += [*numbers(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
     if shape.registers:
         for table, width in tables(build).items():
@@ -60,14 +58,11 @@ def _scratch(plan: Plan) -> list[str]:
     return ["room = scratches[block]", *zeros, f"scratch = ({' '.join(f'({arrays}),' for arrays in made)})"]
 
 
-def _records(build: CudaBuilder) -> list[str]:
-    """Records of numbers, once per flight."""
-    lines, offset = [], 0
-    for letter, fields in build.plan.records.items():
-        kind = build.source.record(letter.upper() * 2, fields)
-        lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
-        offset += len(fields)
-    return [*lines, *reciprocal_lines(build.reciprocals)]
+def numbers(build: CudaBuilder) -> list[str]:
+    """Integers and records of numbers of this world, once per kernel."""
+    wide = {"seed_low": "u32", "seed_high": "u32"}
+    lines = [f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
+    return [*lines, "n = agents", *build.numbers(build.plan.records, "row_"), *reciprocal_lines(build.reciprocals)]
 
 
 def _registers(build: CudaBuilder) -> list[str]:
@@ -86,7 +81,6 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
     if not kept:
         return "ZERO"
-    starts = [s for m in build.plan.metrics for s in getattr(m.Memory, "_field_defaults", {}).values()]
-    if kept[1] == "mem":
-        starts = list(getattr(build.plan.model.Memory, "_field_defaults", {}).values())
+    records = [build.plan.model.Memory] if kept[1] == "mem" else [metric.Memory for metric in build.plan.metrics]
+    starts = [start for record in records for start in defaults(record)]
     return f"real({starts[int(kept[2])]})"

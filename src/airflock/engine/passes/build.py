@@ -90,14 +90,16 @@ class Builder:
 
     def records(self, letters: str) -> list[str]:
         """Lines that read records of numbers (p, b, q, ...) from the parameter row."""
-        lines, offset = [], 0
-        for letter, fields in self.plan.records.items():
-            if letter in letters.split():
-                kind = self.kind(letter, fields)
-                values = ", ".join(f"row[{offset + i}]" for i in range(len(fields)))
-                lines.append(f"{letter} = {kind}({values})")
-            offset += len(fields)
-        return lines
+        return self.numbers(letters.split())
+
+    def numbers(self, letters: Iterable[str], prefix: str = "") -> list[str]:
+        """The same under names that begin with a prefix."""
+        spans, wanted = self.plan.spans, set(letters)
+        return [
+            f"{prefix}{letter} = {self.kind(letter, fields)}({', '.join(f'row[{c}]' for c in _places(spans[letter]))})"
+            for letter, fields in self.plan.records.items()
+            if letter in wanted
+        ]
 
     def whole(self, *names: str) -> list[str]:
         """Lines that read integers of this world."""
@@ -160,6 +162,10 @@ class Builder:
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that run once for the whole flock, and see all that came before."""
         return list(lines)
+
+
+def _places(span: slice) -> range:
+    return range(span.start, span.stop)
 
 
 def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:

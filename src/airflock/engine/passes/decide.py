@@ -1,14 +1,14 @@
-"""Meet neighbours, meet surfaces, decide: the three loop nests of one decision."""
+"""Meet neighbours, decide: two of the loop nests of a decision, with what their stages are handed."""
 
 import ast
 
 from airflock.engine.passes import grid, perceive, percept
 from airflock.engine.passes.build import Builder
 from airflock.engine.passes.perceive import RECEIVE
-from airflock.engine.specialise.stage import Specialised, lines_of, specialise
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.text import Specialised, lines_of
 from airflock.engine.specialise.values import Call, argument
 from airflock.engine.stages import decide as deciding
-from airflock.engine.stages import faults, silence, surfaces
 from airflock.engine.stages import meet as meeting_whom
 from airflock.engine.stages import neighbours as meeting
 from airflock.engine.stages.words import live
@@ -62,13 +62,6 @@ def _for_cells(
     return lines, before, lines_of(again.body), (lines_of(candidates.body), lines_of(made_of.first))
 
 
-def boundaries(build: Builder) -> None:
-    """Function boundaries: the boundary rule over all surfaces."""
-    made = specialise(build, surfaces.boundaries)
-    arguments = "n, row, whole, work, faces, edges, spans, scene"
-    build.stage(f"boundaries{build.mark}", arguments, made.once, made.body, made.answer)
-
-
 def decide(build: Builder) -> None:
     """Function decide: the law's rule for the command of each agent, and those that its percept is bound to."""
     plan, model = build.plan, build.plan.model
@@ -83,18 +76,6 @@ def decide(build: Builder) -> None:
     percept.bind(build)
     arguments = "k_, n, time, row, whole, work, mem, edges, spans, scene"
     build.stage(f"decide{build.mark}", arguments, made.once, made.body, made.answer)
-
-
-def stop(build: Builder) -> None:
-    """Function stop: who has lost somebody stands still, where the scenario says so."""
-    made = specialise(build, silence.stop)
-    build.stage("stop", "n, time, row, work, store", made.once, made.body, made.answer)
-
-
-def overrule(build: Builder) -> None:
-    """Function overrule: faults of the commands, where there are such kinds."""
-    made = specialise(build, faults.overrule, time=argument("time"))
-    build.stage("overrule", "n, time, row, work", made.once, made.body, made.answer)
 
 
 def _asked(build: Builder, sums: list[int]) -> list[int]:

@@ -4,11 +4,12 @@ from collections.abc import Callable
 from functools import partial
 
 from airflock.engine import vectors
-from airflock.engine.passes import decide, flock, grid, measure, move, perceive, scene, slots
+from airflock.engine.passes import decide, flock, grid, measure, move, perceive, slots
 from airflock.engine.passes.build import Builder, columns
 from airflock.engine.passes.measure import measured
+from airflock.engine.passes.plain import plain
 from airflock.engine.plan import Plan
-from airflock.engine.primitives import primitives
+from airflock.engine.primitives import DECLARED, primitives
 from airflock.engine.replace import must_replace
 from airflock.engine.schedule import BY_LAW, in_turn, order
 from airflock.engine.specialise.stage import specialise
@@ -30,35 +31,28 @@ integer = np.int{bits}
 COUNTED = True  # references to arrays; not where a driver makes no arrays of its own
 INLINE = dict(fastmath=True, error_model="numpy", _nrt=COUNTED, **INNER)
 JIT = INLINE | dict(nogil=True, forceinline=True)
-ZERO = real(0.0)
-HALF = real(0.5)
-ONE = real(1.0)
-TINY = real(1e-12)
-FAR = real(1e30)
-LIMIT = real(1e8)
-AWAY = real(1e9)
-{primitives}
 """
+HEAD += DECLARED + "\n{primitives}\n"
 
 
 MADE: dict[str, Callable[[Builder], None]] = {  # what makes the function of each stage; rows are numbered in this order
     "snapshot": perceive.snapshot,
-    "perceive": perceive.perceive,
-    "tune": perceive.tune,
+    "perceive": partial(plain, name="perceive"),
+    "tune": partial(plain, name="tune"),
     "receive": perceive.receive,
     "meet": perceive.meet,
     "neighbours": decide.neighbours,
-    "boundaries": decide.boundaries,
+    "boundaries": partial(plain, name="boundaries"),
     "flock": flock.flock,
     "decide": decide.decide,
-    "stop": decide.stop,
-    "overrule": decide.overrule,
+    "stop": partial(plain, name="stop"),
+    "overrule": partial(plain, name="overrule"),
     "move": move.move,
     "measure_sample": partial(measure.measure, clock="sample"),
     "measure_collision": partial(measure.measure, clock="collision"),
-    "aim_": scene.aim,
-    "glide_": scene.glide,
-    "appear_": scene.appear,
+    "aim_": partial(plain, name="aim_"),
+    "glide_": partial(plain, name="glide_"),
+    "appear_": partial(plain, name="appear_"),
     "rearrange": slots.rearrange,
 }
 CALLED = ("snapshot", "receive", "meet")  # made whatever is due: others call them, or a kernel holds them

@@ -57,12 +57,12 @@ def survey(build: Builder, metric: Metric) -> list[str]:
 
 
 def _call(build: Builder, owner: Owner) -> list[str]:
-    plan, axes = build.plan, build.plan.axes
+    plan = build.plan
     number = [each.name for each in owners(plan)].index(owner.name)
     work = build.source.name(_record(owner, plan))
     fields = _record(owner, plan)._fields
     given = {"work": f"scratch_{owner.name}", "shared": f"shared_{owner.name}"}
-    flown = [*axes, *(f"v{a}" for a in axes)]
+    flown = plan.motion
     used = asks(owner.rule, owner.kind, owner.name)
     lines = build.bind([name for name in flown if name in used])
     for name in ("x", "y", "z", "vx", "vy", "vz"):
@@ -85,13 +85,11 @@ def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str,
     """Parameters of an owner, of the wing and of drag descent as plain records by name, from a row of numbers."""
     found = {}
     for letter in (owner.letter, "wing", "aero"):
-        start = 0
-        for other, names in plan.records.items():
-            if other == letter:
-                numbers = {name: 0.0 if row is None else float(row[start + c]) for c, name in enumerate(names)}
-                whole = {key: tuple(numbers[part] for part in names_of(key, n)) for key, n in vectors_of(names).items()}
-                found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {}), **whole})
-            start += len(names)
+        names = plan.records[letter]
+        values = [0.0] * len(names) if row is None else row[plan.spans[letter]].tolist()
+        numbers = dict(zip(names, values, strict=True))
+        whole = {key: tuple(numbers[part] for part in names_of(key, n)) for key, n in vectors_of(names).items()}
+        found[letter] = SimpleNamespace(**{**numbers, **plan.constants.get(letter, {}), **whole})
     return found
 
 

@@ -71,10 +71,8 @@ def neighbours(
 
     met : where an agent meets but some of whom it hears, lines before `inner` that find out: of each candidate, at last
     """
-    axes = build.plan.axes
     build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
-    names = [*axes, *(f"v{a}" for a in axes)]
-    for c, name in enumerate(names):
+    for c, name in enumerate(build.plan.motion):
         before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
     before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
@@ -149,7 +147,7 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
     """
     axes = build.plan.axes
-    names = [*axes, *(f"v{a}" for a in axes)]
+    names = build.plan.motion
     lines = [*build.bind(names), *build.order(), "low, size, count = cells_of(n, near, row, work)"]
     lines += ["total = count[0] * count[1] * count[2]"]
     inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]

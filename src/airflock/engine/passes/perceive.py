@@ -4,7 +4,6 @@ from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
-from airflock.engine.stages import faults
 from airflock.engine.stages import meet as meeting
 from airflock.engine.stages import perceive as measuring
 from airflock.engine.stages import receive as hearing
@@ -20,18 +19,6 @@ def snapshot(build: Builder) -> None:
     """Function snapshot: the true states into a slot of the ring."""
     made = specialise(build, measuring.snapshot)
     build.function("snapshot(slot, m, work, ring)", made.lines)
-
-
-def perceive(build: Builder) -> None:
-    """Function perceive: own state as measured, the others' as heard."""
-    made = specialise(build, measuring.perceive, decision=argument("k"))
-    build.function("perceive(k, slot, m, row, whole, work, ring, words)", made.lines, "return 0")
-
-
-def tune(build: Builder) -> None:
-    """Function tune: what faults leave of radios and clocks, where there are such kinds."""
-    made = specialise(build, faults.tune, decision=argument("k_"))
-    build.function("tune(k_, m, row, work)", made.lines, "return 0")
 
 
 def meet(build: Builder) -> None:

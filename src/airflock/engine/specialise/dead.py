@@ -6,12 +6,17 @@ from collections.abc import Iterable
 
 def read(nodes: Iterable[ast.AST]) -> set[str]:
     """Names that are read."""
-    return {
-        item.id
-        for node in nodes
-        for item in ast.walk(node)
-        if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load)
-    }
+    return _names(nodes, ast.Load)
+
+
+def written(nodes: Iterable[ast.AST]) -> set[str]:
+    """Names that are written."""
+    return _names(nodes, ast.Store)
+
+
+def _names(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
+    found = (item for node in nodes for item in ast.walk(node) if isinstance(item, ast.Name))
+    return {item.id for item in found if isinstance(item.ctx, context)}
 
 
 def without_dead(statements: list[ast.stmt], kept: set[str]) -> list[ast.stmt]:

@@ -6,8 +6,7 @@ import inspect
 import math
 import operator
 import types
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -20,10 +19,9 @@ from airflock.engine.specialise.values import (
     Call,
     Components,
     Function,
-    StageError,
-    Text,
+    Scope,
     given,
-    kind_of,
+    residual,
     text_of,
 )
 from airflock.engine.stages import words
@@ -31,14 +29,9 @@ from airflock.engine.stages.words import Itself, Named, Nothing
 
 # of the driver, whatever they are called with
 KEPT: dict[Any, str] = {
-    words.real: "real",
-    words.integer: "integer",
-    words.least: "least",
-    words.most: "most",
-    words.choose: "choose",
-    words.repeat: "range",
-}
-LOCALS: dict[Any, str] = {words.vector: "vector", words.totals: "totals", words.aliases: "aliases"}
+    word: word.__name__ for word in (words.real, words.integer, words.least, words.most, words.choose)
+} | {words.repeat: "range"}
+LOCALS: dict[Any, str] = {word: word.__name__ for word in (words.vector, words.totals, words.aliases)}
 STAGES = words.__name__.rpartition(".")[0]
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -50,29 +43,6 @@ OPERATORS: dict[type, Callable[..., Any]] = {
 }  # fmt: skip
 MODULES = {math: "math", np: "np"}  # that drivers import
 MISSING = object()
-
-
-@dataclass
-class Scope:
-    """What the names of a stage, or of a helper in it, stand for."""
-
-    text: Text
-    known: dict[str, object] = field(default_factory=dict)
-
-    def fault(self, node: ast.AST, what: str) -> StageError:
-        """An error that names the line of the stage."""
-        line = getattr(node, "lineno", self.text.node.lineno)
-        return StageError(f"{self.text.where}:{line}: {self.text.node.name}: {what}")
-
-
-def residual(value: object) -> bool:
-    """Whether a value is syntax of the driver."""
-    return isinstance(value, ast.expr)
-
-
-def settled(value: object) -> bool:
-    """Whether a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
-    return not residual(value) or kind_of(value) not in (None, "rule")
 
 
 class Expressions:
@@ -201,9 +171,6 @@ class Expressions:
     def _List(self, node: ast.List, scope: Scope) -> object:
         return self._items(node.elts, scope)
 
-    def _Set(self, node: ast.Set, scope: Scope) -> object:
-        return set(self._items(node.elts, scope))
-
     def _items(self, nodes: Iterable[ast.expr], scope: Scope) -> list[Any]:
         found: list[Any] = []
         for node in nodes:
@@ -214,25 +181,22 @@ class Expressions:
         return found
 
     def _GeneratorExp(self, node: ast.GeneratorExp | ast.ListComp, scope: Scope) -> object:
-        (part,) = node.generators
-        found = []
-        for item in self.value(part.iter, scope):
-            inner = Scope(scope.text, dict(scope.known))
-            self.bind(part.target, item, inner)
-            if all(self.value(test, inner) for test in part.ifs):
-                found.append(self.value(node.elt, inner))
-        return found
+        return [self.value(node.elt, inner) for inner in self.turns(node.generators, scope)]
 
     _ListComp = _GeneratorExp
 
     def _DictComp(self, node: ast.DictComp, scope: Scope) -> object:
-        (part,) = node.generators
-        found = {}
+        inner = self.turns(node.generators, scope)
+        return {self.value(node.key, each): self.value(node.value, each) for each in inner}
+
+    def turns(self, parts: list[ast.comprehension], scope: Scope) -> Iterator[Scope]:
+        """Scopes of the turns of a comprehension over what is known."""
+        (part,) = parts
         for item in self.value(part.iter, scope):
             inner = Scope(scope.text, dict(scope.known))
             self.bind(part.target, item, inner)
-            found[self.value(node.key, inner)] = self.value(node.value, inner)
-        return found
+            if all(self.value(test, inner) for test in part.ifs):
+                yield inner
 
     def _Dict(self, node: ast.Dict, scope: Scope) -> object:
         found: dict[Any, Any] = {}

@@ -3,53 +3,34 @@
 import ast
 import types
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import WHOLE
 from airflock.engine.specialise.apart import Owners, renamed, shares
-from airflock.engine.specialise.dead import read, without_dead
-from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions, Scope, residual, settled
-from airflock.engine.specialise.values import LOAD, Bundle, Components, Loop, StageError, given, kind_of, text_of
+from airflock.engine.specialise.dead import read, without_dead, written
+from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions
+from airflock.engine.specialise.text import Specialised
+from airflock.engine.specialise.values import (
+    LOAD,
+    Bundle,
+    Components,
+    Loop,
+    Scope,
+    StageError,
+    given,
+    kind_of,
+    residual,
+    settled,
+    text_of,
+)
 from airflock.engine.stages import words
 from airflock.engine.stages.state import SCENE, Flock, own_row
 from airflock.engine.stages.words import Itself, Named
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
 UNROLLED = (range, tuple, list, enumerate, zip)
-
-
-@dataclass(frozen=True)
-class Specialised:
-    """Text of a stage for one plan.
-
-    bindings : lines that bind rows, records and integers
-    first    : what is done once per step
-    rest     : what is done for all agents or, in a sequential update, for agent i
-    answer   : what the stage returns
-    """
-
-    bindings: list[str]
-    first: list[ast.stmt]
-    rest: list[ast.stmt]
-    answer: str
-
-    @property
-    def once(self) -> list[str]:
-        """Lines of what is done before anything is done for an agent."""
-        return [*self.bindings, *lines_of(self.first)]
-
-    @property
-    def body(self) -> list[str]:
-        """Lines of what is done for agents."""
-        return lines_of(self.rest)
-
-    @property
-    def lines(self) -> list[str]:
-        """All of them, for a function that is no stage of its own."""
-        return [*self.once, *self.body]
 
 
 def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Specialised:
@@ -76,11 +57,6 @@ def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Sp
         [statement for statement in whole if id(statement) not in first],
         "0" if answer is None else ast.unparse(answer),
     )
-
-
-def lines_of(statements: list[ast.stmt]) -> list[str]:
-    """Lines of statements."""
-    return [line for statement in statements for line in ast.unparse(statement).splitlines()]
 
 
 def _bindings(build: Builder, names: list[Any]) -> list[str]:
@@ -145,7 +121,7 @@ class _Statements(Expressions):
         last = done.pop() if done and isinstance(done[-1], ast.Return) else None
         answer = last.value if isinstance(last, ast.Return) else None
         once, body = done[: self.split], done[len(done) if self.split is None else self.split :]
-        carried = {item.id for s in body for item in ast.walk(s) if isinstance(item, ast.Name) and _stored(item)}
+        carried = written(body)
         first = [s for s in once if isinstance(s, ast.Assign) and _name(s.targets[0]) in carried]
         return [s for s in once if s not in first], [*first, *body], answer
 
@@ -306,10 +282,6 @@ class _Statements(Expressions):
 def _ends(statements: list[ast.stmt]) -> bool:
     """Whether nothing after these statements would be reached."""
     return bool(statements) and isinstance(statements[-1], (ast.Return, ast.Break, ast.Continue))
-
-
-def _stored(node: ast.Name) -> bool:
-    return isinstance(node.ctx, ast.Store)
 
 
 def _name(node: ast.expr) -> str:

@@ -136,3 +136,26 @@ def text_of(function: Callable[..., Any]) -> Text:
     once = frozenset(name for name, count in bound.items() if count == 1 and name not in parameters)
     again = frozenset(bound) & parameters
     return Text(node, frozenset(bound) | parameters, once, again, function.__globals__, function.__code__.co_filename)
+
+
+@dataclass
+class Scope:
+    """What the names of a stage, or of a helper in it, stand for."""
+
+    text: Text
+    known: dict[str, object] = field(default_factory=dict)
+
+    def fault(self, node: ast.AST, what: str) -> StageError:
+        """An error that names the line of the stage."""
+        line = getattr(node, "lineno", self.text.node.lineno)
+        return StageError(f"{self.text.where}:{line}: {self.text.node.name}: {what}")
+
+
+def residual(value: object) -> bool:
+    """Whether a value is syntax of the driver."""
+    return isinstance(value, ast.expr)
+
+
+def settled(value: object) -> bool:
+    """Whether a local of this value needs no variable: it is known, or a name that the driver binds anyway."""
+    return not residual(value) or kind_of(value) not in (None, "rule")

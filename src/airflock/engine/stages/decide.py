@@ -9,7 +9,7 @@ from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own
 from airflock.engine.plan import Plan
-from airflock.engine.stages.state import Flock, numbers_of, tree
+from airflock.engine.stages.state import Columns, Flock, entry_of, numbers_of, tree
 from airflock.engine.stages.words import ONE, ZERO, X, Y, Z, ask, fields, real, vector, wants
 from airflock.world import bvh
 
@@ -21,24 +21,14 @@ def asks(model: Model, name: str) -> bool:
     return any(wants(rule, name) for rule in model.deciding)
 
 
-def heard(i: int, flock: Flock, summed: Iterable[int], *, model: Model) -> Any:
-    """Sums of the neighbours of agent i; fields that nobody sums are zero."""
-    return model.Sums(*[flock.sums[c][i] if c in summed else ZERO for c in fields(model.Sums)])  # type: ignore[misc]
-
-
-def felt(i: int, flock: Flock, walled: Iterable[int], *, model: Model) -> Any:
-    """Sums of the surfaces around agent i."""
-    return model.Walls(*[flock.walls[c][i] if c in walled else ZERO for c in fields(model.Walls)])  # type: ignore[misc]
+def added_up(i: int, record: Any, rows: Columns, live: Iterable[int]) -> Any:
+    """Sums or Walls of agent i; fields that nobody sums are zero."""
+    return record(*[rows[c][i] if c in live else ZERO for c in fields(record)])
 
 
 def solved(i: int, flock: Flock, *, model: Model) -> Any:
     """What the rule of the whole flock found for agent i."""
     return model.Shared(*[flock.shared("model", name)[i] for name in model.Shared._fields])  # type: ignore[misc, union-attr]
-
-
-def remembered(i: int, mem: Any, *, model: Model) -> Any:
-    """What the law remembers of agent i."""
-    return model.Memory(*[mem[c, i] for c in fields(model.Memory)])  # type: ignore[misc]
 
 
 def goal_of(i: int, a: int, flock: Flock, scene: Any, *, plan: Plan) -> Any:
@@ -53,6 +43,18 @@ def offset(i: int, a: int, flock: Flock, scene: Any, *, plan: Plan) -> Any:
         if (plan.goals or plan.own) and a < plan.dimensions
         else ZERO
     )
+
+
+def add(
+    i: int, own: Own, shared: Any, percept: Any, flock: Flock, numbers: Any, *, plan: Plan, model: Model
+) -> None:  # fmt: skip
+    """Add what the law's added rule asks for to the command of agent i."""
+    more = ask(
+        model.added.decide, own=own, shared=shared, percept=percept, period=numbers.c.period, wing=numbers.wing,  # type: ignore[union-attr]
+        aero=numbers.aero,
+    )  # fmt: skip
+    for a in range(plan.dimensions):
+        flock.command[a][i] += more[a]
 
 
 def decide(
@@ -75,10 +77,10 @@ def decide(
             v[a] = flock.measured_velocity[a][i]
         f = ONE / norm(v[X], v[Y], v[Z])
         own = Own(v[X], v[Y], v[Z], f * v[X], f * v[Y], f * v[Z])
-        sums = heard(i, flock, summed, model=model) if asks(model, "sums") else None
-        walls = felt(i, flock, walled, model=model) if asks(model, "walls") else None
+        sums = added_up(i, model.Sums, flock.sums, summed) if asks(model, "sums") else None
+        walls = added_up(i, model.Walls, flock.walls, walled) if asks(model, "walls") else None
         shared = solved(i, flock, model=model) if asks(model, "shared") else None
-        memory = remembered(i, mem, model=model) if asks(model, "memory") else None
+        memory = entry_of(i, model.Memory, mem, 0) if asks(model, "memory") else None
         if perceives and model.sight is not None:
             # decided side by side, each agent gathers into memory of its own
             near = np.empty(NEAR, np.int64) if plan.grid else scene.near
@@ -105,12 +107,7 @@ def decide(
         for a in axes:
             flock.command[a][i] = o[a]
         if model.added is not None:
-            more = ask(
-                model.added.decide, own=own, shared=shared, percept=percept if perceives else None,
-                period=numbers.c.period, wing=numbers.wing, aero=numbers.aero,
-            )  # fmt: skip
-            for a in axes:
-                flock.command[a][i] += more[a]
+            add(i, own, shared, percept if perceives else None, flock, numbers, plan=plan, model=model)
         if asks(model, "memory"):
             for c in fields(model.Memory):
                 mem[c, i] = o[3][c]

@@ -40,13 +40,17 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
                 memory[one.row + c, i] = float(start)
 
 
-def record(flock: Flock, frames: Any, frame: int, n: int, *, plan: Plan) -> None:
-    """Keep positions, velocities and commands as a frame: frames[frame, component, agent]."""
-    rows = (flock.position, flock.velocity, flock.command)
-    for i in range(n):
-        for part, row in enumerate(rows):
-            for a in range(plan.dimensions):
-                frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
+def record(step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan) -> None:
+    """Keep positions, velocities and commands as a frame, where a plan records: frames[frame, component, agent].
+
+    The first frame is that of the first sample at or after the step `first`.
+    """
+    if plan.record:
+        frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
+        for i in range(n):
+            for part, row in enumerate((flock.position, flock.velocity, flock.command)):
+                for a in range(plan.dimensions):
+                    frames[frame, part * plan.dimensions + a, flock.number[i]] = row[a][i]
 
 
 def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
@@ -60,6 +64,43 @@ def turns(n: int, *, stages: Stages, order: tuple[str, ...]) -> Any:
             ask(stages[name], i=i)
         fastest = most(fastest, ask(stages[order[-1]], i=i))
     return fastest
+
+
+def take(
+    name: str, time: Any, values: Any, sums: Any, *, stages: Stages, sampled: Mapping[str, tuple[Sampled, int]]
+) -> None:
+    """Let a stage measure, and add up what it found."""
+    ask(stages[name], time=time)
+    add_up(sums, values, *sampled[name])
+
+
+def prepare(
+    held: Any, flock: Flock, whole: Any, m: int, past: Any, *, stages: Stages, order: Order, slots: bool
+) -> None:
+    """Once agents have their places: who lies in which slot, and what was sent before the first step."""
+    if slots:
+        for i in range(m):
+            flock.number[i] = i
+    if order["send"]:
+        for slot in range(whole.ring):
+            ask(stages["snapshot"], slot=slot, ring=past)
+    held[4] = ONE
+
+
+def sense(
+    step: int, time: Any, late: Any, numbers: Any, whole: Any, past: Any, *, plan: Plan, stages: Stages, order: Order
+) -> None:
+    """What comes before anybody moves: what is sent, what changes in the world and, unless in turn, decisions."""
+    for name in order["send"]:
+        if (step + whole.delay) % whole.decide_every == 0:
+            ask(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
+    for name in order["world"]:
+        ask(stages[name], time=time, elapsed=numbers.c.dt)
+    if not plan.sequential and step % whole.decide_every == 0:
+        k = step // whole.decide_every
+        for name in order["decide"]:
+            if name != "rearrange" or k % EVERY == 0:
+                ask(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
 
 
 def advance(  # noqa: C901 - tests of the plan leave one way through
@@ -82,13 +123,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         status = ask(stages["begin"])
         if status < 0:
             return status  # type: ignore[no-any-return]
-        if slots:
-            for i in range(m):
-                flock.number[i] = i
-        if order["send"]:
-            for slot in range(whole.ring):
-                ask(stages["snapshot"], slot=slot, ring=past)
-        held[4] = ONE
+        prepare(held, flock, whole, m, past, stages=stages, order=order, slots=slots)
     travelled = held[0]
     gap = held[1]
     calm = held[2] > HALF
@@ -97,16 +132,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     for step in range(first, last):
         time = real(step) * numbers.c.dt
         if plan.sequential or (step != first) | (half & 1 == 0):
-            for name in order["send"]:
-                if (step + whole.delay) % whole.decide_every == 0:
-                    ask(stages[name], slot=((step + whole.delay) // whole.decide_every) % whole.ring, ring=past)
-            for name in order["world"]:
-                ask(stages[name], time=time, elapsed=numbers.c.dt)
-            if not plan.sequential and step % whole.decide_every == 0:
-                k = step // whole.decide_every
-                for name in order["decide"]:
-                    if name != "rearrange" or k % EVERY == 0:
-                        ask(stages[name], k=k, k_=k, slot=k % whole.ring, ring=past, time=time, late=late)
+            sense(step, time, late, numbers, whole, past, plan=plan, stages=stages, order=order)
         # where agents take turns, who senses and who moves alternate: there is no place to cut a step
         if not plan.sequential and half & 2 != 0:
             break
@@ -124,19 +150,15 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                     travelled = ZERO
                     calm = False
                 else:
-                    ask(stages[name], time=time)
-                    add_up(sums, values, *sampled[name])
+                    take(name, time, values, sums, stages=stages, sampled=sampled)
         if plan.stop and values[collided] > HALF:
             held[3] = ONE
             following = step
             break
         if (order["sample"] or plan.record) and step % whole.sample_every == 0:
             for name in order["sample"]:
-                ask(stages[name], time=time)
-                add_up(sums, values, *sampled[name])
-            if plan.record:
-                frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
-                record(flock, frames, frame, n, plan=plan)
+                take(name, time, values, sums, stages=stages, sampled=sampled)
+            record(step, first, flock, frames, whole, n, plan=plan)
         if step < whole.steps:
             fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt
@@ -165,12 +187,10 @@ def measure_frames(
             ask(stages[name], time=time, elapsed=frame_period)
         for name in order["watch"]:
             if step % whole.collide_every == 0:
-                ask(stages[name], time=time)
-                add_up(sums, values, *sampled[name])
+                take(name, time, values, sums, stages=stages, sampled=sampled)
         for name in order["sample"]:
             if step % whole.sample_every == 0:
-                ask(stages[name], time=time)
-                add_up(sums, values, *sampled[name])
+                take(name, time, values, sums, stages=stages, sampled=sampled)
         for c in range(len(values)):
             series[step, c] = values[c]
     return 0

@@ -9,7 +9,7 @@ from airflock.core.maths import norm
 from airflock.core.vocabulary import Mean
 from airflock.engine.plan import Plan
 from airflock.engine.stages.scene import contacts
-from airflock.engine.stages.state import Axes, Flock
+from airflock.engine.stages.state import Axes, Flock, entry_of
 from airflock.engine.stages.words import (
     FAR,
     ONE,
@@ -158,11 +158,6 @@ def pairs(  # noqa: C901 - tests of the plan leave one way through
     return least2
 
 
-def remembered(record: Any, memory: Any, row: int, i: int) -> Any:
-    """A record of agent i from the rows of a table, from one on."""
-    return record(*[memory[row + c, i] for c in fields(record)])
-
-
 def moving(i: int, flock: Flock) -> Any:
     """Of agent i what every rule may ask for: position, velocity, heading and speed."""
     return {
@@ -195,7 +190,7 @@ def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n
             pair = found(metric.Pair, flock.pair, i, metric) if wants(metric.agent, "pair") else None
             shared = found(metric.Shared, flock.shared, i, metric) if wants(metric.agent, "shared") else None
             if wants(metric.agent, "memory"):
-                before = remembered(metric.Memory, memory, row, i)
+                before = entry_of(i, metric.Memory, memory, row)
                 t, kept = judged(i, pair, shared, before, mean, flock, numbers, metric=metric)
                 for c in fields(metric.Memory):
                     memory[row + c, i] = kept[c]

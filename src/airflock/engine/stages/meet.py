@@ -6,9 +6,10 @@ from typing import Any
 
 from airflock.core import random
 from airflock.engine.plan import Plan
+from airflock.engine.stages.percept import to_obstacle
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
-from airflock.world import bvh, polygon, rays
+from airflock.world import bvh
 
 FADE = random.FADE
 
@@ -26,10 +27,7 @@ def free_way(
     free = r
     if plan.obstacles:
         for o in range(whole.obstacles):
-            if plan.obstacle is polygon.prism:
-                free = least(free, polygon.ray_to_prism(x, y, z, ux, uy, uz, edges, spans[o, 0], spans[o, 1]))
-            else:
-                free = least(free, rays.to_edges(x, y, ux, uy, edges, spans[o, 0], spans[o, 1]))
+            free = least(free, to_obstacle(x, y, z, ux, uy, uz, edges, spans, o, plan=plan))
     if plan.scene:
         free = least(free, bvh.cast(x, y, z, ux, uy, uz, r, ZERO, *tree(scene)))
     return free

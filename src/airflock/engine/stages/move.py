@@ -5,18 +5,13 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
-from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.state import Flock, column_of, numbers_of
 from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, most, real, wants
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
     """Own velocity as agent i measures it along one axis, m/s."""
     return flock.velocity[a][i] + flock.own_drift[a][i] if plan.noisy and a < plan.dimensions else flock.velocity[a][i]
-
-
-def remembered(i: int, flock: Flock, *, plan: Plan) -> Any:
-    """What the body of agent i remembers."""
-    return plan.body.Memory(*[flock.body[c][i] for c in fields(plan.body.Memory)]) if plan.body.Memory else None
 
 
 def respond(
@@ -29,8 +24,8 @@ def respond(
             plan.body.move, vx=v[X][i], vy=v[Y][i], vz=v[Z][i], cx=command[X][i], cy=command[Y][i], cz=command[Z][i],
             mx=felt(i, X, flock, plan=plan), my=felt(i, Y, flock, plan=plan), mz=felt(i, Z, flock, plan=plan),
             gx=g[X][i], gy=g[Y][i], gz=g[Z][i], wx=wx, wy=wy, wz=wz if plan.dimensions == 3 else ZERO,
-            memory=remembered(i, flock, plan=plan), dt=numbers.c.dt, b=numbers_of(i, "b", flock, numbers, plan=plan),
-            wing=numbers.wing,
+            memory=column_of(i, plan.body.Memory, flock.body), dt=numbers.c.dt, wing=numbers.wing,
+            b=numbers_of(i, "b", flock, numbers, plan=plan),
         )  # fmt: skip
         for kind in plan.suffers("motion"):
             on = lasts(i, kind, time, flock, numbers)

@@ -12,7 +12,7 @@ from airflock.core.sensor import FIRST
 from airflock.engine.plan import Plan
 from airflock.engine.stages import faults
 from airflock.engine.stages.noise import normals, uniforms
-from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.state import Flock, column_of, numbers_of
 from airflock.engine.stages.words import X, Y, Z, ask, fields, real, wants
 
 SENSOR = random.SENSOR
@@ -43,18 +43,13 @@ def drawn(flock: Flock, whole: Any, decision: int, m: int, *, plan: Plan) -> Non
         uniforms(flock, flock.chances, whole, decision, SENSOR + 256 * (FIRST + 3), m)
 
 
-def recalled(i: int, flock: Flock, *, plan: Plan) -> Any:
-    """What the sensor of agent i remembers."""
-    return plan.sensor.Memory(*[flock.sense[c][i] for c in fields(plan.sensor.Memory)]) if plan.sensor.Memory else None
-
-
 def measure(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, *, plan: Plan) -> None:
     """Own states by the rule of the sensor, and how far they are off."""
     x, v, g, u = flock.position, flock.velocity, flock.errors, flock.chances
     for i in lanes:
         t = ask(
             plan.sensor.measure, x=x[X][i], y=x[Y][i], z=x[Z][i], vx=v[X][i], vy=v[Y][i], vz=v[Z][i],
-            memory=recalled(i, flock, plan=plan), **{"g" + str(c): g[c][i] for c in range(12)},
+            memory=column_of(i, plan.sensor.Memory, flock.sense), **{"g" + str(c): g[c][i] for c in range(12)},
             **{"u" + str(c): u[c][i] for c in range(4)}, time=time, period=numbers.c.period,
             s=numbers_of(i, "s", flock, numbers, plan=plan),
         )  # fmt: skip

@@ -16,6 +16,17 @@ def level(z: Any, edges: Any, corners: int, *, plan: Plan) -> Any:
     return z - edges[corners, 0] if plan.raised else z
 
 
+def to_obstacle(
+    x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, edges: Any, spans: Any, o: Any, *, plan: Plan
+) -> Any:  # fmt: skip
+    """Free distance along a ray to obstacle number o, m."""
+    return (
+        polygon.ray_to_prism(x, y, z, ux, uy, uz, edges, spans[o, 0], spans[o, 1])
+        if plan.obstacle is polygon.prism
+        else rays.to_edges(x, y, ux, uy, edges, spans[o, 0], spans[o, 1])
+    )
+
+
 def ray(percept: Any, ux: float, uy: float, uz: float, length: float, *, plan: Plan) -> Any:
     """Free distance (m) along the unit vector u to walls, obstacles and the scene, at most `length` (m)."""
     x = -percept.centre_x
@@ -30,12 +41,7 @@ def ray(percept: Any, ux: float, uy: float, uz: float, length: float, *, plan: P
     )  # fmt: skip
     if plan.obstacles:
         for o in range(percept.obstacles):
-            if plan.obstacle is polygon.prism:
-                free = polygon.ray_to_prism(
-                    x, y, z, ux, uy, uz, percept.edges, percept.spans[o, 0], percept.spans[o, 1]
-                )
-            else:
-                free = rays.to_edges(x, y, ux, uy, percept.edges, percept.spans[o, 0], percept.spans[o, 1])
+            free = to_obstacle(x, y, z, ux, uy, uz, percept.edges, percept.spans, o, plan=plan)
             t = least(t, free)
     if plan.scene:
         t = least(t, bvh.cast(x, y, z, ux, uy, uz, t, ZERO, percept.shapes, percept.nodes, percept.links))
@@ -70,18 +76,21 @@ def cast(
     return t
 
 
-def normal(percept: Any, draw: int) -> Any:
-    """Normal random number N(0, 1) of this agent and decision."""
-    w0, w1, w2, w3 = random.draw(
+def drawn(percept: Any, draw: int) -> Any:
+    """Random words of this agent and decision."""
+    return random.draw(
         percept.agent, percept.step, MODEL + 256 * draw, percept.world, percept.seed_low, percept.seed_high
     )
+
+
+def normal(percept: Any, draw: int) -> Any:
+    """Normal random number N(0, 1) of this agent and decision."""
+    w0, w1, w2, w3 = drawn(percept, draw)
     a, b = random.normal_pair(w0, w1)
     return a
 
 
 def uniform(percept: Any, draw: int) -> Any:
     """Uniform random number between 0 and 1."""
-    w0, w1, w2, w3 = random.draw(
-        percept.agent, percept.step, MODEL + 256 * draw, percept.world, percept.seed_low, percept.seed_high
-    )
+    w0, w1, w2, w3 = drawn(percept, draw)
     return random.uniform(w0)

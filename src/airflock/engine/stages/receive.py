@@ -99,13 +99,9 @@ def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
     )
 
 
-def offset(i: int, j: int, a: int, w: Any, flock: Flock, *, plan: Plan) -> Any:
-    """True offset from agent i to agent j along one axis, to its nearest image, m."""
-    return (
-        nearest_image(flock.position[a][j] - flock.position[a][i], getattr(w, SIDES[a]))
-        if plan.periodic
-        else flock.position[a][j] - flock.position[a][i]
-    )
+def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
+    """Offset between two coordinates along one axis, to the nearest image, m."""
+    return nearest_image(there - here, getattr(w, SIDES[a])) if plan.periodic else there - here
 
 
 def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
@@ -114,7 +110,7 @@ def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, p
     for j in others:
         o = vector()
         for a in range(plan.dimensions):
-            o[a] = offset(i, j, a, w, flock, plan=plan)
+            o[a] = apart(flock.position[a][j], flock.position[a][i], a, w, plan=plan)
         audible = sum(o[a] * o[a] for a in range(plan.dimensions)) <= range2
         talkers = talkers + choose(audible & (integer(j) != integer(i)), ONE, ZERO)
     return talkers
@@ -130,7 +126,7 @@ def shade(
         flock.clear[j] = ONE
         o = vector()
         for a in range(plan.dimensions):
-            o[a] = offset(i, j, a, w, flock, plan=plan)
+            o[a] = apart(flock.position[a][j], flock.position[a][i], a, w, plan=plan)
         apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
         if (apart2 <= range2) & (integer(j) != integer(i)):
             r = math.sqrt(apart2 + TINY)
@@ -219,11 +215,6 @@ def glimpse(
         packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
         packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
     packet[2 * dims] = choose(got, by_clock(time - late, i, flock, plan=plan), flock.packet[2 * dims][i, j])
-
-
-def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
-    """Offset between two coordinates along one axis, to the nearest image, m."""
-    return nearest_image(there - here, getattr(w, SIDES[a])) if plan.periodic else there - here
 
 
 def received(

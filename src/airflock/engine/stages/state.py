@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.words import NOTHING
+from airflock.engine.stages.words import NOTHING, fields
 
 Row = Any  # one number per agent: row[i]
 # The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
@@ -38,156 +39,90 @@ class Columns:
         return self.take(f"{self.prefix}{column}")
 
 
-class Flock:
-    """Rows of one flock, each with one number per agent.
+def axes(prefix: str) -> Any:
+    """Rows of a vector as an attribute of a flock."""
+    return cached_property(lambda flock: Axes(prefix, flock.take, flock.dimensions))
 
-    number                               : of agent i, by which random numbers and others know it
-    position, velocity, command          : true state (m, m/s), and what was asked of the body
-    measured_position, measured_velocity : own state as the agent believes it
-    heard_position, heard_velocity       : its state as others hear it
-    packet                               : where packets are kept, those of each pair: packet[c][i, j] is number c
-                                           (`Plan.of_pair`) of what agent i has of agent j
-    own_error, own_drift                 : error of the own measured position (m) and velocity (m/s)
-    sent_error, sent_drift               : the same of what is sent to others
-    reach_out, reach_in                  : squares of how far it is heard and hears, m²; negative: not at all
-    clock                                : how far its clock is ahead, s
-    stopped, stop_position, stands_until : whether it stopped for somebody whom it has lost (1 or 0), where, and until
-                                           when it stands, s
-    away, square                         : offsets of the others from one agent (m), and their squares (m²), FAR of
-                                           whom it does not hear
-    hidden, fade                         : whether something hides each of them (1 or 0), normal numbers of signals
-    clear                                : whether nothing stands in the way of packets from each of them (1 or 0)
-    met, heap, weak                      : whether that agent meets each of them (1 or 0), and scratch to find out
-    sums, walls                          : what the rules for neighbours and for surfaces add up to, by field
-    body, sense                          : what the body and the sensor remember, by field of their Memory
-    goal, departed                       : where its own goal is, and where it started, m
-    speed, heading                       : m/s, and unit vector, of the true state
-    excursion                            : how far it is outside the arena or inside of what stands in it, m
-    before, touches                      : where it was when it was last looked at (m), and whether it touched (1 or 0)
-    rays                                 : rays that it cast at its last decision
-    errors, chances                      : normal and uniform numbers of the sensors
-    outer, words                         : normal numbers of the outer noise, and random words
+
+def columns(prefix: str) -> Any:
+    """Rows of a record as an attribute of a flock."""
+    return cached_property(lambda flock: Columns(prefix, flock.take))
+
+
+def row(name: str) -> Any:
+    """One row as an attribute of a flock."""
+    return cached_property(lambda flock: flock.take(name))
+
+
+class Flock:
+    """Rows of one flock, each with one number per agent: position[X][i], sums[c][i], speed[i].
 
     take       : the row of a name in the driver
     dimensions : 2 or 3
-    number     : row of the numbers of agents
+    number     : of agent i, by which random numbers and others know it
     """
 
+    position: Axes = axes("")  # true state, m
+    velocity: Axes = axes("v")  # m/s
+    command: Axes = axes("c")  # what was asked of the body
+    measured_position: Axes = axes("m")  # own state as the agent believes it, m
+    measured_velocity: Axes = axes("mv")  # m/s
+    heard_position: Axes = axes("h")  # its state as others hear it, m
+    heard_velocity: Axes = axes("hv")  # m/s
+    packet: Columns = columns("packet")  # [c][i, j]: number c (`Plan.of_pair`) of what agent i has kept of agent j
+    own_error: Axes = axes("own_q")  # of the own measured position, m
+    own_drift: Axes = axes("own_u")  # of the own measured velocity, m/s
+    sent_error: Axes = axes("sent_q")  # the same of what is sent to others
+    sent_drift: Axes = axes("sent_u")
+    reach_out: Row = row("reach_out")  # square of how far it is heard, m²; negative: not at all
+    reach_in: Row = row("reach_in")  # square of how far it hears
+    clock: Row = row("clock")  # how far its clock is ahead, s
+    stopped: Row = row("stopped")  # whether it stopped for somebody whom it has lost, 1 or 0
+    stop_position: Axes = axes("stop_")  # where, m
+    stands_until: Row = row("stands_until")  # s
+    away: Columns = columns("away")  # offsets of the others from one agent, m
+    square: Row = row("square")  # squares of their distances, m²; FAR of whom it does not hear
+    hidden: Row = row("hidden")  # whether something that stands in the world hides each of them, 1 or 0
+    clear: Row = row("clear")  # whether nothing stands in the way of packets from each of them, 1 or 0
+    fade: Row = row("fade")  # normal number of the signal of each of them
+    met: Row = row("met")  # whether that agent meets each of them, 1 or 0
+    heap: Row = row("heap")  # scratch of whoever ranks agents
+    weak: Row = row("weak")  # scratch of whoever ranks signals
+    sums: Columns = columns("sum")  # what the rule for neighbours adds up to, by field
+    walls: Columns = columns("wall")  # what the rule for surfaces adds up to
+    body: Columns = columns("body")  # what the body remembers, by field of its Memory
+    sense: Columns = columns("sense")  # what the sensor remembers
+    goal: Axes = axes("goal_")  # where its own goal is, m
+    departed: Axes = axes("from_")  # where it started, m
+    speed: Row = row("speed")  # of the true state, m/s
+    heading: Axes = axes("head_")  # unit vector
+    excursion: Row = row("excursion_")  # how far it is outside the arena or inside of what stands in it, m
+    before: Axes = axes("before_")  # where it was when it was last looked at, m
+    touches: Row = row("touches_")  # whether it touched the scene since then, 1 or 0
+    rays: Row = row("rays_")  # rays that it cast at its last decision
+    errors: Columns = columns("e")  # normal numbers of the sensors
+    chances: Columns = columns("chance")  # uniform numbers of the sensors
+    outer: Columns = columns("g")  # normal numbers of the outer noise
+    words: Columns = columns("u")  # random words
+
     def __init__(self, take: Callable[[str], Row], dimensions: int, number: Row):
-        def axes(prefix: str) -> Axes:
-            return Axes(prefix, take, dimensions)
-
-        self.number = number
-        self.position, self.velocity, self.command = axes(""), axes("v"), axes("c")
-        self.measured_position, self.measured_velocity = axes("m"), axes("mv")
-        self.heard_position, self.heard_velocity = axes("h"), axes("hv")
-        self.own_error, self.own_drift = axes("own_q"), axes("own_u")
-        self.sent_error, self.sent_drift = axes("sent_q"), axes("sent_u")
-        self.stop_position = axes("stop_")
-        self.sums, self.walls, self.body = Columns("sum", take), Columns("wall", take), Columns("body", take)
-        self.away = Columns("away", take)
-        self.errors, self.outer, self.words = Columns("e", take), Columns("g", take), Columns("u", take)
-        self.sense, self.chances = Columns("sense", take), Columns("chance", take)
-        self.packet = Columns("packet", take)
-        self.goal, self.departed, self.before = axes("goal_"), axes("from_"), axes("before_")
-        self.heading = axes("head_")
-        self._take = take
-
-    @property
-    def speed(self) -> Row:
-        """Speed of each agent, m/s."""
-        return self._take("speed")
-
-    @property
-    def excursion(self) -> Row:
-        """How far each agent is outside, m."""
-        return self._take("excursion_")
-
-    @property
-    def touches(self) -> Row:
-        """Whether each agent touched the scene since it was last looked at, 1 or 0."""
-        return self._take("touches_")
-
-    @property
-    def rays(self) -> Row:
-        """How many rays each agent cast at its last decision."""
-        return self._take("rays_")
-
-    @property
-    def square(self) -> Row:
-        """Squared distance of each other agent, m²; FAR of whom one agent does not hear."""
-        return self._take("square")
-
-    @property
-    def hidden(self) -> Row:
-        """Whether something that stands in the world hides each other agent, 1 or 0."""
-        return self._take("hidden")
-
-    @property
-    def clear(self) -> Row:
-        """Whether nothing stands between one agent and each other one, 1 or 0."""
-        return self._take("clear")
-
-    @property
-    def fade(self) -> Row:
-        """Normal number of the signal of each other agent."""
-        return self._take("fade")
-
-    @property
-    def met(self) -> Row:
-        """Whether one agent meets each other one, 1 or 0."""
-        return self._take("met")
-
-    @property
-    def heap(self) -> Row:
-        """Scratch of whoever ranks agents."""
-        return self._take("heap")
-
-    @property
-    def weak(self) -> Row:
-        """Scratch of whoever ranks signals."""
-        return self._take("weak")
-
-    @property
-    def reach_out(self) -> Row:
-        """Square of how far the packets of each agent carry, m²; negative where nobody hears it."""
-        return self._take("reach_out")
-
-    @property
-    def reach_in(self) -> Row:
-        """Square of how far each agent hears, m²; negative where it hears nobody."""
-        return self._take("reach_in")
-
-    @property
-    def clock(self) -> Row:
-        """How far the clock of each agent is ahead, s."""
-        return self._take("clock")
-
-    @property
-    def stopped(self) -> Row:
-        """Whether each agent stopped for somebody whom it has lost, 1 or 0."""
-        return self._take("stopped")
-
-    @property
-    def stands_until(self) -> Row:
-        """Time until which each agent that stopped stands, s."""
-        return self._take("stands_until")
+        self.take, self.dimensions, self.number = take, dimensions, number
 
     def fault(self, kind: str, what: str) -> Row:
         """Of a kind of fault: its "onset" (s) and how long it "lasts" (s; 0 where there is none), or one number."""
-        return self._take(fault_row(kind, what))
+        return self.take(fault_row(kind, what))
 
     def shared(self, owner: str, name: str) -> Row:
         """A column of Shared, that a rule of the whole flock fills: of the "model" or of a metric, by its name."""
-        return self._take(f"shared_{owner}_{name}")
+        return self.take(f"shared_{owner}_{name}")
 
     def pair(self, metric: str, name: str) -> Row:
         """What the pair rule of a metric found, one field of it."""
-        return self._take(f"{metric}_{name}")
+        return self.take(f"{metric}_{name}")
 
     def own(self, letter: str, name: str) -> Row:
         """A number that differs among agents."""
-        return self._take(own_row(letter, name))
+        return self.take(own_row(letter, name))
 
 
 def tree(scene: Any) -> tuple[Any, Any, Any]:
@@ -203,6 +138,16 @@ def fault_row(kind: str, what: str) -> str:
 def own_row(letter: str, name: str) -> str:
     """Name of the row with a number that differs among agents; without a letter it is of no record."""
     return f"number_{letter}_{name}" if letter else name
+
+
+def column_of(i: int, record: Any, rows: Columns) -> Any:
+    """A record of what rows hold of agent i, by field; None where there is no such record."""
+    return record(*[rows[c][i] for c in fields(record)]) if record else None
+
+
+def entry_of(i: int, record: Any, table: Any, first: int) -> Any:
+    """A record of what a table holds of agent i, from row `first` on."""
+    return record(*[table[first + c, i] for c in fields(record)])
 
 
 def numbers_of(i: int, letter: str, flock: Flock, numbers: Any, *, plan: Plan) -> Any:

@@ -27,8 +27,9 @@ class Named(float):
 
 ZERO, HALF, ONE = Named(0.0, "ZERO"), Named(0.5, "HALF"), Named(1.0, "ONE")
 TINY, FAR, LIMIT = Named(1e-12, "TINY"), Named(1e30, "FAR"), Named(1e8, "LIMIT")
-GONE = Named(-1.0, "-ONE")  # a time, or a square: not there
 AWAY = Named(1e9, "AWAY")  # m, along each axis: where agents are that only fill up vectors
+CONSTANTS = (ZERO, HALF, ONE, TINY, FAR, LIMIT, AWAY)  # of every driver
+GONE = Named(-1.0, "-ONE")  # a time, or a square: not there
 START = {"sum": ZERO, "min": FAR, "max": Named(-1e30, "-FAR")}  # a total before its first term
 
 
@@ -60,13 +61,13 @@ def integer(value: Any) -> Any:
 
 
 def least(a: Any, b: Any) -> Any:
-    """The lesser of two numbers."""
-    return a if a < b else b
+    """The lesser of two numbers; of a number and nan the number."""
+    return b if a != a or b < a else a
 
 
 def most(a: Any, b: Any) -> Any:
-    """The greater of two numbers."""
-    return a if a > b else b
+    """The greater of two numbers; of a number and nan the number."""
+    return b if a != a or b > a else a
 
 
 def choose(test: Any, a: Any, b: Any) -> Any:
