@@ -47,6 +47,7 @@ class Fleet:
         self._every = max(1, round(card.period / self._dt))
         self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.stamps, self.log = 0, [], [], []  # type: ignore[var-annotated]
+        self.standing: list[list[bool]] = []  # (time, agent): who stands because it has lost somebody
         self._befalls = befalls = Faults(scenario, seed)
         self._bodies = [b for _, b in records_of(scenario, len(card.members), seed)]
         self._noise = OuterNoise(seed, len(card.members), not card.flat)
@@ -182,6 +183,7 @@ class Fleet:
         self.stamps.append(
             [[n.peers.all[m].at if m != n.member else -1e9 for m in self.card.members] for n in self.nodes]
         )
+        self.standing.append([n.stands for n in self.nodes])
 
     def array(self) -> NDArray[np.float64]:
         """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""
