@@ -288,11 +288,7 @@ class Pilot:
             own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
         time = now if time is None else time
         self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
-        near = [
-            heard._replace(state=self.place.beside(own, heard.state), fade=(fades or {}).get(heard.who, 0.0))
-            for heard in self.heard(now)
-            if only is None or heard.who in only
-        ]
+        near = [self._beside(own, heard, fades) for heard in self.heard(now) if only is None or heard.who in only]
         near = met_of(self.topology, self.t, own, near, self.place)
         made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
@@ -300,6 +296,13 @@ class Pilot:
         stays = self.stay(own, now) if self.model.command == "velocity" else None
         x, y, z = made.command if stays is None else stays
         return Decision((x, y, 0.0) if self.flat else (x, y, z), made.memory)
+
+    def _beside(self, own: State, heard: Heard, fades: Mapping[int, float] | None) -> Heard:
+        """A neighbour at its image nearest to own, with what weakens its signal."""
+        state, fade = self.place.beside(own, heard.state), fades.get(heard.who, 0.0) if fades else 0.0
+        if state is heard.state and fade == heard.fade:
+            return heard
+        return Heard(heard.who, state, heard.age, fade, heard.group)
 
     def _decided(
         self, own: State, near: list[Heard], walls: Iterable[tuple[float, float, float, float]], time: float,

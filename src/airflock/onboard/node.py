@@ -113,15 +113,15 @@ class Node:
         if got.message == orders.MESSAGE:
             self.operator.take(got.values, now, utc)
             return
-        told = status.status_of(got.values, self.card.site)
+        told = status.status_in(got.payload, self.card.site)
         if told is None:
             return
         at = (told.time - self._zero) * 1e-6
         if self.peers.take(got.system, told, at, now):
             index, peer = self.card.members.index(got.system), self.peers.all[got.system]
             if peer.flies():
-                state = self.card.law_state(State(*told.position, *told.velocity))
-                self.pilot.hear(index, state, at, now, stands=peer.phase in STANDING)
+                assert peer.state is not None, "it was taken"
+                self.pilot.hear(index, self.card.law_state(peer.state), at, now, stands=peer.phase in STANDING)
             else:
                 self.pilot.forget(index)
 
