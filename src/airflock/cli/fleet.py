@@ -95,6 +95,7 @@ def fleet(
         found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
         period = found.sensors.period or found.flight.dt
         found = compare.sampled(found, period)
+        broken = read_faults(faults, tuple(range(1, found.agents + 1))) if faults else ()
     if vehicle not in VEHICLES:
         wrong.append(f"--vehicle {vehicle} is none of {', '.join(VEHICLES)}")
     if body not in (None, *FLOWN):
@@ -112,7 +113,6 @@ def fleet(
     live = mode != realtime.MODES[0]
     given = {"vehicle": vehicle, "operator": operator[1], "silent": stops, "live": live}
     card = compare.software_card(found, **given, seed=first_seed)
-    broken = read_faults(faults, card.members) if faults else ()
     options.refuse(realtime.refused(found, broken) if live else [])
     if card_file is not None:
         _write_card(card_file, card, found, seeds)
