@@ -19,7 +19,7 @@ from airflock.core.contract import model
 from airflock.core.parameters import choices
 from airflock.core.pilot import Hearing, Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import complete, could_be_near, counts
+from airflock.core.silence import complete, could_be_near, counts, of_standing
 from airflock.errors import RuleError
 from airflock.fleet.prepare import plain
 from airflock.models import dimock_2003, vasarhelyi_2018, vicsek_1995
@@ -237,6 +237,32 @@ def test_a_lost_neighbour_comes_nearer_with_silence_and_is_given_up(distance, ag
         assert could_be_near(distance, age + longer, s), "silence never makes it safe before it is given up"
     assert not could_be_near(distance, s.forget, s)
     assert not could_be_near(distance, min(age, s.patience), s), "data younger than the patience stop nobody"
+
+
+@given(st.floats(0, 200), st.floats(0, 60), st.floats(0, 1), st.floats(0, 20))
+def test_who_said_that_it_holds_may_have_flown_on_with_the_flock_unnoticed_no_nearer_than_is_kept(
+    distance, age, share, speed
+):  # fmt: skip
+    """Whatever part of the time it has flown towards here at up to the flock's speed: within `keep` it stops us."""
+    s = complete(Silence(rule="stop"), speed)
+    slow = of_standing(s)
+    flown = (speed or 4.0) * share * age
+    if s.patience < age < s.forget and distance - flown < s.keep - 1e-6:
+        assert could_be_near(distance, age, slow)
+    if could_be_near(distance, age, slow):
+        assert could_be_near(distance, age, s), "who said nothing of that kind is feared at least as much"
+
+
+def test_a_pilot_stops_later_for_whom_it_lost_when_it_held():
+    """At 60 m: a neighbour that flew with the flock could be near after 7 s, one that hovered not before 14 s."""
+    stops = []
+    for stands in (False, True):
+        one, own = pilot(silence=Silence(rule="stop", closing=8.0)), State(0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+        one.hear(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, stands=stands)
+        stops.append([age for age in range(1, 20) if one.lost_near(own, float(age))][0])
+    assert stops == [7, 14]
+    one.hear(1, State(60.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.5, 0.5)
+    assert one.lost_near(own, 8.0), "its last word counts"
 
 
 @given(st.floats(0, 60), st.floats(0, 200))

@@ -286,6 +286,13 @@ def test_silence_does_not_end_in_a_collision():
     assert lows[True] > 3.0 > lows[False]
 
 
+def test_a_drone_that_hovers_out_of_range_does_not_make_others_stop_in_the_flock():
+    """Its clock is wrong, so it holds; who stopped for it 15 s after it was lost stood where others flew."""
+    rows = in_the_air(10, 34.2, 15, (Fault("clock", (2,), amount=0.5),), noisy=True, silent=True).array()[100:, :, :3]
+    gaps = np.linalg.norm(rows[:, :, None] - rows[:, None], axis=-1) + 1e9 * np.eye(10)
+    assert gaps.min() > 3.0, "0.73 m where it was taken to come at twice the flock's speed"
+
+
 @pytest.mark.parametrize(("kind", "seconds"), [("px4", 30.0), ("ardupilot", 36.0)])
 def test_whose_node_died_lands_while_the_others_stand(kind, seconds):
     """PX4 lands a second after the last setpoint, ArduPilot five after the last heartbeat; the others wait for 20 s."""

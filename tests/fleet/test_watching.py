@@ -28,7 +28,7 @@ from airflock.onboard.mission import Phase
 from airflock.onboard.peers import FRESH
 from airflock.onboard.ports import Place, Udp
 from airflock.stage.field import field_of
-from airflock.studio.fleet_tables import about, members_table, notes_of, trouble_of
+from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
 from airflock.studio.fleet_watch import opened
 from fleets import PRIVATE, card, fleet, scenario
 
@@ -147,6 +147,23 @@ def test_whom_the_ether_says_to_be_heard_is_a_link_for_a_while_both_ways_or_one(
     assert teller.report(f.now + 0.1, utc) == []
     observer.look(f.now + 3.0)
     assert not observer.links(f.now + 3.0) and not observer.faults and observer.notes[-1].text == "fault loss is over"
+
+
+def test_several_faults_of_one_kind_are_told_with_all_whom_they_befall():
+    f, observer = watched()
+    teller = Teller(f.card.members, [Fault("loss", (who,), 0.0, 5.0, 0.5) for who in (1, 3)])
+    for datagram in teller.report(f.now, STARTED + round(f.now * 1e6)):
+        observer.take(datagram, f.now)
+    assert observer.faults == {"loss": {1, 3}}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_is_told_without_an_amount_that_nobody_knows(kind):
+    f, observer = watched()
+    teller = Teller(f.card.members, [Fault(kind, (2,), 0.0, 5.0, 0.5)])
+    for datagram in teller.report(f.now, STARTED + round(f.now * 1e6)):
+        observer.take(datagram, f.now)
+    assert f"<b>{kind}</b>, drone 2: " in faults_of(observer) and "amount" not in faults_of(observer)
 
 
 def test_what_the_ether_tells_needs_the_key_and_its_own_system():

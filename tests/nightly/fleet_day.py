@@ -9,11 +9,13 @@ flown, at least 100 faults of each kind fell, and no collision is of the class "
 (AIRFLOCK_LIMIT, s) is over: call it again to go on.
 
 Classes, the first that holds within the 20 s before: a motor was off; the navigation of one was frozen; one had not
-heard the other for longer than it counts as heard (blind); one was within 5 m of a wall (crowding); one was not
-flocking, but returned, landed, held or was in a pilot's hand (logic); somebody with the key lied about one (impostor).
+heard the other for longer than it counts as heard, or stood when they met because it had lost anybody (blind); one was
+within 5 m of a wall (crowding); one was not flocking, but returned, landed, held or was in a pilot's hand (logic);
+somebody with the key lied about one (impostor).
 """
 
 import csv
+import gc
 import os
 import sys
 import time
@@ -106,10 +108,11 @@ def classed(mine, ages, k, a, b, rows, phases, fleet, period):
     """Class of one collision of agents a and b at frame k."""
     kinds, first = {f.kind for f in mine}, max(0, k - round(BEFORE / period))
     heard = np.maximum(ages[first : k + 1, a, b], ages[first : k + 1, b, a])
+    lost = not (np.nan_to_num(heard, nan=np.inf) <= fleet.card.silence.patience + period).all()
     walls = SIDE / 2 - np.abs(rows[max(0, k - round(2.0 / period)) : k + 1, [a, b], :2]).max()
     for name, holds in (
         ("motor", "motor" in kinds), ("gnss", "gnss" in kinds),
-        ("blind", not (np.nan_to_num(heard, nan=np.inf) <= fleet.card.silence.patience + period).all()),
+        ("blind", lost or fleet.standing[k][a] or fleet.standing[k][b]),
         ("crowding", walls < WALL), ("logic", any(phase != "FLOCK" for phase in phases)),
         ("impostor", "impostor" in kinds),
     ):  # fmt: skip
@@ -151,6 +154,7 @@ def append(path, fields, rows):
 def main():
     folder, hours = Path(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else HOURS
     folder.mkdir(parents=True, exist_ok=True)
+    gc.freeze()  # what is imported stays; to look through it takes a twentieth of the time
     kept, struck = folder / "flights.csv", folder / "collisions.csv"
     done, count = {int(row["flight"]) for row in read(kept)}, round(hours * 3600.0 / SECONDS)
     hits = [row for row in read(struck) if int(row["flight"]) in done]  # those of a flight that was cut off are gone

@@ -9,6 +9,7 @@ OPEN, 1 if not, 3 if its time (AIRFLOCK_LIMIT, s) is over: call it again to go o
 """
 
 import csv
+import gc
 import math
 import os
 import sys
@@ -40,10 +41,7 @@ CONDITIONS = {
 FIRST = ("none", "blackout of 15 s")
 FREE = "blackout of 15 s, no rule of silence"  # flown to show what the rule is for
 # condition → mechanism, and the rule that is missing; at most two may stand here
-OPEN: dict[str, str] = {
-    "clock 0.5 s ahead": "who flies out of range of the drone that hovers stops for it, one after another, and others "
-    "fly into those; missing: a lost neighbour that said it hovers is not taken to come at twice the flock's speed",
-}
+OPEN: dict[str, str] = {}
 MEDIAN, NEAR, MORE = 5.0, 3.0, 1  # m, m, flights
 GROUND = 0.5  # m; who is lower has landed or fallen
 SPARE = 60.0  # s before the limit at which no further flight is begun
@@ -90,6 +88,7 @@ def table(rows):
 def main():
     folder, seeds = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else SEEDS
     folder.mkdir(parents=True, exist_ok=True)
+    gc.freeze()  # what is imported stays; to look through it takes a twentieth of the time
     kept = folder / "flights.csv"
     rows = list(csv.DictReader(kept.open())) if kept.exists() else []
     done = {(row["condition"], int(row["seed"])) for row in rows}

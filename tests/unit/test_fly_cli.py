@@ -44,8 +44,11 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
         "fly", "prepare", REAL, "--site", "47.5;19", "--members", "a-3", "--out", "absent/m.txt", "--set", "agents"
     )
     assert code == 2 and all(line.startswith("airflock: ") for line in lines)
-    for part in ("is not LAT,LON,ALT", "write 1-10", "absent", "KEY=VALUE"):
+    for part in ("--site 47.5;19: is not LAT,LON,ALT", "write 1-10", "absent", "KEY=VALUE"):
         assert any(part in line for line in lines), part
+    for text in ("3-", "-3", "3-1", "1,,2", ""):
+        code, _, lines = airflock("fly", "prepare", REAL, *HERE[:2], "--members", text)
+        assert code == 2 and any(f"--members {text}: write 1-10" in line for line in lines), (text, lines)
     for more, part in (
         (["--limit", "breake=2"], "breake"), (["--limit", "brake=900"], "outside [0.1, 20] m/s^2"),
         (["--limit", "status_period=0.02", "--fast-bits", "30000"], "fast radio: 3 drones would take"),
@@ -88,12 +91,13 @@ def test_a_fleet_is_flown_and_told(airflock):
     assert code == 2 and len(lines) >= 4
 
 
-def test_how_a_fleet_flies_is_checked_at_once(airflock):
-    code, _, lines = airflock("fleet", REAL, "--mode", "procs", "--body", "quad", "--vehicle", "px5", "--agents", 2)
-    assert code == 2 and len(lines) == 3
-    for line, part in zip(
-        lines, ("px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes"), strict=True
-    ):
+def test_how_a_fleet_flies_is_checked_at_once(airflock, tmp_path):
+    (tmp_path / "wrong.toml").write_text('[[fault]]\nkind = "los"\n')
+    wrong = ["--mode", "procs", "--body", "quad", "--vehicle", "px5", "--faults", "wrong.toml"]
+    code, _, lines = airflock("fleet", REAL, *wrong, "--agents", 2)
+    assert code == 2 and len(lines) == 4
+    told = ("kind = 'los' is none of", "px4, ardupilot", "multirotor, quadrotor", "lockstep, tasks, processes")
+    for line, part in zip(lines, told, strict=True):
         assert part in line
     faulty = ["--set", 'faults=[{kind="motor", at=1.0}]']
     code, _, lines = airflock("fleet", REAL, "--agents", 2, "--mode", "tasks", *faulty)

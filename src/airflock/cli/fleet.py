@@ -1,5 +1,8 @@
 """Verb fleet: a scenario flown by nodes and vehicles that speak MAVLink, beside the simulator if wanted."""
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -95,6 +98,7 @@ def fleet(
         found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
         period = found.sensors.period or found.flight.dt
         found = compare.sampled(found, period)
+        broken = read_faults(faults, tuple(range(1, found.agents + 1))) if faults else ()
     if vehicle not in VEHICLES:
         wrong.append(f"--vehicle {vehicle} is none of {', '.join(VEHICLES)}")
     if body not in (None, *FLOWN):
@@ -112,7 +116,6 @@ def fleet(
     live = mode != realtime.MODES[0]
     given = {"vehicle": vehicle, "operator": operator[1], "silent": stops, "live": live}
     card = compare.software_card(found, **given, seed=first_seed)
-    broken = read_faults(faults, card.members) if faults else ()
     options.refuse(realtime.refused(found, broken) if live else [])
     if card_file is not None:
         _write_card(card_file, card, found, seeds)
@@ -120,7 +123,7 @@ def fleet(
     beside: list[dict[str, Any]] = []
     runs, departed = [], None
     ticks = seeds * (int(found.flight.duration) + (12 if ground else 0))
-    with options.progress(f"{found.name}: fleet", ticks, quiet=as_json) as done:
+    with options.progress(f"{found.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
         for seed in range(first_seed, first_seed + seeds):
             card = compare.software_card(found, **given, seed=seed) if found.varied else card
             orders: dict[str, Any] = {"faults": broken, "operator": operator[0], "done": done}
@@ -142,6 +145,16 @@ def fleet(
             runs.append(run | ({"load": flown.load._asdict()} if live else {}))
             _save(save, seed, seeds, flown)
     _tell(found, card, seeds, rows, beside, runs, departed, as_json)
+
+
+@contextmanager
+def _imports_kept() -> Iterator[None]:
+    """Let the collector leave alone what is there already; a look at it all takes a tenth of a second, now and then."""
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _operator(ground: bool) -> tuple[bytes, bytes]:

@@ -86,7 +86,7 @@ def prepare(
     from airflock.scenarios.files import load
 
     faults: list[str] = []
-    where, systems = _site(site, faults), _members(members, faults)
+    where, systems = _site("--site", site, faults), _members(members, faults)
     with options.gathering(faults):
         options.writable((out, (".json",)))
     for path in (out, out.with_suffix(".key"), out.with_suffix(".operator")):
@@ -174,7 +174,7 @@ def order(
         faults.append(f"{do}: is not an order; give start, go, goto, hold, resume, return, land, kill or ping")
     if (do == "goto") != (point is not None):
         faults.append("--point LAT,LON,ALT belongs to goto, and goto needs it")
-    where = _site(point, faults) if point else (0.0, 0.0, 0.0)
+    where = _site("--point", point, faults) if point else (0.0, 0.0, 0.0)
     with options.gathering(faults):
         found = read_card(card_file)
         if target and target not in found.members:
@@ -231,11 +231,11 @@ def replay(
         )
 
 
-def _site(text: str, faults: list[str]) -> tuple[float, float, float]:
+def _site(option: str, text: str, faults: list[str]) -> tuple[float, float, float]:
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
     except ValueError:
-        faults.append(f"{text!r} is not LAT,LON,ALT, for instance 47.50,19.04,120")
+        faults.append(f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120")
         return 0.0, 0.0, 0.0
     return latitude, longitude, altitude
 
@@ -243,9 +243,10 @@ def _site(text: str, faults: list[str]) -> tuple[float, float, float]:
 def _members(text: str, faults: list[str]) -> list[int]:
     found: list[int] = []
     for part in text.split(","):
-        first, _, last = part.partition("-")
-        if not first.isdigit() or (last and not last.isdigit()) or int(last or first) - int(first) > 250:
+        first, dash, last = part.partition("-")
+        last = last if dash else first
+        if not (first.isdigit() and last.isdigit() and 0 <= int(last) - int(first) <= 250):
             faults.append(f"--members {text}: write 1-10 or 1,2,5")
             return [1]
-        found += range(int(first), int(last or first) + 1)
+        found += range(int(first), int(last) + 1)
     return found

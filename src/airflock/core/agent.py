@@ -120,7 +120,8 @@ def meet_neighbours(
     for heard in neighbours:
         given = pair_percept(own, heard, index, group)
         if given["r2"] <= near * near + TINY:  # which r2 carries as a guard: a neighbour at exactly the reach counts
-            terms.append(answer(model.neighbour, "neighbour", given | {"p": p}, model.name))
+            given["p"] = p
+            terms.append(answer(model.neighbour, "neighbour", given, model.name))
     return reduced(model.Sums, model.reduce, terms)
 
 
@@ -137,7 +138,7 @@ def meet_surfaces(model: Model, p: Any, own: State, surfaces: Iterable[tuple[flo
     return reduced(model.Walls, {}, terms)
 
 
-def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> dict[str, float]:
+def pair_percept(own: State, heard: Heard, index: int, group: float = -1.0) -> dict[str, Any]:
     """Everything that a neighbour rule may ask for, SI; differences are neighbour minus own; group : the own one."""
     other = heard.state
     dx, dy, dz = other.x - own.x, other.y - own.y, other.z - own.z
@@ -177,9 +178,9 @@ def answer(rule: Callable[..., Any], kind: str, given: Mapping[str, Any], owner:
     """Call a rule with what it asks for by name."""
     names = _asked(rule, kind, owner)
     values = [given.get(name) for name in names]
-    for name, value in zip(names, values, strict=True):
+    for place, value in enumerate(values):
         if value is None:
-            raise RuleError(f"{owner}.{kind} asks for {name}, which {owner} does not provide".lstrip("."))
+            raise RuleError(f"{owner}.{kind} asks for {names[place]}, which {owner} does not provide".lstrip("."))
     return rule(*values)
 
 

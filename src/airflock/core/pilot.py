@@ -14,7 +14,7 @@ from airflock.core.contract import Body, Model
 from airflock.core.maths import FAR, norm
 from airflock.core.radio import Radio
 from airflock.core.silence import Parameters as Silence
-from airflock.core.silence import back, complete, could_be_near, counts, stands_until
+from airflock.core.silence import back, complete, could_be_near, counts, of_standing, stands_until
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
@@ -74,12 +74,15 @@ class Hearing:
 
 
 class Packet:
-    """The newest state of one neighbour, when it held (s), and how many decisions there were before it came."""
+    """The newest state of one neighbour, when it held (s), and how many decisions there were before it came.
 
-    __slots__ = ("came", "sent_at", "state")
+    stands : its sender said that it holds or returns
+    """
 
-    def __init__(self, state: State, sent_at: float, came: int):
-        self.state, self.sent_at, self.came = state, sent_at, came
+    __slots__ = ("came", "sent_at", "stands", "state")
+
+    def __init__(self, state: State, sent_at: float, came: int, stands: bool = False):
+        self.state, self.sent_at, self.came, self.stands = state, sent_at, came, stands
 
     def carried(self, now: float) -> State:
         """The state carried forward with its own velocity."""
@@ -174,6 +177,7 @@ class Pilot:
         self.hearing, self.flat, self.seed = hearing or Hearing(), flat, seed
         speed = float(model.preferred_speed(p)) if model.preferred_speed is not None else 0.0
         self.silence = complete(silence, speed) if silence is not None and silence.rule == "stop" else None
+        self._of_standing = of_standing(self.silence) if self.silence is not None else None
         self.body, self.b, self.wing, self.aero, self.told = body, b, wing, aero, told
         self.topology, self.t, self.groups = topology, t, groups
         self.memory = first_memory(model)
@@ -205,14 +209,17 @@ class Pilot:
             if not all(map(isfinite, setpoint)):
                 raise RuleError(f"{self.model.name} commands {setpoint}, which is no velocity")
 
-    def hear(self, who: int, state: State, sent_at: float, now: float) -> bool:
-        """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan."""
+    def hear(self, who: int, state: State, sent_at: float, now: float, *, stands: bool = False) -> bool:
+        """Take note of a neighbour's state that held at sent_at (s); False if it is old, of the future or nan.
+
+        stands : it says that it holds or returns, so that less is to be feared of it once it is lost
+        """
         known = self.packets.get(who)
         if who == self.index or not all(map(isfinite, state)) or not sent_at <= now + self.hearing.early:
             return False
         if known is not None and self.hearing.in_order and sent_at <= known.sent_at:
             return False
-        self.packets[who] = Packet(state, sent_at, self.decisions)
+        self.packets[who] = Packet(state, sent_at, self.decisions, stands)
         return True
 
     def group_of(self, who: int) -> float:
@@ -243,9 +250,9 @@ class Pilot:
         if self.silence is None:
             return False
         for packet in self.packets.values():
-            s = self.place.beside(own, packet.state)
-            distance = norm(s.x - own.x, s.y - own.y, 0.0 if self.flat else s.z - own.z)
-            if could_be_near(distance, now - packet.sent_at, self.silence) > 0.5:
+            at, rule = self.place.beside(own, packet.state), self._of_standing if packet.stands else self.silence
+            distance = norm(at.x - own.x, at.y - own.y, 0.0 if self.flat else at.z - own.z)
+            if could_be_near(distance, now - packet.sent_at, rule) > 0.5:
                 return True
         return False
 
@@ -281,11 +288,7 @@ class Pilot:
             own, goal = level(own), None if goal is None else (*goal[:2], 0.0)
         time = now if time is None else time
         self.senses = percept or Senses.of(self.place, own, time, goal, (self.seed, self.decisions, self.index))
-        near = [
-            heard._replace(state=self.place.beside(own, heard.state), fade=(fades or {}).get(heard.who, 0.0))
-            for heard in self.heard(now)
-            if only is None or heard.who in only
-        ]
+        near = [self._beside(own, heard, fades) for heard in self.heard(now) if only is None or heard.who in only]
         near = met_of(self.topology, self.t, own, near, self.place)
         made = self._decided(own, near, self.place.surfaces(own.x, own.y, own.z), time, self.senses, shared)
         self.decisions += 1
@@ -293,6 +296,13 @@ class Pilot:
         stays = self.stay(own, now) if self.model.command == "velocity" else None
         x, y, z = made.command if stays is None else stays
         return Decision((x, y, 0.0) if self.flat else (x, y, z), made.memory)
+
+    def _beside(self, own: State, heard: Heard, fades: Mapping[int, float] | None) -> Heard:
+        """A neighbour at its image nearest to own, with what weakens its signal."""
+        state, fade = self.place.beside(own, heard.state), fades.get(heard.who, 0.0) if fades else 0.0
+        if state is heard.state and fade == heard.fade:
+            return heard
+        return Heard(heard.who, state, heard.age, fade, heard.group)
 
     def _decided(
         self, own: State, near: list[Heard], walls: Iterable[tuple[float, float, float, float]], time: float,

@@ -63,6 +63,16 @@ def complete(s: Parameters, speed: float, delay: float = 0.0, rule: str | None =
     return replace(s, closing=closing, patience=patience, rule=rule or s.rule)
 
 
+def of_standing(s: Parameters) -> Parameters:
+    """The same numbers for a lost neighbour that said that it holds or returns: its reach grows half as fast.
+
+    Its distance is measured from where an agent is now, so that half of twice the flock's speed still covers one that
+    has flown on at the speed of the flock. docs/decisions/0111 tells what was measured.
+    """
+    assert s.closing is not None, "complete"
+    return replace(s, closing=0.5 * s.closing)
+
+
 def counts(age, s):
     """1.0 if what is known of a neighbour, data of this age (s), still counts as heard, else 0.0.
 

@@ -18,33 +18,33 @@ class OuterNoise:
 
     def __init__(self, seed: int, count: int, three: bool, first: int = 0):
         self._seed, self._count, self._three, self._drone = seed, count, three, first
-        self._first, self._rows = -BLOCK, []  # type: ignore[var-annotated]
+        self._first = -BLOCK
+        self._numbers: tuple[list[float], list[float]] = ([], [])  # first and second half of each draw, flat
 
     def __call__(self, step: int, drone: int) -> Vector:
         """Three numbers N(0, 1) of a drone at a step; in a plane the third is zero."""
         if not self._first <= step < self._first + BLOCK:
             self._first = step - step % BLOCK
-            self._rows = self._drawn(self._first)
-        row: Vector = self._rows[step - self._first][drone - self._drone]
-        return row
+            self._numbers = self._drawn(self._first)
+        place, column, (one, two) = step - self._first, drone - self._drone, self._numbers
+        if self._three:
+            at = 2 * (place * self._count + column)
+            return one[at], one[at + 1], two[at]
+        at = 2 * ((place >> 1) * self._count + column)
+        numbers = two if place & 1 else one
+        return numbers[at], numbers[at + 1], 0.0
 
-    def _drawn(self, first: int) -> list[list[Vector]]:
-        """Rows of BLOCK steps; the words come as arrays, what is made of them by the functions of one number."""
+    def _drawn(self, first: int) -> tuple[list[float], list[float]]:
+        """Numbers of BLOCK steps; the words come as arrays, what is made of them by the function of one pair."""
         steps = np.arange(first, first + BLOCK, 1 if self._three else 2, dtype=np.uint64)
         if not self._three:
             steps //= np.uint64(2)
         drones = np.arange(self._drone, self._drone + self._count, dtype=np.uint64)
         drawn = random.words(self._seed, random.OUTER, 0, steps[:, None], drones[None, :])
-        tables = [np.broadcast_to(words, (len(steps), self._count)).tolist() for words in drawn]
-        rows: list[list[Vector]] = []
-        for a, b, c, d in zip(*tables, strict=True):
-            one = [random.normal_pair(*pair) for pair in zip(a, b, strict=True)]
-            two = [random.normal_pair(*pair) for pair in zip(c, d, strict=True)]
-            if self._three:
-                rows.append([(x, y, z) for (x, y), (z, _) in zip(one, two, strict=True)])
-            else:
-                rows += [[(x, y, 0.0) for x, y in pairs] for pairs in (one, two)]
-        return rows
+        a, b, c, d = (np.broadcast_to(words, (len(steps), self._count)).ravel().tolist() for words in drawn)
+        one = [number for pair in map(random.normal_pair, a, b) for number in pair]
+        two = [number for pair in map(random.normal_pair, c, d) for number in pair]
+        return one, two
 
 
 class SensorDice:

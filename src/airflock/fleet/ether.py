@@ -35,9 +35,12 @@ class Ether:
         reach: Callable[[int, int, float], float] | None = None,
         clear: Callable[[Vector, Vector], bool] | None = None, site: Site | None = None,
     ):  # fmt: skip
-        self._radio, self._k, self._members, self._period, self._faults = radio, k, list(members), period, faults
+        self._radio, self._k, self._members, self._period = radio, k, list(members), period
+        self._faults = {f.kind: [other for other in faults if other.kind == f.kind] for f in faults}
+        self._forgers = [f for f in faults if f.kind in ("rogue", "impostor")]
         self._reception, self._clear = Reception(radio, k, seed, len(members), period), clear
         self._site = site
+        self._asks = frozenset(name for name in ("dx", "dy", "dz", "talkers", "clear") if radio.asks(name))
         self._reach, self._drawn = reach, PacketDice(seed, len(members))
         self._queue: list[tuple[float, int, int, int, bytes]] = []
         self._count = 0
@@ -50,8 +53,8 @@ class Ether:
             if to != who:
                 late = self._late(to, now) + self._slow(now, who, to, at)
                 self._push(now + self._k.delay + late, who, to, datagram)
-        for f in self._faults:
-            if f.kind in ("rogue", "impostor") and f.holds(self._members[who], now) and self._site is not None:
+        for f in self._forgers:
+            if f.holds(self._members[who], now) and self._site is not None:
                 false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
                 for to in range(len(self._members)):
                     self._push(now + self._k.delay, who, to, false)
@@ -66,11 +69,13 @@ class Ether:
         """What rules of the radio may ask for of a pair."""
         here, there = at[to], at[who]
         known = {"distance": math.dist(here, there)}
+        if not self._asks:
+            return known
         known |= {name: b - a for name, a, b in zip(("dx", "dy", "dz"), here, there, strict=True)}
-        if self._radio.asks("talkers"):
+        if "talkers" in self._asks:
             near = [math.dist(here, other) <= self._k.range for other in at]
             known["talkers"] = float(sum(near)) - 1.0
-        if self._radio.asks("clear") and self._clear is not None:
+        if "clear" in self._asks and self._clear is not None:
             known["clear"] = 1.0 if self._clear(here, there) else 0.0
         return known
 
@@ -82,7 +87,8 @@ class Ether:
         return sum(self._dice.uniform(0.0, f.amount) for f in self._of("jitter", to, now))
 
     def _of(self, kind: str, to: int, now: float) -> Sequence[Fault]:
-        return self._faults and [f for f in self._faults if f.kind == kind and f.holds(self._members[to], now)]
+        found = self._faults.get(kind, ())
+        return found and [f for f in found if f.holds(self._members[to], now)]
 
     def deliver(self, now: float, at: Sequence[Vector]) -> Iterator[tuple[int, bytes]]:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
@@ -93,20 +99,23 @@ class Ether:
             if not self._passes(now, number, who, to, at):
                 continue
             self.arrived += 1
+            if not self._faults:
+                yield to, datagram
+                continue
             yield to, self._bent(to, now, datagram)
             if any(self._dice.random() < f.amount for f in self._of("duplicate", to, now)):
                 yield to, datagram
 
     def _passes(self, now: float, number: int, who: int, to: int, at: Sequence[Vector]) -> bool:
         """Whether a packet gets through between two drones at these places, m."""
-        distance = math.dist(at[who], at[to])
+        known = self._known(who, to, at)
+        distance = known["distance"]
         if distance > self._k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
         if self._faults and (
             self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
         ):
             return False
-        known = self._known(who, to, at)
         if not self._reception.hears(to, who, number, known):
             return False
         missed = unheard(self._radio, self._k, number, self._period, known)
@@ -116,7 +125,7 @@ class Ether:
         if self._of("outage", who, now) or self._of("outage", to, now):
             return True
         here, there = self._members[to], self._members[who]
-        cuts = (f for f in self._faults if f.kind == "partition" and f.begin <= now < f.end)
+        cuts = (f for f in self._faults.get("partition", ()) if f.begin <= now < f.end)
         return any((here in f.who) != (there in f.who) for f in cuts)
 
     def _bent(self, to: int, now: float, datagram: bytes) -> bytes:

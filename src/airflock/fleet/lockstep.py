@@ -18,6 +18,7 @@ from airflock.fleet.ether import Ether
 from airflock.fleet.faults import Fault
 from airflock.fleet.individuals import Faults, records_of, sensors_of
 from airflock.fleet.starting import KEY, Station, in_the_air, lift_of, vehicle_of
+from airflock.fleet.vehicle import SUFFERED
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do
 from airflock.onboard.card import Card
@@ -47,8 +48,10 @@ class Fleet:
         self._every = max(1, round(card.period / self._dt))
         self._tick = max(1, round(min(card.safety.tick, card.period) / self._dt))
         self.steps, self.frames, self.stamps, self.log = 0, [], [], []  # type: ignore[var-annotated]
+        self.standing: list[list[bool]] = []  # (time, agent): who stands because it has lost somebody
         self._befalls = befalls = Faults(scenario, seed)
         self._bodies = [b for _, b in records_of(scenario, len(card.members), seed)]
+        self._errs = scenario.errs
         self._noise = OuterNoise(seed, len(card.members), not card.flat)
         self.vehicles = [vehicle_of(scenario, card, i, b, self._noise, STARTED) for i, b in enumerate(self._bodies)]
         for vehicle in self.vehicles:
@@ -58,6 +61,10 @@ class Fleet:
         self.nodes = [
             Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
             for who in card.members
+        ]  # fmt: skip
+        self._breaks = [
+            (v, own) for v in self.vehicles
+            if (own := [f for f in self.faults if f.kind in SUFFERED and (not f.who or v.system in f.who)])
         ]  # fmt: skip
         reach = befalls.reach if befalls else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
@@ -163,12 +170,12 @@ class Fleet:
 
     def _break(self, now: float) -> None:
         """Let faults of vehicles act."""
-        for vehicle in self.vehicles if self.faults else ():
-            vehicle.suffer(self.faults, now, self._dt)
+        for vehicle, faults in self._breaks:
+            vehicle.suffer(faults, now, self._dt)
 
     def _err(self, number: int) -> None:
         """Advance the error of each drone's navigation by one period, with the simulator's numbers."""
-        if not self.scenario.errs:
+        if not self._errs:
             return
         for sensing, vehicle in zip(self._sensing, self.vehicles, strict=True):
             vehicle.error = sensing.measure(number, State(*vehicle.state), self.card.period)
@@ -182,6 +189,7 @@ class Fleet:
         self.stamps.append(
             [[n.peers.all[m].at if m != n.member else -1e9 for m in self.card.members] for n in self.nodes]
         )
+        self.standing.append([n.stands for n in self.nodes])
 
     def array(self) -> NDArray[np.float64]:
         """(time, agent, 15): true position and velocity, setpoint, own position and velocity as the node knows them."""

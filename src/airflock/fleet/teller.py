@@ -40,7 +40,9 @@ class Teller:
             witness.message(witness.HEARS, member, [who for who, at in known.items() if now - at <= LATELY])
             for member, known in self._at.items()
         ]
+        holding: dict[str, set[int]] = {}  # several faults of one kind are told as one
         for fault in self._faults:
             if fault.begin <= now < fault.end:
-                told.append(witness.message(NUMBERS[fault.kind], 0, fault.who or self._members))
+                holding.setdefault(fault.kind, set()).update(fault.who or self._members)
+        told += [witness.message(NUMBERS[kind], 0, who) for kind, who in holding.items()]
         return [self._sign(each, utc) for each in told]

@@ -30,6 +30,7 @@ ACCEPTED, DENIED, UNSUPPORTED = 0, 2, 3
 POSITION_IGNORED = 0x0007
 VELOCITY_IGNORED = 0x0038
 LOCAL_NED, BODY_NED = 1, 8
+SUFFERED = frozenset({"motor", "gnss", "battery", "pilot"})  # faults that befall a vehicle itself
 GROUND = 0.15  # m; lower is landed
 FRESH = 0.5  # s between setpoints that still are one stream
 GIVEN = (*(letter + axis for letter in "vmcgw" for axis in "xyz"), "dt", "b", "memory")  # what a body may ask for

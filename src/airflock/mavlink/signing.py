@@ -57,12 +57,17 @@ class Signer:
 
 
 class Received(NamedTuple):
-    """A genuine message: sender, its stamp, number of the message and its fields."""
+    """A genuine message: sender, its stamp, number of the message, and its payload without trailing zeros."""
 
     system: int
     stamp: int
     message: int
-    values: dict[str, Any]
+    payload: bytes
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Its fields by name."""
+        return dialect.values(self.message, self.payload)
 
 
 class Receiver:
@@ -107,7 +112,7 @@ class Receiver:
         self.heard[system] = stamp
         self.accepted += 1
         payload = bytes(datagram[HEADER : HEADER + datagram[1]])
-        return Received(system, stamp, message, dialect.values(message, payload))
+        return Received(system, stamp, message, payload)
 
     def _fault(self, data: bytes, utc: int) -> str:
         """Why a datagram is refused; empty if it is not. Changes nothing."""

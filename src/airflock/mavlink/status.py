@@ -6,6 +6,7 @@ velocities lost to their whole numbers, a byte each.
 """
 
 import struct
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from airflock.mavlink import dialect
@@ -76,6 +77,12 @@ def status_of(values: dict[str, Any], site: Site) -> Status | None:
         values["time"], at, velocity, values["h_acc"] * 1e-3, phase, values["flight_state"] == AIRBORNE, mission, card,
         battery, clock * 0.01, peers,
     )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def status_in(payload: bytes, site: Site) -> Status | None:
+    """The status in the payload of a message; where many members live in one process, a packet is read once."""
+    return status_of(dialect.values(MESSAGE, payload), site)
 
 
 def _fit(value: float, low: int, high: int) -> int:

@@ -17,7 +17,7 @@ from airflock.mavlink.signing import Receiver, Signer
 from airflock.onboard import guidance, saying
 from airflock.onboard.card import Card
 from airflock.onboard.limiter import STILL, Velocity, limit
-from airflock.onboard.mission import FLY, Facts, Phase, look
+from airflock.onboard.mission import FLY, STANDING, Facts, Phase, look
 from airflock.onboard.operator import Operator
 from airflock.onboard.peers import Peers
 from airflock.onboard.situation import SLOW, Timers, facts
@@ -113,14 +113,15 @@ class Node:
         if got.message == orders.MESSAGE:
             self.operator.take(got.values, now, utc)
             return
-        told = status.status_of(got.values, self.card.site)
+        told = status.status_in(got.payload, self.card.site)
         if told is None:
             return
         at = (told.time - self._zero) * 1e-6
         if self.peers.take(got.system, told, at, now):
-            index = self.card.members.index(got.system)
-            if self.peers.all[got.system].flies():
-                self.pilot.hear(index, self.card.law_state(State(*told.position, *told.velocity)), at, now)
+            index, peer = self.card.members.index(got.system), self.peers.all[got.system]
+            if peer.flies():
+                assert peer.state is not None, "it was taken"
+                self.pilot.hear(index, self.card.law_state(peer.state), at, now, stands=peer.phase in STANDING)
             else:
                 self.pilot.forget(index)
 
@@ -128,6 +129,11 @@ class Node:
     def memory(self) -> Memory:
         """What must outlive a restart."""
         return Memory(self._sign.last, dict(self._receive.heard), self.operator.given)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it stands because somebody whom it has lost could be near."""
+        return self._stay is not None
 
     @property
     def refused(self) -> dict[str, int]:
@@ -170,7 +176,7 @@ class Node:
         return facts(
             self.card, self.member, self.phase, self.wire, self.peers, self.operator, self._timers, self.utc(now), now,
             home=self.home, order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced,
-            lost_near=self._stay is not None, twin=self._twin,
+            lost_near=self.stands, twin=self._twin,
             streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
             time_over=self._flew_at is not None and now - self._flew_at > s.mission_time, before=self._before,
         )  # fmt: skip

@@ -17,6 +17,16 @@ WHY = {
     "mission": "of another mission",
     "stranger": "of systems that are no members",
 }
+SOME = {  # what is said of faults whose amount the ether does not tell
+    "loss": "some packets to these drones are lost",
+    "jitter": "packets to these drones are late",
+    "duplicate": "some packets to these drones arrive twice",
+    "corrupt": "some packets to these drones arrive with a wrong bit",
+    "rogue": "somebody without the key sends packets as these drones, from another place",
+    "impostor": "somebody with the key sends packets as these drones, from another place",
+    "battery": "the battery tells another level",
+    "clock": "the node's clock is wrong",
+}
 TABLE = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;text-align:right'>"
 
 
@@ -62,7 +72,8 @@ def about(observer: Observer, member: int, now: float) -> str:
 
 def faults_of(observer: Observer) -> str:
     """Faults that hold, with what they do."""
-    lines = [f"<b>{kind}</b>, {observer.named(who)}: {KINDS[kind]}" for kind, who in observer.faults.items()]
+    said = KINDS | SOME
+    lines = [f"<b>{kind}</b>, {observer.named(who)}: {said[kind]}" for kind, who in observer.faults.items()]
     return note("<br>".join(lines)) if lines else ""
 
 
