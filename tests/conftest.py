@@ -6,7 +6,8 @@ import os
 import hypothesis
 import pytest
 
-hypothesis.settings.register_profile("untimed", deadline=None)  # no test asserts a time
+too_slow = [hypothesis.HealthCheck.too_slow]  # a draw is slow where others use the machine
+hypothesis.settings.register_profile("untimed", deadline=None, suppress_health_check=too_slow)  # no test asserts a time
 hypothesis.settings.load_profile("untimed")
 gc.set_threshold(100_000, 50, 50)  # a compilation makes millions of objects that stay: looking at them takes a tenth
 
