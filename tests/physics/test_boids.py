@@ -125,7 +125,7 @@ def test_a_flock_along_a_line_or_in_a_plane_is_met_in_full(shape, seed):
     """Its box has far more room for cells than agents; the cells grow, and nobody is missed."""
     found = load("zapotecatl_2016/best", {
         "agents": 300, "update": "synchronous", "dt": 0.02, "duration": 0.2, "world.arena": "none",
-        "world.edges": "open", "start.kind": "ball", "start.radius": 1.0, "metrics.period": 0.1,
+        "world.edges": "open", "start.kind": "ball", "start.radius": 1.0, "metrics.period": 0.1, "metrics.max_e": 1.0,
     })  # fmt: skip
     rng = np.random.default_rng(seed)
     place = rng.uniform(-0.5, 0.5, (300, 3)) * STRETCHED[shape]
