@@ -3,8 +3,9 @@
 python tests/kills.py FOLDER --what evolve --kills 200 --seed 7
 
 What is at work is one of LIVES: a life begins, or goes on with, what a folder holds, to its end. Toy flights stand for
-real ones where only the store matters. `workers` and `sweep` kill worker processes of dask under a study or a sweep of
-real flights. What is done stands in FOLDER/WHAT/done.json, so that a run that was cut off goes on.
+real ones where only the store matters. `workers`, `sweep` and `certificates` kill worker processes of dask under a
+study, and under a sweep and a certificate of real flights. What is done stands in FOLDER/WHAT/done.json, so that a run
+that was cut off goes on.
 """
 
 import argparse
@@ -290,7 +291,42 @@ def sweeps(_, kills, seed):
     sys.stdout.write(f"sweep: {len(died)} workers killed under {done} sweeps: all tables identical\n")
 
 
-CLUSTERS = {"workers": workers, "sweep": sweeps}
+def certificates(folder, kills, seed):
+    """Kill workers of dask under campaigns of real flights until so many have died."""
+    from airflock.certify.campaign import FOLDER, Campaign
+    from airflock.certify.flights import CampaignTask
+    from airflock.certify.run import run
+    from airflock.executors.cluster import Cluster
+    from airflock.limits.limit import read_all
+    from airflock.scenarios.files import load
+
+    shutil.rmtree(folder, ignore_errors=True)
+    scenario = load("vasarhelyi_2018/real_4ms", {"agents": 10, "duration": 300.0})
+    limits = read_all(["r_min<3 at 5%", "phi_vel>=2 in 90%"], scenario)
+    campaign = Campaign(scenario, limits, flights=1000)
+    task = CampaignTask(scenario, limits, 32)
+
+    def ended(place, executor):
+        open_folder(place, campaign, resume=False, kind=FOLDER)
+        try:
+            run(campaign, place, executor, 600.0, kept=False).save(place / "certificate.toml")
+        finally:
+            executor.close()
+        return of_certificate(place)
+
+    wanted = ended(folder / "here", Here(lambda p, s: task(p, s)[0], 1))
+    chance, died, done = random.Random(seed), [], 0
+    while len(died) < kills:
+        with dying_workers(chance, died) as address:
+            found = ended(folder / f"there{done}", Cluster([task], address))
+        assert found == wanted, f"campaign {done} ended differently after {len(died)} kills"
+        done += 1
+        sys.stderr.write(f"certificates: {len(died)} of {kills} kills\n")
+    sys.stdout.write(f"certificates: {len(died)} workers killed under {done} campaigns of {campaign.flights} flights: "
+                     "all ends identical\n")  # fmt: skip
+
+
+CLUSTERS = {"workers": workers, "sweep": sweeps, "certificates": certificates}
 
 
 def main():

@@ -67,10 +67,12 @@ def test_the_programs_count_knows_no_images():
 
 
 def test_order_parameters_over_all_pairs_of_a_large_flock_are_announced():
+    def told(**settings):
+        return " ".join(load("zapotecatl_2016/best", settings).notes)
+
     large = {"agents": 100_000, "update": "synchronous"}
-    notes = load("zapotecatl_2016/best", large).notes
-    assert any("metrics.kind = 'zapotecatl' looks at all pairs of 100000 agents" in note for note in notes)
-    assert not any(
-        "all pairs" in note for note in load("zapotecatl_2016/best", {**large, "metrics.kind": "order"}).notes
-    )
-    assert not any("all pairs" in note for note in load("zapotecatl_2016/best").notes)
+    assert "metrics.kind = 'zapotecatl' looks at all pairs of 100000 agents (quality)" in told(agents=100_000)
+    assert "looks at all pairs of 100000 agents (correlation)" in told(**large, **{"metrics.kind": "vasarhelyi"})
+    assert "all pairs" not in told(**large)  # by cells
+    assert "all pairs" not in told(agents=100_000, **{"metrics.kind": "order"})
+    assert "all pairs" not in told()

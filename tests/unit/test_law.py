@@ -131,7 +131,7 @@ def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
         assert law.faults(body.move) == []
     for metric in METRICS.values():
-        for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
+        for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey"):
             if getattr(metric, kind) is not None:
                 assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)
 

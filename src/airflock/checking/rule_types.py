@@ -2,7 +2,8 @@
 
 LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
-MEASURES = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey", "fitness", "faults")
+PARAMETER = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey")
+MEASURES = (*PARAMETER, "fitness", "faults")
 SENSOR = ("measure", "error", "exact", "bounds")
 RADIO = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
 FAULT = ("sense", "tell", "radio", "clock", "overrule", "motion", "leaves")
@@ -56,8 +57,8 @@ RESULTS = {
     "fitness": "Mapping[str, float]", "faults": "list[str]", "limits": "list[str]",
     "sense": STATE, "tell": STATE, "overrule": VECTOR, "motion": VECTOR, "clock": "float", "leaves": "float",
     "radio": "tuple[float, float]", "measure": STATE, "error": "tuple[float, float]", "exact": "bool",
-    "bounds": "list[str]", "missed": "float", "missed_few": "float", "receive": "float", "late": "float",
-    "see": STATE, "carry": VECTOR, "lasts": "float",
+    "settled": "bool", "bounds": "list[str]", "missed": "float", "missed_few": "float", "receive": "float",
+    "late": "float", "see": STATE, "carry": VECTOR, "lasts": "float",
 }  # fmt: skip
 
 

@@ -258,6 +258,11 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "sample": {**SAMPLE, "q": "metric parameters"},
     "survey": {**FLOCK, "q": "metric parameters"},
     "within": {"q": "metric parameters"},
+    "settled": {
+        "pair": "what the rule `pair` adds up to over all who are nearer than `beyond`, and perhaps some others",
+        "beyond": "distance, m",
+        "q": "metric parameters",
+    },
     "sense": {**STATE, **ONSET, "f": "the fault's parameters"},
     "tell": {**STATE, **ONSET, "f": "the fault's parameters"},
     "radio": {"reach": "radio.range, m", "since": ONSET["since"], "f": "the fault's parameters"},

@@ -52,6 +52,11 @@ def pair(r2, lower, q):
     return Pair(contact, contact * lower)
 
 
+def settled(beyond, q):
+    """Whether nobody farther than this (m) is in contact."""
+    return q.r_coll <= beyond
+
+
 def agent(pair, memory):
     """Contacts and events of one agent."""
     now = 1.0 if pair.contacts > 0.5 else 0.0

@@ -86,6 +86,11 @@ def pair(r2, q):
     return Pair(r2, 1.0 if r2 < q.r_cluster * q.r_cluster else 0.0)
 
 
+def settled(pair, beyond, q):
+    """Whether nobody farther than this (m) is nearer than the nearest one, or within r_cluster."""
+    return (pair.nearest2 <= beyond * beyond) & (q.r_cluster <= beyond)
+
+
 def linked(r2, q):
     """Whether two agents at a squared distance r2 (m²) belong to one group."""
     return r2 < q.r_cluster * q.r_cluster

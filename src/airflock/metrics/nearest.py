@@ -43,6 +43,11 @@ def pair(r2):
     return Pair(r2)
 
 
+def settled(pair, beyond):
+    """Whether nobody farther than this (m) is nearer than the nearest one."""
+    return pair.nearest2 <= beyond * beyond
+
+
 def agent(pair, q):
     """Nearest distance (m) and whether it exceeds the radio range."""
     nearest = math.sqrt(pair.nearest2)

@@ -54,6 +54,11 @@ def pair(r2):
     return Pair(r2)
 
 
+def settled(pair, beyond):
+    """Whether nobody farther than this (m) is nearer than the nearest one."""
+    return pair.nearest2 <= beyond * beyond
+
+
 def offset_from(x, y, z, mean):
     """Distance (m) from a position to a mean position: a term of Eq. 14."""
     return math.sqrt((x - mean.x) * (x - mean.x) + (y - mean.y) * (y - mean.y) + (z - mean.z) * (z - mean.z))

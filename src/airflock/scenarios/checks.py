@@ -203,9 +203,13 @@ def silence_faults(rule: str, flight: Any, found: Model | None) -> list[str]:
 MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 
 
-def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...]) -> list[str]:
-    """What order parameters over all pairs cost in a large flock: neighbours may be found by cells, these are not."""
-    paired = [item.name for item in metrics if item.pair or item.cluster or item.survey]
+def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) -> list[str]:
+    """What order parameters over all pairs cost in a large flock.
+
+    cells : neighbours are found by cells, and so are pairs of order parameters that say when they are `settled`
+    """
+    near = cells and all(item.settled for item in metrics if item.pair)
+    paired = [item.name for item in metrics if (item.pair and not near) or item.cluster or item.survey]
     if flight.agents < MANY or not paired:
         return []
     seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md

@@ -15,6 +15,8 @@ class Metric:
 
     within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
               while no two agents are nearer than that. A driver may then skip the pair loop.
+    settled : whether nobody farther than `beyond` (m) can change what `pair` adds up to for an agent. Large flocks then
+              look no farther than they must
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
     survey    : rule of the whole flock like a model's `flock`: fills the columns of Shared that `agent` may read;
               `workspace` of any of n, q, wing gives its scratch
@@ -37,6 +39,7 @@ class Metric:
     Cluster: type | None = None
     Memory: type | None = None
     within: Callable[..., float] | None = None
+    settled: Callable[..., bool] | None = None
     survey: Callable[..., None] | None = None
     Shared: type | None = None
     workspace: Callable[..., Any] | None = None
@@ -99,7 +102,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     for rule, record in RULES_AND_RECORDS:
         if rule in found and record not in found:
             raise RuleError(f"metric {name} has a rule {rule} but no {record}")
-    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "survey"):
+    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey"):
         if kind in found:
             asks(found[kind], kind, name)
     fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
@@ -114,7 +117,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "total", "survey", "Shared", "workspace",
+        "Memory", "within", "settled", "total", "survey", "Shared", "workspace",
     )  # fmt: skip
     return Metric(
         name=name,

@@ -108,6 +108,19 @@ def neighbours(
     build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
+def sort(build: Builder) -> list[str]:
+    """Lines that sort agents into cells as wide as the law's reach, at any time; makes the function `sort` of them."""
+    reach = build.plan.model.reach
+    assert reach is not None
+    if not any("def sort(" in text for text in build.functions):
+        if not any("def cells_of(" in text for text in build.functions):
+            build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
+        lines = [*build.records("p"), f"near = least({build.call(reach, 'reach', {})}, LIMIT)", *opened(build)]
+        lines += must_replace(_sorted(build, False), "CHUNKS", str(CHUNKS))
+        build.function("sort(n, row, work, cells)", lines, "return size, count", parallel=True)
+    return [*opened(build), "sides, count = sort(n, row, work, cells)"]
+
+
 def _found(each: list[str], last: list[str]) -> list[str]:
     """Lines that find whom an agent meets of the candidates of its cell: `met`, by number of the candidate."""
     each = must_replace(each, "integer(j) != ii", OTHERS)

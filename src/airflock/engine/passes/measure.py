@@ -1,6 +1,6 @@
 """Measure: order parameters of one instant, and how instants add up. The same text scores flights and recordings."""
 
-from airflock.engine.passes import flock
+from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
 from airflock.engine.plan import Plan
@@ -9,14 +9,15 @@ from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.measure import Measured
+from airflock.engine.stages.near import pairs_by_cells
 from airflock.engine.stages.words import fields, wants
 
 CLOCKS = ("sample", "collision")
 
 
-def arguments(build: Builder) -> str:
-    """What a measure function is called with."""
-    rest = ", scratch" if flock.surveys(build.plan) else ""
+def arguments(build: Builder, cells: bool = False) -> str:
+    """What a measure function is called with. cells : it looks at pairs by them."""
+    rest = (", scratch" if flock.surveys(build.plan) else "") + ", cells" * cells
     return f"time, n, m, row, whole, work, edges, spans, scene, memory, labels, values{rest}"
 
 
@@ -26,12 +27,15 @@ def measure(build: Builder, clock: str) -> None:
     That of the collision clock returns the least distance of a pair, m.
     """
     metrics = measured(build.plan, clock)
+    paired = [one.metric for one in metrics if one.metric.pair is not None]
+    cells = build.plan.grid and bool(paired) and all(metric.settled is not None for metric in paired)
     outside = any(wants(one.metric.agent, "excursion") for one in metrics)
     parts = {f"survey_{one.metric.name}": flock.survey(build, one.metric) for one in metrics if one.metric.survey}
     grouped = {one.metric.name: build.clusters(one.metric) for one in metrics if build.clusters and one.metric.cluster}
     parts |= {f"clusters_{name}": lines for name, lines in grouped.items()}
     made = specialise(
         build, measuring.measure, metrics=metrics, nearest=clock == "collision",
+        over=pairs_by_cells if cells else None,
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
         clustered={
@@ -39,10 +43,10 @@ def measure(build: Builder, clock: str) -> None:
             for one in metrics
         },
     )  # fmt: skip
-    lines = made.lines
+    lines = [*(grid.sort(build) if cells else []), *made.lines]
     for name, part in parts.items():
         lines = in_place(lines, name, part)
-    build.function(f"measure_{clock}({arguments(build)})", lines, f"return {made.answer}")
+    build.function(f"measure_{clock}({arguments(build, cells)})", lines, f"return {made.answer}")
 
 
 def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:
