@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.engine.beginnings import first_memories, of_pairs
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
@@ -118,11 +119,14 @@ def arrays(
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
     own["all_reached"] = cuda.to_device(np.full((len(jobs), *size["all_reached"]), -1.0, real))
     own["starts"] = cuda.to_device(_stacked(starts, real) if starts is not None else np.zeros((len(jobs), 1, 1), real))
-    own["stores"] = cuda.to_device(_silent(len(jobs), size["stores"], real))
+    own["stores"] = cuda.to_device(_silent(plan, len(jobs), size["stores"], real))
+    own["owns"] = cuda.to_device(np.stack([_wide(t.own, size["owns"], real) for t in jobs]))
     model = list(getattr(plan.model.Memory, "_field_defaults", {}).values())
     kept = [s for metric in plan.metrics for s in getattr(metric.Memory, "_field_defaults", {}).values()]
     for name, begin in (("all_mem", model), ("all_memory", kept)):
         own[name] = cuda.to_device(_memories(len(jobs), size[name], begin, real))
+    if plan.laws:
+        own["all_mem"] = cuda.to_device(np.stack([_remembered(plan, t, size["all_mem"], real) for t in jobs]))
     if not shape.registers:
         own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {
@@ -178,10 +182,25 @@ def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
     return np.stack([np.ascontiguousarray(start, real) for start in starts])
 
 
-def _silent(flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
-    """Packets of every pair before any was received."""
-    found = np.zeros((flocks, *size), real)
-    found[:, -1] = -1e9
+def _silent(plan: Plan, flocks: int, size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """What is kept of every pair before any packet was received."""
+    first = of_pairs(plan, size[1], size[2], real)
+    return np.broadcast_to(first[: size[0]], (flocks, *size)).copy()
+
+
+def _wide(own: NDArray[Any], size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """What differs among agents, with the last one's numbers where nobody is."""
+    if not len(own):
+        return np.zeros(size, real)
+    return np.pad(own, ((0, 0), (0, size[1] - own.shape[1])), mode="edge").astype(real)
+
+
+def _remembered(plan: Plan, tables: Tables, size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """What laws remember at the start, of each lane what its law does."""
+    laws = _wide(tables.own, (len(plan.columns), size[1]), np.float64)[plan.columns.index(("", "law"))]
+    found = np.zeros(size, real)
+    kept = first_memories(plan, laws.astype(np.int64), real)
+    found[: len(kept)] = kept[: size[0]]
     return found
 
 

@@ -8,7 +8,8 @@ from airflock.engine.passes import flock
 from airflock.engine.passes.build import columns, loop
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.stages.decide import NEAR
-from airflock.engine.stages.state import SCENE
+from airflock.engine.stages.state import SCENE, own_row
+from airflock.rules.generate import law_mark
 
 
 def memory(build: CudaBuilder) -> list[str]:
@@ -19,6 +20,7 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += ["row = rows[block]; whole = wholes[block]"]
     lines += ["faces = all_faces[block]; edges = all_edges[block]; spans = all_spans[block]"]
     lines += ["goals = all_goals[block]; reached = all_reached[block]; past = pasts[block]; store = stores[block]"]
+    lines += ["differing = owns[block]"]
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
     wide = {"seed_low": "u32", "seed_high": "u32"}
     names = {"ring": "slots"}
@@ -64,7 +66,9 @@ def _records(build: CudaBuilder) -> list[str]:
     """Records of numbers, once per flight."""
     lines, offset = [], 0
     for letter, fields in build.plan.records.items():
-        kind = build.source.record(letter.upper() * 2, fields)
+        law = letter.removeprefix("p")
+        of_law = build.plan.laws and letter.startswith("p") and law.isdigit()
+        kind = build.source.record(f"PP{law_mark(int(law))}" if of_law else letter.upper() * 2, fields)
         lines += [f"row_{letter} = {kind}({', '.join(f'row[{offset + c}]' for c in range(len(fields)))})"]
         offset += len(fields)
     return [*lines, *reciprocal_lines(build.reciprocals)]
@@ -78,14 +82,23 @@ def _registers(build: CudaBuilder) -> list[str]:
             lines += [f"{name} = u32(0)"]
         elif name.endswith("_i"):
             lines += [f"{name} = {_first_value(build, name)}"]
-    return lines if build.shape.registers else []
+    rows = {own_row(*key): c for c, key in enumerate(build.plan.columns)}
+    if build.shape.registers:
+        return lines
+    tables = [f"work[{build.row(name)}, i] = differing[{c}, i]" for name, c in rows.items() if name in build.names]
+    return [*loop("i in range(tid, n, THREADS)", tables), "cuda.syncthreads()"] if tables else []
 
 
 def _first_value(build: CudaBuilder, name: str) -> str:
     """First value of one register."""
     kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
+    differing = [own_row(*key) for key in build.plan.columns]
+    if name[:-2] in differing:
+        return f"differing[{differing.index(name[:-2])}, i]"
     if not kept:
         return "ZERO"
+    if kept[1] == "mem" and build.plan.laws:
+        return f"all_mem[block, {kept[2]}, i]"
     starts = [s for m in build.plan.metrics for s in getattr(m.Memory, "_field_defaults", {}).values()]
     if kept[1] == "mem":
         starts = list(getattr(build.plan.model.Memory, "_field_defaults", {}).values())
