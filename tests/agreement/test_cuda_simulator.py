@@ -15,7 +15,8 @@ needed("numba_cuda")
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
     "paper", "split", "storm", "polygon", "silo", "links", "torus", "table", "couzin", "vicsek", "groups", "together",
-    "city", "herd", "stop", "display", "wings", "vee", "echelon", "weights",
+    "city", "herd", "stop", "display", "wings", "vee", "echelon", "weights", "crowded air", "shadow", "bursts",
+    "jitter", "seen", "species", "in turn",
 )  # fmt: skip
 
 

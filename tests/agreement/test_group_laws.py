@@ -1,16 +1,18 @@
 """Groups with laws of their own: in the driver each agent flies as the pilot of its law would."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import airflock
+import wary as wary_law
 from against_reference import compared
 from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import ScenarioError
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import find_model
-from inside import no_cuda
 from scenarios_drawn import Draw
 
 PAPER = "vasarhelyi_2018/4ms"
@@ -106,41 +108,6 @@ def test_what_is_shown_of_an_agent_is_of_its_law():
         assert live and np.allclose(np.array(view.sums)[live], summed[live])
 
 
-WARY = """
-from dataclasses import dataclass
-from typing import NamedTuple
-
-import airflock
-
-COMMAND = "velocity"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameters(airflock.Parameters):
-    style: str = airflock.choice("flee", ("flee", "chase"), meaning="what strangers are to it")
-    k: float = airflock.quantity(1.0, "m/s", low=0.0, high=50.0, meaning="speed")
-
-
-class Sums(NamedTuple):
-    x: float
-    y: float
-    third: float
-
-
-class Memory(NamedTuple):
-    met: float = 7.0
-
-
-def neighbour(dx, dy, r, kin, group, p):
-    k = (1.0 - kin) / r * (-1.0 if p.style == "flee" else 1.0)
-    return Sums(k * dx, k * dy, 1.0 if group == 2.0 else 0.0)
-
-
-def decide(own, sums, memory, percept, p):
-    k = p.k * (1.0 + 0.1 * percept.normal(0))
-    x = 0.5 * own.vx + k * sums.x + 0.01 * memory.met
-    return x, 0.5 * own.vy + k * sums.y, 0.0, Memory(memory.met + sums.third)
-"""
 KINDS = [
     {"name": "wary", "agents": [0, 3, 5], "model": {"k": {"value": 2.0, "spread": 0.3}}},
     {"name": "bold", "agents": [1, 6], "model": {"style": "chase", "k": 3.0}},
@@ -151,7 +118,7 @@ KINDS = [
 @pytest.fixture
 def wary(tmp_path):
     """A file with a law that asks for groups, remembers, draws and chooses."""
-    (tmp_path / "wary.py").write_text(WARY)
+    (tmp_path / "wary.py").write_text(Path(wary_law.__file__).read_text(encoding="utf-8"), encoding="utf-8")
     return tmp_path / "wary.py"
 
 
@@ -226,4 +193,3 @@ def test_laws_that_do_not_fit_the_world_or_the_flock_are_refused():
         beside("kidger", **rays)
     with pytest.raises(ScenarioError, match="dimock_2003 solves for the whole flock, so all fly by it"):
         load("dimock_2003/published", {"groups": [{"agents": 1, "model": {"kind": "viragh_2014"}}]})
-    assert no_cuda(plan_of(beside("formation")), 7) == "groups with laws of their own fly on device = cpu or python"

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import airflock  # noqa: E402
 import several_terms  # noqa: E402
+import wary  # noqa: E402
 from airflock.engine import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
 from airflock.scenarios.making import make  # noqa: E402
@@ -31,6 +32,14 @@ GNSS = {
     "sensors.kind": "gnss", "sensors.drift_time": 1.0, "sensors.bias": 1.0, "sensors.white": 0.3,
     "sensors.jump_rate": 0.7, "sensors.jump_time": 0.3, "sensors.outage_rate": 0.7, "sensors.outage_time": 0.3,
 }  # fmt: skip
+NUMBERS = [
+    {"name": "a", "agents": [1, 4], "body": {"tau": 2.0}, "model": {"p_rep": {"value": 0.3, "spread": 0.1}}},
+    {"name": "b", "agents": 2, "sensors": {"noise": 0.1}},
+]
+LAWS = [
+    {"name": "a", "agents": [1, 4], "model": {"kind": "viragh_2014"}},
+    {"name": "b", "agents": 2, "model": {"p_rep": 0.3}, "body": {"tau": 0.5}},
+]
 # model or preset, keys, threads per agent, states in registers
 CASES = {
     "paper": ("vasarhelyi_2018", {
@@ -99,6 +108,35 @@ CASES = {
         "agents": 3, "duration": 0.6, "dt": 0.1, "sensors.period": 0.2, "metrics.period": 0.3, "wing.segments": "5",
     }, 1, False),
     "city": ("kidger/city", {"agents": 3, "duration": 0.3, "scene.blocks": 3, "goals.count": 2}, 1, True),
+    "crowded air": ("vasarhelyi_2018", {
+        "radio.kind": "congestion", "radio.delay": 0.2, "radio.airtime": 0.02, "agents": 8, "groups": LAWS,
+        "metrics.r_coll": 9.0,
+    }, 1, True),
+    "shadow": ("vasarhelyi_2018", {
+        "radio.kind": "shadow", "radio.delay": 0.2, "radio.near": 5.0, "radio.far": 40.0, "agents": 7,
+        "world.obstacles": ISLANDS, "groups": NUMBERS,
+    }, 2, True),
+    "bursts": ("vasarhelyi_2018", {
+        "world.dimensions": "3", "radio.kind": "bursts", "radio.delay": 0.2, "radio.outage_rate": 2.0,
+        "radio.outage_time": 0.4, "radio.loss": 0.4, "groups": NUMBERS,
+    }, 1, False),
+    "jitter": ("vasarhelyi_2018", {
+        "radio.kind": "jitter", "radio.delay": 0.2, "agents": 7, "groups": LAWS, "world.edges": "periodic",
+        "world.side": 40.0,
+    }, 1, False),
+    "seen": ("vasarhelyi_2018", {"radio.kind": "vision", "radio.delay": 0.1, "scene.kind": "boxes",
+        "scene.boxes": [[2.0, 1.0, 7.0, 3.0, 2.5, 18.0, 0.0]], "world.dimensions": "3", "metrics.kind": "order",
+    }, 2, True),
+    "species": (wary, {
+        "agents": 7, "radio.delay": 0.1, "metrics.kind": "order", "model.k": 1.0, "groups": [
+            {"name": "wary", "agents": [0, 3, 5], "model": {"k": {"value": 2.0, "spread": 0.3}}},
+            {"name": "bold", "agents": [1, 6], "model": {"style": "chase", "k": 3.0}},
+            {"name": "slow", "agents": [2], "model": {"k": 0.5}},
+        ],
+    }, 1, True),
+    "in turn": ("vasarhelyi_2018", IDEAL | {
+        "update": "sequential", "sensors.period": 0.0, "groups": LAWS[:1], "duration": 0.3,
+    }, 2, False),
     "weights": (several_terms, {"model.w": [0.5, 0.3, 0.1], "start.separation": 3.0}, 1, True),
 }  # fmt: skip
 
@@ -106,7 +144,7 @@ CASES = {
 def build(name):
     """Scenario and layout of a case."""
     kind, keys, per_agent, registers = CASES[name]
-    if kind is several_terms:
+    if not isinstance(kind, str):
         found = make({}, name, COMMON | keys, law=airflock.model(vars(kind)))
     elif "/" in kind:
         found = load(kind, keys)
@@ -127,6 +165,7 @@ def differ(name, seed):
     frames, values = 0.0, {}
     for simulated, known in zip((one, two), trusted, strict=True):
         assert simulated.status == known.status == 0
+        assert np.isfinite(simulated.state).all() and np.isfinite(simulated.frames).all()
         frames = max(frames, float(np.abs(simulated.frames - known.frames).max()))
         frames = max(frames, float(np.abs(simulated.state - known.state).max()))
         for key, value in known.values.items():

@@ -1,8 +1,9 @@
-"""Collisions per flock hour of vasarhelyi_2018/faulty: without faults, with each kind alone, and with all of them.
+"""Collisions per flock hour of a preset with faults: without them, with each kind alone, and with all of them.
 
-    python tests/nightly/faulty.py FOLDER [HOURS]
+    python tests/nightly/faulty.py FOLDER [HOURS] [PRESET]
 
-Each line flies as many flights of 600 s as HOURS (300 by default) take, on the seeds from 0 on, the same for all lines.
+PRESET is vasarhelyi_2018/faulty by default, or vasarhelyi_2018/faulty_evolved. Each line flies as many flights of
+600 s as HOURS (300 by default) take, on the seeds from 0 on, the same for all lines.
 What is done stands in FOLDER/flights.csv, so that a run that was cut off goes on. Prints the table in Markdown: means
 with 95 % intervals by bootstrap over flights, or where nothing collided the exact upper bound of Poisson. A kind whose
 paired difference to the flights without faults has an interval that holds 0 changes nothing that these hours can tell.
@@ -26,12 +27,12 @@ FIELDS = ("line", "seed", "n_coll", "r_min")
 DRAWS = 2000
 
 
-def lines() -> dict[str, Any]:
+def lines(preset: str) -> dict[str, Any]:
     """Scenario of each line of the table."""
-    whole = airflock.load(PRESET)
+    whole = airflock.load(preset)
     entries = list(whole.document["faults"])
-    found = {"none": airflock.load(PRESET, {"faults": []})}
-    found |= {entry["kind"]: airflock.load(PRESET, {"faults": [entry]}) for entry in entries}
+    found = {"none": airflock.load(preset, {"faults": []})}
+    found |= {entry["kind"]: airflock.load(preset, {"faults": [entry]}) for entry in entries}
     return found | {"all": whole}
 
 
@@ -46,7 +47,7 @@ def done(table: Path) -> dict[str, dict[int, float]]:
     return found
 
 
-def flown(folder: Path, hours: float) -> dict[str, dict[int, float]]:
+def flown(folder: Path, hours: float, preset: str) -> dict[str, dict[int, float]]:
     """Fly what is not done yet."""
     folder.mkdir(parents=True, exist_ok=True)
     table = folder / "flights.csv"
@@ -55,7 +56,7 @@ def flown(folder: Path, hours: float) -> dict[str, dict[int, float]]:
         rows = csv.DictWriter(file, FIELDS)
         if not begun:
             rows.writeheader()
-        for line, scenario in lines().items():
+        for line, scenario in lines(preset).items():
             for seed in range(round(hours * 3600.0 / scenario.flight.duration)):
                 if seed not in found[line]:
                     values = fly(scenario, seed).values
@@ -92,12 +93,12 @@ def table_of(found: dict[str, dict[int, float]], hours: float) -> str:
     return "\n".join(text)
 
 
-def main(folder: Path, hours: float = 300.0) -> int:
+def main(folder: Path, hours: str = "300", preset: str = PRESET) -> int:
     """Fly what is missing and print the table."""
-    found = flown(folder, hours)
-    print(table_of(found, airflock.load(PRESET).flight.duration / 3600.0))
+    found = flown(folder, float(hours), preset)
+    print(table_of(found, airflock.load(preset).flight.duration / 3600.0))
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(Path(sys.argv[1]), *map(float, sys.argv[2:3])))
+    raise SystemExit(main(Path(sys.argv[1]), *sys.argv[2:4]))

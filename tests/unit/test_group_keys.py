@@ -67,7 +67,12 @@ def test_an_open_flight_takes_a_key_of_a_group(seed):
     ("key", "said"),
     [
         ("groups.hevy.body.tau", "unknown group 'hevy'; did you mean heavy"),
-        ("groups.heavy.bdy.tau", "unknown key; write groups.NAME.SECTION.KEY"),
+        ("groups.heavy.bdy.tau", "unknown key; did you mean groups.heavy.body.tau"),
+        ("groups.hevy.tua", "unknown key; did you mean groups.heavy.body.tau"),
+        ("groups.old.one.p_rep", "unknown key; did you mean groups.old.ones.model.p_rep"),
+        ("groups.light.damping", "unknown key; did you mean groups.light.sensors.damping"),
+        ("groups.light.zz", "did you mean groups.light.SECTION.zz; sections: model, body, sensors"),
+        ("groups.nobody.tau", "unknown key; write groups.NAME.SECTION.KEY"),
         ("groups.heavy", "unknown key; write groups.NAME.SECTION.KEY"),
         ("groups.heavy.body.tua", r"groups\[0\].body.tua: unknown key; did you mean groups.0..body.tau"),
         ("groups.heavy.sensors.period", "all measure and decide at the same times"),

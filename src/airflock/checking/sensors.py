@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.single import run
 from airflock.checking.units import OTHERS, Units, rescaled
-from airflock.core.agent import State, answer
+from airflock.core.agent import State
 from airflock.core.parameters import Quantity, choices, declarations
+from airflock.core.sensing import added, measured
 from airflock.core.sensor import COMPONENTS, Sensor, sensor
 from airflock.core.vocabulary import asks
 from airflock.rules import law
@@ -88,29 +89,18 @@ def _draws(seed: int, number: int) -> dict[str, float]:
     return {f"g{c}": g for c, g in enumerate(normal)} | {f"u{c}": u for c, u in enumerate(uniform)}
 
 
-def _given(found: Sensor, s: Any, state: Any, number: int, period: float, memory: Any, seed: int) -> dict[str, Any]:
-    """Everything that `measure` may ask for, by name."""
-    true = dict(zip(COMPONENTS, map(float, state), strict=True))
-    return true | _draws(seed, number) | {"memory": memory, "time": number * period, "period": period, "s": s}
-
-
 def _believed(found: Sensor, s: Any, track: Track, period: float, seed: int) -> Track:
     """What the sensor makes of a track, measured from its first state on."""
     made = np.empty_like(track)
     memory, off = (found.Memory() if found.Memory is not None else None), State(*(0.0,) * 6)
     for number, state in enumerate(track):
-        given = _given(found, s, state, number, period, memory, seed)
+        draws = _draws(seed, number)
         if found.error is not None:
-            each = [
-                answer(found.error, "error", {"dx": dx, "dv": dv, "g": given[f"g{c}"], "period": period, "s": s})
-                for c, (dx, dv) in enumerate(zip(off[:3], off[3:], strict=True))
-            ]
-            off = State(*(dx for dx, _ in each), *(dv for _, dv in each))
+            off = added(found, s, off, [draws[f"g{axis}"] for axis in range(3)], period)
             made[number] = state + np.array(off)
-            continue
-        answered = answer(found.measure, "measure", given, found.name)  # type: ignore[arg-type]
-        made[number] = answered[:6]
-        memory = answered[6] if found.Memory is not None else None
+        else:
+            true = [float(component) for component in state]
+            made[number], memory = measured(found, s, true, memory, number * period, period, draws)
     return made
 
 
@@ -169,7 +159,9 @@ def _single(found: Sensor, s: Any, period: float) -> str:
     assert rule is not None
     memory = found.Memory() if found.Memory is not None else None
     for number in range(5):
-        given = _given(found, s, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), number, period, memory, number)
-        given |= {"dx": 0.3, "dv": 0.1, "g": given["g0"]}
+        draws = _draws(number, number)
+        given: dict[str, Any] = {**dict(zip(COMPONENTS, (1.0, 2.0, 3.0, 0.5, 0.25, 0.125), strict=True)), **draws}
+        given |= {"memory": memory, "time": number * period, "period": period, "s": s}
+        given |= {"dx": 0.3, "dv": 0.1, "g": draws["g0"]}
         run(rule, {"s": choices(s)}, given, asks(rule, kind, found.name))
     return ""

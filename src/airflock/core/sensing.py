@@ -1,6 +1,6 @@
 """Sensing: one agent's sensor, measurement after measurement, in plain Python with the random numbers of a flight."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from airflock.core import random
@@ -29,32 +29,42 @@ class Sensing:
         """Measurement `number`: what is believed minus the true state, m and m/s, until the next one."""
         if self.sensor.is_exact(self.s):
             return self.off
-        found = self._added(number, period) if self.sensor.error is not None else self._measured(number, true, period)
-        x, v = found
+        x, v = self._errors(number, true, period)
         self.off = State(x[0], x[1], 0.0 if self.flat else x[2], v[0], v[1], 0.0 if self.flat else v[2])
         return self.off
 
-    def _added(self, number: int, period: float) -> tuple[list[float], list[float]]:
-        """Errors that are added along each axis."""
-        assert self.sensor.error is not None
-        low, high = (self._words(number, draw) for draw in (0, 1))
-        normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
-        steps = [
-            answer(self.sensor.error, "error", {"dx": dx, "dv": dv, "g": g, "period": period, "s": self.s})
-            for dx, dv, g in zip(self.off[:3], self.off[3:], normal, strict=True)
-        ]
-        return [dx for dx, _ in steps], [dv for _, dv in steps]
+    def _errors(self, number: int, true: State, period: float) -> tuple[Sequence[float], Sequence[float]]:
+        """Errors of position (m) and velocity (m/s), all three axes."""
+        if self.sensor.error is not None:
+            low, high = (self._words(number, draw) for draw in (0, 1))
+            normal = (*random.normal_pair(low[0], low[1]), random.normal_pair(high[0], high[1])[0])
+            off = added(self.sensor, self.s, self.off, normal, period)
+            return off[:3], off[3:]
+        draws = drawn(self.seed, number, self.agent)
+        time = number * period
+        found, self._memory = measured(self.sensor, self.s, true, self._memory, time, period, draws)
+        apart = [float(a - b) for a, b in zip(found, true, strict=True)]
+        return apart[:3], apart[3:]
 
-    def _measured(self, number: int, true: State, period: float) -> tuple[list[float], list[float]]:
-        """What `measure` believes, minus the true state."""
-        assert self.sensor.measure is not None
-        given = true._asdict() | drawn(self.seed, number, self.agent)
-        given |= {"memory": self._memory, "time": number * period, "period": period, "s": self.s}
-        found = answer(self.sensor.measure, "measure", given, self.sensor.name)
-        if self.sensor.Memory is not None:
-            self._memory = found[6]
-        off = [float(a - b) for a, b in zip(found[:6], true, strict=True)]
-        return off[:3], off[3:]
+
+def added(sensor: Sensor, s: Any, off: State, normal: Sequence[float], period: float) -> State:
+    """Errors (m, m/s) that a sensor adds along each axis, after `off` by the normal numbers of three axes."""
+    assert sensor.error is not None
+    steps = [
+        answer(sensor.error, "error", {"dx": dx, "dv": dv, "g": g, "period": period, "s": s})
+        for dx, dv, g in zip(off[:3], off[3:], normal, strict=True)
+    ]
+    return State(*(dx for dx, _ in steps), *(dv for _, dv in steps))
+
+
+def measured(
+    sensor: Sensor, s: Any, true: Sequence[float], memory: Any, time: float, period: float, draws: Mapping[str, float]
+) -> tuple[State, Any]:
+    """What the rule `measure` of a sensor believes of a true state (m, m/s), and what it then remembers."""
+    assert sensor.measure is not None
+    given = {**State(*true)._asdict(), **draws, "memory": memory, "time": time, "period": period, "s": s}
+    found = answer(sensor.measure, "measure", given, sensor.name)
+    return State(*found[:6]), found[6] if sensor.Memory is not None else None
 
 
 def drawn(seed: int, number: int, agent: int, world: int = 0) -> dict[str, float]:

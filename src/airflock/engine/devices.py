@@ -91,17 +91,8 @@ def no_cuda(plan: Plan, agents: int) -> str | None:
         return "faults and agents that come and go fly on device = cpu or python"
     if plan.silent:
         return "silence.rule = 'stop' flies on device = cpu or python"
-    rules = (plan.radio.receive, plan.radio.late, plan.radio.see, plan.radio.lasts)
-    if any(rule is not None for rule in rules) or plan.radio.asks("clear", "talkers"):
-        return f"radio.kind = {plan.radio.name!r} flies on device = cpu or python"
     if plan.topology is not None:
         return f"topology.kind = {plan.topology.name!r} flies on device = cpu or python"
-    if plan.laws:
-        return "groups with laws of their own fly on device = cpu or python"
-    if plan.grouped:
-        return "rules that ask for groups fly on device = cpu or python"
-    if plan.varied:
-        return "numbers that differ among agents fly on device = cpu or python"
     if agents <= MOST_TOGETHER:
         return None
     from airflock.engine.cuda.crowd import refused

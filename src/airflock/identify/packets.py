@@ -50,7 +50,9 @@ def curve_of(k: Packets) -> links.Parameters:
 def _kernel() -> Any:
     """Probability that nothing arrives, by row, compiled from the rule itself."""
     from numba import njit
+    from numba.extending import register_jitable
 
+    register_jitable(links.share)  # which the rule calls
     received = njit(links.received)
 
     @njit

@@ -31,16 +31,22 @@ class Parameters(Packets):
     received_far: float = quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="received share at far")
 
 
+def share(distance, near, far, received_near, received_far):
+    """Received share over a distance (m) on a link that is near-perfect below `near` (m).
+
+    It falls linearly to received_far at `far` (m), then with the inverse square of the distance (signal power).
+    """
+    middle = received_near + (received_far - received_near) / max(far - near, 1e-6) * (distance - near)
+    beyond = received_far * far * far / max(distance * distance, far * far)
+    return received_near if distance <= near else (middle if distance < far else beyond)
+
+
 def received(distance, slow, k):
     """Probability that one packet arrives on the fast (slow = 0) or the slow link (slow = 1), 0-1.
 
-    Near-perfect below k.near, falling linearly to received_far at k.far, then with the inverse square of the distance
-    (signal power); the slow link reaches twice as far.
+    The slow link reaches twice as far.
     """
-    s = distance / (1.0 + slow)
-    middle = k.received_near + (k.received_far - k.received_near) / max(k.far - k.near, 1e-6) * (s - k.near)
-    beyond = k.received_far * k.far * k.far / max(s * s, k.far * k.far)
-    return k.received_near if s <= k.near else (middle if s < k.far else beyond)
+    return share(distance / (1.0 + slow), k.near, k.far, k.received_near, k.received_far)
 
 
 def thrice(x, n):

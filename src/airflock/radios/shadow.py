@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from airflock.core.parameters import quantity
 from airflock.core.radio import Packets, forward
-from airflock.radios.links import FIG8, SETUP
+from airflock.radios.links import FIG8, SETUP, share
 
 OURS = "our choice: a house"
 
@@ -25,13 +25,6 @@ class Parameters(Packets):
     exponent: float = quantity(
         2.0, "1", low=0.5, high=8.0, source="free space", meaning="of the path loss of signals over distance"
     )
-
-
-def share(distance, near, far, received_near, received_far):
-    """Received share over a distance (m) in the open: the short link of Vásárhelyi et al. 2018 (`radios.links`)."""
-    middle = received_near + (received_far - received_near) / max(far - near, 1e-6) * (distance - near)
-    beyond = received_far * far * far / max(distance * distance, far * far)
-    return received_near if distance <= near else (middle if distance < far else beyond)
 
 
 def stretched(distance, clear, k):

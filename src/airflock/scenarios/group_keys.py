@@ -42,7 +42,8 @@ def with_groups(
     for key, value in wanted.items():
         group, section, name = parts_of(key)
         if section not in LETTERS or not name:
-            faults.append(f"{key}: unknown key; {FORM}; sections: {', '.join(LETTERS)}")
+            hint = _advice(key, document, dict(zip(map(str, names), tables, strict=True)))
+            faults.append(f"{key}: unknown key; {hint}")
         elif group not in names:
             near = get_close_matches(group, [str(known) for known in names], n=1, cutoff=0.5)
             hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(map(str, names))}"
@@ -52,6 +53,26 @@ def with_groups(
             own = table.get(section, {})
             table[section] = {**own, name: _kept(own.get(name), value)} if isinstance(own, Mapping) else own
     return {**document, "groups": tables}, {key: v for key, v in others.items() if key != "groups"}, faults
+
+
+def _advice(key: str, document: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """What to write instead of a key without a section: the nearest group, and the word at the end of the key.
+
+    Known are the words that the file writes for the flock or for the group; of any other the section stays open.
+    """
+    rest, _, word = key.removeprefix(FIRST).rpartition(".")
+    group = next(iter(get_close_matches(rest, list(tables), n=1, cutoff=0.5)), "")
+    sections = f"sections: {', '.join(LETTERS)}"
+    if not rest or not group:
+        return f"{FORM}; {sections}"
+    places: dict[str, str] = {}
+    for section in LETTERS:
+        for table in (document.get(section), tables[group].get(section)):
+            places |= {name: section for name in table} if isinstance(table, Mapping) else {}
+    near = next(iter(get_close_matches(word, list(places), n=1)), "")
+    if not near:
+        return f"did you mean {FIRST}{group}.SECTION.{word}; {sections}"
+    return f"did you mean {FIRST}{group}.{places[near]}.{near}?"
 
 
 def _kept(before: Any, value: Any) -> Any:

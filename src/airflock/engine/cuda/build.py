@@ -17,6 +17,7 @@ from airflock.engine.cuda.shape import Shape
 from airflock.engine.passes.build import JIT, Builder, branch, in_place
 from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
+from airflock.rules.generate import law_mark
 
 STAGES = (
     "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
@@ -140,7 +141,21 @@ class CudaBuilder(Builder):
         plan = self.plan
         found = {a: ("truth", c) for c, a in enumerate(plan.axes)}
         table = "said" if plan.late else "truth"
-        return found | {f"h{name}": (table, c) for c, name in enumerate(plan.motion)}
+        found |= {f"h{name}": (table, c) for c, name in enumerate(plan.motion)}
+        if plan.grouped:
+            found["group"] = ("truth", 1 + max(c for table, c in found.values() if table == "truth"))
+        return found
+
+    def kind(self, letter: str, fields: tuple[str, ...]) -> str:
+        """Name of the record of numbers behind a letter; a kernel reads those of all laws."""
+        law = letter.removeprefix("p")
+        if letter != "p" and law.isdigit():
+            return self.source.record(f"PP{law_mark(int(law))}", fields)
+        return super().kind(letter, fields)
+
+    def named(self, letter: str) -> str:
+        """What the kernel calls a record of numbers; each law of the flock has its own p."""
+        return f"row_p{self.plan.law}" if letter == "p" and self.plan.law else f"row_{letter}"
 
     def cells(self) -> tuple[str, ...]:
         """Lines around a pair loop that runs over cells; none where it runs over all pairs."""
@@ -163,13 +178,14 @@ class CudaBuilder(Builder):
     def _stage(self, name: str, lines: list[str]) -> None:
         rows = self.names | {"u0", "u1", "u2", "u3"}
         statements = parse(self.prepared(name, self._with_parts(lines) if name == "move" else lines))
-        turn = self.plan.sequential and name in ("neighbours", "boundaries", "decide", "move")
+        of_all = name.removesuffix(self.mark)  # each law has such a stage
+        turn = self.plan.sequential and of_all in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
         context.cells, context.exact = self.cells(), name.startswith("measure_")
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self).visit(s) for s in body]
-        body, numbers = with_reciprocals(self.forms, body, {f"row_{letter}" for letter in self.plan.records})
+        body, numbers = with_reciprocals(self.forms, body, {self.named(letter) for letter in self.plan.records})
         self.source.blocks += self.forms.made
         self.forms.made.clear()
         if name == "move":  # which runs at every step: the kernel takes the reciprocals once
@@ -244,7 +260,7 @@ class _Renamed(ast.NodeTransformer):
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         if node.id in self.letters:
-            node.id = f"row_{node.id}"
+            node.id = self.build.named(node.id)
         elif node.id.endswith("_i") and node.id[:-2] in self.build.names:
             node.id = f"{self.build.same(node.id[:-2])}_i"
         return node

@@ -39,6 +39,8 @@ def refused(plan: Plan, agents: int) -> str | None:
     """Why a plan cannot be flown by cells on a GPU; None if it can."""
     if not plan.grid:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
+    if plan.columns:
+        return "one big flock with groups flies on cpu"
     if owners(plan):
         return f"{plan.model.name} or its order parameters solve for the whole flock"
     if plan.start in FORMATIONS and not plan.given_start:

@@ -15,8 +15,8 @@ from airflock.engine.stages.words import START, ZERO
 
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
-    "starts", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states", "all_sums",
-    "all_reached", "all_frames", "scratches", "scratch_rows",
+    "starts", "owns", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states",
+    "all_sums", "all_reached", "all_frames", "scratches", "scratch_rows",
 )  # fmt: skip
 
 
@@ -212,8 +212,9 @@ def _advance(build: CudaBuilder) -> list[str]:
     if not build.plan.sequential:
         return [build.stages["move"].call(), further]
     due = in_turn(build.plan)
-    turn = [build.stages["neighbours"].call(k_="step"), "cuda.syncthreads()"] if "neighbours" in due else []
-    alone = [build.stages[name].call(k_="step") for name in due if name != "neighbours"]
+    met = [name for name in due if name.startswith("neighbours")]  # one for each law
+    turn = [*(build.stages[name].call(k_="step") for name in met), *["cuda.syncthreads()"] * bool(met)]
+    alone = [build.stages[name].call(k_="step") for name in due if name not in met]
     turn += [*branch("tid == 0", [*alone, "fastest_ = most(fastest_, answer)"]), "cuda.syncthreads()"]
     return ["fastest_ = ZERO", *loop("i in range(n)", turn), "answer = fastest_", further]
 

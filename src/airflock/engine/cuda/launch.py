@@ -127,6 +127,9 @@ def arrays(
     }
     for name, one in beginning.items():
         own[name] = cuda.to_device(np.repeat(one[None, : size[name][0]], len(jobs), axis=0))
+    own["owns"] = cuda.to_device(np.stack([_wide(t.own, size["owns"], real) for t in jobs]))
+    if plan.laws:
+        own["all_mem"] = cuda.to_device(np.stack([_remembered(plan, t, size["all_mem"], real) for t in jobs]))
     if not shape.registers:
         own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {
@@ -180,3 +183,16 @@ def _padded(arrays: Sequence[NDArray[Any]], fill: float = 0.0) -> NDArray[Any]:
 
 def _stacked(starts: Sequence[NDArray[Any]], real: Any) -> NDArray[Any]:
     return np.stack([np.ascontiguousarray(start, real) for start in starts])
+
+
+def _wide(own: NDArray[Any], size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """What differs among agents, with the last one's numbers where nobody is."""
+    if not len(own):
+        return np.zeros(size, real)
+    return np.pad(own, ((0, 0), (0, size[1] - own.shape[1])), mode="edge").astype(real)
+
+
+def _remembered(plan: Plan, tables: Tables, size: tuple[int, ...], real: Any) -> NDArray[Any]:
+    """What laws remember at the start, of each lane what its law does."""
+    laws = _wide(tables.own, (len(plan.columns), size[1]), np.float64)[plan.columns.index(("", "law"))]
+    return first_memories(plan, laws.astype(np.int64), real)[: size[0]]

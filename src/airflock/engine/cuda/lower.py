@@ -120,6 +120,9 @@ class _Pairs:
         for statement in statements:
             if isinstance(statement, ast.For) and _target(statement) == "j":
                 done += self.pairs(statement)
+            elif isinstance(statement, ast.If) and _by_law(statement):
+                statement.body = self.walk(statement.body)
+                done.append(statement)
             else:
                 done.append(statement)
         return done
@@ -194,6 +197,11 @@ def _over_agents(statement: ast.stmt) -> ast.For | None:
 def _of_one_thread(statement: ast.stmt) -> bool:
     """Whether only the first thread runs a statement, so that no barrier may stand in it."""
     return isinstance(statement, ast.If) and ast.unparse(statement.test) == "tid == 0"
+
+
+def _by_law(statement: ast.If) -> bool:
+    """Whether only the agents of one law run a statement: one thread serves each of them."""
+    return ast.unparse(statement.test).startswith("law[i] == ")
 
 
 def _target(loop: ast.For) -> str:

@@ -16,22 +16,24 @@ SHARE = 0.9  # of the free memory that may be used
 
 def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> Shape:
     """Layout of flocks of one plan and size."""
-    return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=bool(owners(plan)))
+    whole, apart = bool(owners(plan)), bool(plan.laws)
+    return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=whole, apart=apart)
 
 
 def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays that a launch works on, for one flock, by argument name; rows: of the table of states."""
     whole, dims, lanes = tables.integers, plan.dimensions, shape.lanes
     n, table = whole["agents"], not shape.registers
-    model = len(getattr(plan.model.Memory, "_fields", ()))
+    model = max(len(getattr(memory, "_fields", ())) for memory in plan.memories)
     kept = sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     return {
         "starts": (2 * dims, n) if plan.given_start else (1, 1),
         "pasts": (whole["ring"], 2 * dims, lanes) if plan.late else (1, 1, 1),
-        "stores": (2 * dims + 1, lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
+        "stores": (len(plan.of_pair), lanes, lanes) if plan.packets else (2 * dims + 1, 1, 1),
+        "owns": (max(len(plan.columns), 1), lanes),
         "works": (rows, lanes) if table else (1, 1),
         "all_words": (4, lanes) if table else (1, 1),
-        "all_mem": (max(model, 1), lanes) if table else (1, 1),
+        "all_mem": (max(model, 1), lanes) if table or plan.laws else (1, 1),
         "all_memory": (max(kept, 1), lanes) if table else (1, 1),
         "states": (2 * dims, n),
         "all_sums": (len(columns(plan.metrics)) + 2, 2),

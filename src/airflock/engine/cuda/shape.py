@@ -50,8 +50,9 @@ class Shape:
 
 
 def shape_of(
-    agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, whole: bool = False
-) -> Shape:
+    agents: int, flocks: int, processors: int = 132, *, sequential: bool = False, whole: bool = False,
+    apart: bool = False,
+) -> Shape:  # fmt: skip
     """Layout for many flocks of this size on a GPU with this many multiprocessors.
 
     Few flocks leave most of a GPU idle: then several threads share the pairs of one agent. When there are flocks enough
@@ -60,6 +61,7 @@ def shape_of(
 
     sequential : one agent after another
     whole      : some rule solves for the whole flock, which one thread does
+    apart      : agents fly by several laws: threads of one warp part there, so none hands another a sum
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs
@@ -70,6 +72,6 @@ def shape_of(
         return Shape(lanes, 1, MOST_THREADS, registers=False)
     per_agent = 1
     busy = flocks * lanes / (processors * 3.0 * 128.0)  # 1.0: as full as pays
-    while per_agent < 4 and 2 * per_agent * lanes <= MOST_THREADS and busy * per_agent < 1.0:
+    while not apart and per_agent < 4 and 2 * per_agent * lanes <= MOST_THREADS and busy * per_agent < 1.0:
         per_agent *= 2
     return Shape(lanes, per_agent, lanes * per_agent)

@@ -9,7 +9,7 @@ from airflock.engine.passes import flock
 from airflock.engine.passes.build import columns, loop
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.stages.decide import NEAR
-from airflock.engine.stages.state import SCENE
+from airflock.engine.stages.state import SCENE, own_row
 
 
 def memory(build: CudaBuilder) -> list[str]:
@@ -20,6 +20,7 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += ["row = rows[block]; whole = wholes[block]"]
     lines += ["faces = all_faces[block]; edges = all_edges[block]; spans = all_spans[block]"]
     lines += ["goals = all_goals[block]; reached = all_reached[block]; past = pasts[block]; store = stores[block]"]
+    lines += ["differing = owns[block]"]
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
     lines += [*numbers(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
@@ -73,14 +74,23 @@ def _registers(build: CudaBuilder) -> list[str]:
             lines += [f"{name} = u32(0)"]
         elif name.endswith("_i"):
             lines += [f"{name} = {_first_value(build, name)}"]
-    return lines if build.shape.registers else []
+    rows = {own_row(*key): c for c, key in enumerate(build.plan.columns)}
+    if build.shape.registers:
+        return lines
+    tables = [f"work[{build.row(name)}, i] = differing[{c}, i]" for name, c in rows.items() if name in build.names]
+    return [*loop("i in range(tid, n, THREADS)", tables), "cuda.syncthreads()"] if tables else []
 
 
 def _first_value(build: CudaBuilder, name: str) -> str:
     """First value of one register."""
     kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
+    differing = [own_row(*key) for key in build.plan.columns]
+    if name[:-2] in differing:
+        return f"differing[{differing.index(name[:-2])}, i]"
     if not kept:
         return "ZERO"
+    if kept[1] == "mem" and build.plan.laws:
+        return f"all_mem[block, {kept[2]}, i]"
     records = [build.plan.model.Memory] if kept[1] == "mem" else [metric.Memory for metric in build.plan.metrics]
     starts = [start for record in records for start in defaults(record)]
     return f"real({starts[int(kept[2])]})"

@@ -21,6 +21,7 @@ from airflock.engine.stages.receive import (
     sent,
     shade,
     unheard,
+    unshaded,
     word_of,
 )  # fmt: skip
 from airflock.engine.stages.state import Flock, numbers_of
@@ -144,7 +145,8 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
     late   : how old is what is heard on arrival, s
     edges, spans, scene : what stands in the world, where it shades the radio
     draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
-    drawn  : instead of it, draws the random word of what agent j sends agent i
+    drawn  : instead of it, draws the random word of what agent j sends agent i; each pair is then looked at by itself,
+             also for what stands between the two
     meet   : finds whom of those whom agent i hears it meets, where that is not all of them
     sums   : each field of Sums that is summed, and how it is reduced
     images : whether offsets go to the nearest image (candidates that come by cells are at theirs)
@@ -185,7 +187,7 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
             talkers = crowd(i, others, range_ * range_, flock, w, plan=plan)
         else:
             talkers = ZERO
-        if plan.shades:
+        if plan.shades and drawn is None:
             shade(i, others, range_ * range_, flock, w, whole, edges, spans, scene, plan=plan)
         for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
             for j in others:
@@ -195,12 +197,16 @@ def neighbours(  # noqa: C901 - tests of the plan leave one way through
                     apart2 = away(j, true, o, flock, w, plan=plan)
                 else:
                     apart2 = ZERO
+                if plan.shades and drawn is not None:  # noqa: SIM108 - as above
+                    open_way = unshaded(i, j, range_ * range_, flock, w, whole, edges, spans, scene, plan=plan)
+                else:
+                    open_way = flock.clear[j] if plan.shades else ONE
                 if plan.packets and part != ADD:
                     carried2 = carries(i, j, range_ * range_, flock, plan=plan)
                     known = {
                         "distance": math.sqrt(apart2 + TINY), "dx": o[X], "dy": o[Y], "dz": o[Z], "talkers": talkers,
                         "vx": flock.velocity[X][i], "vy": flock.velocity[Y][i], "vz": flock.velocity[Z][i],
-                        "clear": flock.clear[j] if plan.shades else ONE, "step": real(decision),
+                        "clear": open_way, "step": real(decision),
                         "period": numbers.c.period, "fast": fast, "slow": slow,
                     }  # fmt: skip
                     hear(

@@ -121,20 +121,29 @@ def shade(
     *, plan: Plan,
 ) -> None:  # fmt: skip
     """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
-    x = flock.position
     for j in others:
-        flock.clear[j] = ONE
-        o = vector()
-        for a in range(plan.dimensions):
-            o[a] = apart(flock.position[a][j], flock.position[a][i], a, w, plan=plan)
-        apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
-        if (apart2 <= range2) & (integer(j) != integer(i)):
-            r = math.sqrt(apart2 + TINY)
-            ux = o[X] / r
-            uy = o[Y] / r
-            uz = o[Z] / r
-            free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
-            flock.clear[j] = ZERO if free < r else ONE
+        open_way = unshaded(i, j, range2, flock, w, whole, edges, spans, scene, plan=plan)
+        flock.clear[j] = open_way
+
+
+def unshaded(
+    i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan
+) -> Any:
+    """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
+    x = flock.position
+    open_way = ONE
+    o = vector()
+    for a in range(plan.dimensions):
+        o[a] = apart(x[a][j], x[a][i], a, w, plan=plan)
+    apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
+    if (apart2 <= range2) & (integer(j) != integer(i)):
+        r = math.sqrt(apart2 + TINY)
+        ux = o[X] / r
+        uy = o[Y] / r
+        uz = o[Z] / r
+        free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
+        open_way = ZERO if free < r else ONE
+    return open_way
 
 
 def chances(i: int, j: int, flock: Flock, whole: Any, decision: int, n: int, *, plan: Plan) -> dict[str, Any]:
