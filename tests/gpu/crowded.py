@@ -9,6 +9,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import simulator  # noqa: E402
+
 from airflock.engine import plan_of  # noqa: E402
 from airflock.scenarios.files import load  # noqa: E402
 from inside import Crowd, cells_of, fly_crowd  # noqa: E402
@@ -57,7 +59,7 @@ def differ(name, seed):
 
 
 if __name__ == "__main__":
-    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
+    simulator.quick()
     warnings.simplefilter("ignore", RuntimeWarning)
     seed, *names = sys.argv[1:]
     json.dump({name: differ(name, int(seed)) for name in names or CASES}, sys.stdout)

@@ -10,6 +10,8 @@ from numba import cuda
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import simulator  # noqa: E402
+
 from airflock.core import random  # noqa: E402
 from airflock.rules.generate import Source  # noqa: E402
 from inside import Shape, head, load_driver  # noqa: E402
@@ -29,7 +31,7 @@ def fill(counters, words, uniforms, normals):
 """
 
 if __name__ == "__main__":
-    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
+    simulator.quick()
     warnings.simplefilter("ignore", RuntimeWarning)
     rng, n = np.random.default_rng(int(sys.argv[1])), 200
     counters = rng.integers(0, 2**32, (6, n))

@@ -12,6 +12,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import simulator  # noqa: E402
+
 import airflock  # noqa: E402
 import several_terms  # noqa: E402
 import wary  # noqa: E402
@@ -182,7 +184,7 @@ def differ(name, seed):
 
 
 if __name__ == "__main__":
-    sys.setswitchinterval(1e-5)  # s: the simulator asks its threads in a loop, and must let them run meanwhile
+    simulator.quick()
     warnings.simplefilter("ignore", RuntimeWarning)  # the simulator's 32-bit words overflow on purpose
     seed, *names = sys.argv[1:]
     json.dump({name: differ(name, int(seed)) for name in names}, sys.stdout)
