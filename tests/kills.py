@@ -227,7 +227,13 @@ def dying_workers(chance, died):
     with distributed.LocalCluster(**how) as cluster:
 
         def killer():
+            quiet = 0
             while not over.wait(chance.uniform(0.2, 0.6)):
+                quiet = 0 if cluster.scheduler_info["workers"] else quiet + 1
+                if quiet == 50:  # both died while they started, and their nannies gave up: hire two others
+                    cluster.scale(0)
+                    cluster.scale(2)
+                    quiet = 0
                 worker = chance.choice([*cluster.workers.values(), None])
                 # one at a time: a worker that dies before it has started is given up by its nanny
                 if worker is not None and worker.pid and len(cluster.scheduler_info["workers"]) == 2:

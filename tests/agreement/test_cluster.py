@@ -19,6 +19,7 @@ from airflock.evolve.run import run
 from airflock.evolve.store import Store
 from airflock.evolve.task import tasks_of
 from airflock.executors import Flight
+from airflock.executors import cluster as executors_cluster
 from airflock.executors.cluster import Cluster
 from airflock.executors.here import Here
 from airflock.executors.scores import scores
@@ -123,6 +124,19 @@ def test_flights_that_never_end_are_recorded_as_failed(doomed):
 def test_schedulers_without_workers_are_one_line():
     with local(0) as empty, pytest.raises(StudyError, match="has no workers"):
         Cluster(tasks_of(toys.study()), empty.scheduler_address, answer=0.3)
+
+
+def test_a_scheduler_that_loses_all_its_workers_is_one_line(monkeypatch):
+    """Found by kills: two workers died while they started, their nannies gave up, and the study waited for ever."""
+    monkeypatch.setattr(executors_cluster, "DESERTED", 0.5)
+    with local(1) as alone:
+        executor = Cluster([toy_task(0.2)], alone.scheduler_address)
+        flying = executor.fly([Flight(0, repeat, dict(toys.BEST), repeat) for repeat in range(20)])
+        next(flying)
+        alone.scale(0)
+        with pytest.raises(StudyError, match=r"^the scheduler has had no workers for 0.5 s; what has landed is stored"):
+            list(flying)
+        executor.close()
 
 
 def test_schedulers_that_do_not_answer_are_one_line():

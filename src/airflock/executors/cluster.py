@@ -26,6 +26,7 @@ from airflock.scenarios.scenario import Scenario
 ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
 RETRIES = 2  # further tries of a flight that took too long
+DESERTED = 300.0  # s without a single worker after which nobody is expected to come back
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
 Fly = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
 compiling = Lock()  # held while a worker compiles: its threads wait for the first
@@ -62,6 +63,7 @@ class Cluster:
         except ModuleNotFoundError as fault:
             raise StudyError("--scheduler needs distributed: pip install 'airflock[cluster]'") from fault
         self.tasks, self.timeout, self.kept = tuple(tasks), timeout, kept
+        self.seen = 0.0  # when there was a worker, s of the monotonic clock
         try:
             self.client: Any = Client(address, timeout=answer, set_as_default=False)
             self.client.wait_for_workers(1, timeout=answer)
@@ -89,9 +91,10 @@ class Cluster:
         waiting = list(reversed(flights))
         tries: dict[tuple[int, int], int] = {}
         out: dict[Any, tuple[Flight, float]] = {}
+        self.seen = time.monotonic()
         try:
             while waiting or out:
-                threads = max(sum(self._answered().values()), 1)
+                threads = max(self._threads(), 1)
                 while waiting and len(out) < threads * (1 if self.timeout else AHEAD):
                     flight = waiting.pop()
                     # impure: equal flights are equal anyway, and dask must not forget or share one
@@ -115,13 +118,18 @@ class Cluster:
         finally:
             self.client.cancel(list(out), force=True)
 
-    def _answered(self) -> dict[str, int]:
-        """Threads of each worker; StudyError once the scheduler has gone."""
+    def _threads(self) -> int:
+        """Threads of all workers; StudyError once the scheduler has gone, or all workers for too long."""
+        after = "; what has landed is stored, continue with --resume" if self.kept else ""
         try:
-            return dict(self.client.nthreads())
+            threads = int(sum(self.client.nthreads().values()))
         except Exception as fault:  # whatever the network raises
-            after = "; what has landed is stored, continue with --resume" if self.kept else ""
             raise StudyError(f"the scheduler answers no more{after}") from fault
+        if threads:
+            self.seen = time.monotonic()
+        elif time.monotonic() - self.seen > DESERTED:
+            raise StudyError(f"the scheduler has had no workers for {DESERTED:g} s{after}")
+        return threads
 
     def _landed(self, future: Any, flight: Flight, began: float, tries: dict[tuple[int, int], int]) -> Landed | None:
         """The outcome of a task that is over; None if it has to fly again."""
