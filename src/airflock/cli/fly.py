@@ -1,6 +1,7 @@
 """Verb fly: prepare a mission on the ground, run a node, give orders, fly a log again."""
 
 import time
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -79,10 +80,12 @@ def prepare(
     """
     import secrets
 
+    from airflock.core.parameters import declarations
     from airflock.fleet.prepare import card_document
     from airflock.mavlink.keys import write_key
     from airflock.mavlink.orders import new_keys
     from airflock.onboard.card import write_card
+    from airflock.onboard.safety import Safety
     from airflock.scenarios.files import load
 
     faults: list[str] = []
@@ -96,16 +99,17 @@ def prepare(
         found = load(scenario, options.settings(changes), trust=trust)
     with options.gathering(faults):
         safety = options.settings(limits)
+        known = [name for name, _, _ in declarations(Safety)]
+        for name in (name for name in safety if name not in known):
+            near = get_close_matches(name, known, n=1, cutoff=0.5)
+            faults.append(f"--limit {name}: is not a limit; {f'did you mean {near[0]}?' if near else ', '.join(known)}")
     options.refuse(faults)
     private, public = new_keys()
-    try:
-        document = card_document(
-            found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
-            expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
-            margin=margin, safety=safety,
-        )  # fmt: skip
-    except TypeError as fault:
-        raise CardError([f"--limit: {str(fault).rpartition(' ')[2]} is not a limit"]) from fault
+    document = card_document(
+        found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
+        expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
+        margin=margin, safety=safety,
+    )  # fmt: skip
     loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits)
     full = [
         f"{name} radio: {len(systems)} drones would take {share:.0%} of its time; at most {SHARE:.0%}: "

@@ -67,7 +67,7 @@ def measured(
         driver.measure_frames(
             first, tables.row, own["whole"], tables.edges, tables.spans, state.scene, own["work"], own["memory"],
             own["labels"], own["values"], own["sums"], np.ascontiguousarray(part, real), series, real.type(period),
-            *state.scratch,
+            *state.scratch, *state.cells,
         )  # fmt: skip
 
     if present is None or present.all():

@@ -154,7 +154,7 @@ def replay_stages(plan: Plan) -> Builder:
     made = specialise(build, flight_.measure_frames, stages=build.stages, order=events, sampled=_sampled(plan))
     build.function(
         "measure_frames(first, row, whole, edges, spans, scene, work, memory, labels, values, sums, frames, series,"
-        " frame_period" + (", scratch)" if flock.owners(plan) else ")"),
+        " frame_period" + (", scratch" if flock.owners(plan) else "") + (", cells)" if plan.grid else ")"),
         _agents(build),
         made.lines,
         f"return {made.answer}",
