@@ -34,7 +34,7 @@ class Allocations(dict):
 
 def quick():
     """Let the simulator's threads change places often, and close the gap."""
-    from numba_cuda.numba.cuda.simulator.kernelapi import FakeCUDAShared
+    from numba.cuda.simulator.kernelapi import FakeCUDAShared  # by the name that kernels know it by
 
     sys.setswitchinterval(SWITCH)
     begin = FakeCUDAShared.__init__
