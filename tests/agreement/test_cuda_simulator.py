@@ -71,3 +71,8 @@ def test_random_integers_of_a_kernel_are_those_of_plain_python(seed):
     assert found["wrong_words"] == 0
     assert found["wrong_uniforms"] == 0
     assert found["normals"] < 1e-12
+
+
+def test_threads_that_ask_for_a_shared_array_at_once_get_the_same_one():
+    """Numba's simulator gave each of them its own: a kernel then read what nobody had written, once in some runs."""
+    assert simulated("shared_arrays.py") == 0

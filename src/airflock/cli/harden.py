@@ -140,18 +140,8 @@ def _print(name: str, steps: list[Any], seeds: int) -> None:
     from rich.table import Table
 
     table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
-    for column in (
-        "step",
-        "fitness",
-        "cost (95 %)",
-        "r_min, m",
-        "gain, m (95 %)",
-        "n_coll",
-        "f_wall",
-        "contacts",
-        "clearance, m",
-        "",
-    ):
+    told = ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)")
+    for column in (*told, "n_coll", "f_wall", "contacts", "clearance, m", ""):
         table.add_column(column, justify="left" if column in ("step", "") else "right")
     for step in steps:
         cost, gain = (f"{m:.3g} ({low:.3g} … {high:.3g})" for m, low, high in (step.cost, step.gain))

@@ -130,6 +130,7 @@ class _Trial:
         done: Callable[[], None] | None,
     ):
         self.scenarios, self.cost, self.limits, self.threads, self.done = scenarios, cost, limits, threads, done
+        self.at_walls = [limit for limit in limits if limit.score in WALLS]
         self.seeds, self.fresh = list(seeds), [max(seeds) + 1 + i for i in range(len(seeds))]
         self.optimum = self.table = self._fly(optimum[1], self.seeds)
         self.kept, self.seen = [optimum], [optimum[1]]
@@ -145,15 +146,13 @@ class _Trial:
 
     def touches(self) -> bool:
         """Whether what was kept so far touches walls or obstacles in some flight, or more often than a limit allows."""
-        walls = [limit for limit in self.limits if limit.score in WALLS]
         seen = any("phi_wall" in table and float(table["phi_wall"].max()) > 0.0 for table in self.table)
-        return seen or self._excess(self.table, walls) > 0.0
+        return seen or self._excess(self.table, self.at_walls) > 0.0
 
     def short_at_walls(self) -> bool:
         """Whether limits of walls and obstacles are farther from being kept than the others."""
-        walls = [limit for limit in self.limits if limit.score in WALLS]
-        others = [limit for limit in self.limits if limit not in walls]
-        return self._excess(self.table, walls) > self._excess(self.table, others)
+        others = [limit for limit in self.limits if limit not in self.at_walls]
+        return self._excess(self.table, self.at_walls) > self._excess(self.table, others)
 
     def tried(self, step: Step) -> list[Measured]:
         """The step and, where it breaks something or costs too much, half of it."""
