@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from itertools import product
 from typing import Any
 
@@ -15,6 +14,7 @@ from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 MOST = 400  # cells
 
@@ -26,10 +26,7 @@ def sound_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[
         faults.append(f"map: needs two keys, not {len(axes)}")
     for key, values in axes.items():
         if key not in known:
-            near = get_close_matches(key, known, n=1, cutoff=0.5)
-            faults.append(
-                f"map: {key} is not a number of {scenario.name}{f'; did you mean {near[0]}?' if near else ''}"
-            )
+            faults.append(f"map: {key} is not a number of {scenario.name}{meant(key, known, lead='; ')}")
             continue
         how = known[key][0]
         for value in values:

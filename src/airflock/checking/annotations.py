@@ -10,10 +10,10 @@ import io
 import tokenize
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 from airflock.checking.rule_types import KNOWN, LETTERS, MEASURES, RECORDS, RESULTS, SPECIAL, kinds_of
 from airflock.core.vocabulary import VOCABULARY
+from airflock.spelling import meant
 
 
 @dataclass(frozen=True)
@@ -211,9 +211,8 @@ def words_of(value: ast.expr, words: Mapping[str, tuple[str, ...]]) -> tuple[str
 
 
 def _unknown(rule: str, arguments: Iterable[ast.arg], name: str, known: Mapping[str, str]) -> str:
-    near = get_close_matches(name, known, n=1)
     asked = ", ".join(argument.arg for argument in arguments)
-    return f"{rule}({asked}) asks for {name!r}{f'; did you mean {near[0]}?' if near else ''}"
+    return f"{rule}({asked}) asks for {name!r}{meant(name, known, lead='; ', cutoff=0.6)}"
 
 
 def _ends(text: str, functions: Iterable[ast.FunctionDef]) -> dict[int, tuple[int, int]]:

@@ -1,7 +1,6 @@
 """Verb fly: prepare a mission on the ground, run a node, give orders, fly a log again."""
 
 import time
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ from typer.core import TyperGroup
 from airflock.cli import options, tables
 from airflock.doors import is_file
 from airflock.errors import CardError, ScenarioError
+from airflock.spelling import meant
 
 DATAGRAM = 95  # bytes of a signed status packet
 OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
@@ -101,8 +101,7 @@ def prepare(
         safety = options.settings(limits)
         known = [name for name, _, _ in declarations(Safety)]
         for name in (name for name in safety if name not in known):
-            near = get_close_matches(name, known, n=1, cutoff=0.5)
-            faults.append(f"--limit {name}: is not a limit; {f'did you mean {near[0]}?' if near else ', '.join(known)}")
+            faults.append(f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}")
     options.refuse(faults)
     private, public = new_keys()
     document = card_document(

@@ -2,8 +2,9 @@
 
 import re
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
+
+from airflock.spelling import meant
 
 
 def usage_fault(fault: Any, words: Sequence[str]) -> str:
@@ -49,8 +50,7 @@ def _path(context: Any) -> str:
 
 
 def _near(name: str, known: Sequence[str], context: Any) -> str:
-    near = get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"; did you mean {near[0]}?" if near else f"; {_path(context)} --help lists them"
+    return meant(name, known, f"; {_path(context)} --help lists them", lead="; ")
 
 
 def _example(context: Any) -> str:
@@ -73,8 +73,7 @@ def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
     name, value = _name(parameter), _given(parameter, words)
     choices = _choices(parameter)
     if value is not None and choices:
-        near = get_close_matches(value, choices, n=1, cutoff=0.5)
-        return f"{name} {value} is none of {', '.join(choices)}{f'; did you mean {near[0]}?' if near else ''}"
+        return f"{name} {value} is none of {', '.join(choices)}{meant(value, choices, lead='; ')}"
     low, high = _ends(parameter)
     if value is None or (low is None and high is None and "valid" not in message):
         return f"{name}: {message.strip().rstrip('.')}"

@@ -5,11 +5,11 @@ All quantities are in SI; a difference is always neighbour minus own.
 
 import inspect
 from collections.abc import Callable
-from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from airflock.errors import RuleError
+from airflock.spelling import meant
 
 PAIR = {
     "dx": "offset to the neighbour as heard, east, m",
@@ -382,8 +382,7 @@ def asks(rule: Callable[..., Any], kind: str, owner: str = "") -> tuple[str, ...
     known = VOCABULARY[kind]
     for name in names:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else "."
+            hint = meant(name, known, ".", lead="; ", cutoff=0.6)
             where = f"{owner}.{kind}" if owner else kind
             raise RuleError(f"{where}({', '.join(names)}) asks for {name!r}{hint} Known: {', '.join(known)}")
     return names

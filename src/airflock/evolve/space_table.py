@@ -8,6 +8,7 @@ from typing import Any
 from airflock.core.parameters import Quantity, with_unit
 from airflock.evolve.space import Axis, Space, Tie, declared, usual_scale
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 ENTRY = ("low", "high", "unit", "scale", "integer", "above", "fixed", "tied", "factor", "offset", "source", "note")
 
@@ -82,10 +83,7 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
     for name, value in entry.items():
         numeric = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         if name not in ENTRY:
-            near = get_close_matches(name, ENTRY, n=1, cutoff=0.5)
-            faults.append(
-                f"space.{key}.{name}: unknown key; {f'did you mean {near[0]}?' if near else ', '.join(ENTRY)}"
-            )
+            faults.append(f"space.{key}.{name}: unknown key; {meant(name, ENTRY, ', '.join(ENTRY))}")
         elif name in ("low", "high", "fixed", "factor", "offset") and not numeric:
             faults.append(f"space.{key}.{name} = {value!r} is not a number; give {how.span}")
         elif name in ("low", "high", "fixed") and not how.low <= value <= how.high:
@@ -103,10 +101,7 @@ def _entry_faults(key: str, entry: Mapping[str, Any], how: Quantity, known: Mapp
         elif how.whole and name == "fixed" and value != int(value):
             faults.append(f"space.{key}.fixed = {value:g} is not a whole number")
         elif name in ("above", "tied") and not (isinstance(value, str) and value in known):
-            near = get_close_matches(str(value), known, n=1, cutoff=0.5)
-            faults.append(
-                f"space.{key}.{name} = {value!r} is not a number{f'; did you mean {near[0]}?' if near else ''}"
-            )
+            faults.append(f"space.{key}.{name} = {value!r} is not a number{meant(value, known, lead='; ')}")
     if faults or "fixed" in entry or "tied" in entry:
         return faults
     return _range_faults(_axis(key, entry, how))

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from airflock.scenarios.files import load, presets
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 from airflock.world.place import half_sizes
 
 STEP = 0.025  # s; longest motion step
@@ -147,8 +147,7 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
         open_air["start"] = {"kind": "ball", "separation": 0.0}
         return make(open_air, str(what), settings, trust=trust or str(what).endswith(".py"))
     if what not in presets() and not Path(what).is_file():
-        near = get_close_matches(str(what), [*MODELS, *presets()], n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else f"; laws: {', '.join(MODELS)}"
+        hint = meant(what, [*MODELS, *presets()], f"; laws: {', '.join(MODELS)}", lead="; ", cutoff=0.4)
         raise ScenarioError([f"{what}: no such law, preset or file{hint}"])
     return load(what, settings, trust=trust)
 

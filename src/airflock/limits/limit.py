@@ -4,13 +4,13 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 from airflock.errors import ScenarioError
 from airflock.limits.bounds import per_flight, per_hour
 from airflock.metrics.registry import numbers_of, reports
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 FORM = re.compile(rf"\s*(\w+)\s*(<=|>=|<|>)\s*({NUMBER})\s*(?:(at|in)\s*({NUMBER})\s*(%?)\s*(?:/\s*([a-z -]+?))?)?\s*")
@@ -77,8 +77,7 @@ def read(text: str, scenario: Scenario) -> Limit:
     score, sign, value, word, rate, percent, unit = found.groups()
     known = numbers_of(scenario.measures, scenario.metrics, scenario.goals.kind != "none")
     if score not in known:
-        near = get_close_matches(score, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+        hint = meant(score, known, f"known: {', '.join(known)}")
         raise ScenarioError([f"{where}: {score}: unknown order parameter; {hint}"])
     often = None if rate is None else float(rate) * (0.01 if percent else 1.0)
     timed = _lasting(scenario, score, sign, float(value))

@@ -8,7 +8,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from airflock.onboard.fence import Fence
 from airflock.onboard.fields import are_shapes, frozen, hexadecimal, is_ring, numbers_in, record
 from airflock.onboard.laws import body_of, law_of, look_of, own_of
 from airflock.onboard.safety import Safety
+from airflock.spelling import meant
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
 from airflock.world import arena
@@ -141,8 +141,7 @@ def card_of(document: Any, where: str = "card") -> Card:
     faults: list[str] = []
     for key in document:
         if key not in (*KEYS, *OPTIONAL):
-            near = get_close_matches(key, (*KEYS, *OPTIONAL), n=1)
-            faults.append(f"{key} is not known{f'; did you mean {near[0]}?' if near else ''}")
+            faults.append(f"{key} is not known{meant(key, (*KEYS, *OPTIONAL), lead='; ', cutoff=0.6)}")
     faults += [f"{key} is missing" for key in KEYS if key not in document]
     if faults:
         raise CardError([f"{where}: {fault}" for fault in faults])

@@ -1,7 +1,6 @@
 """Stage of a video: everything that stands still, drawn once, and a picture of what moves at any instant."""
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from airflock.plots.scene import (
 from airflock.plots.solid import Rendering
 from airflock.plots.through import built, scenery
 from airflock.recordings.scores import over_time
+from airflock.spelling import meant
 
 Array = NDArray[Any]
 TAIL_POINTS = 9
@@ -177,8 +177,7 @@ class Stage:
 def check_chart(chart: str, known: Sequence[str], whose: str) -> None:
     """Raise RecordingError for a chart of an order parameter that a flight does not have: also before it is flown."""
     if chart and chart not in known:
-        near = get_close_matches(chart, known, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = meant(chart, known, lead="; ")
         raise RecordingError(f"chart = {chart!r} is none that {whose} has: {', '.join(known)}{hint}")
 
 

@@ -3,7 +3,6 @@
 import itertools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import pandas as pd
@@ -14,6 +13,7 @@ from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
+from airflock.spelling import meant
 
 
 def sweep(
@@ -130,7 +130,6 @@ def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
         usual = [name for name in (found.measures.best for found in scenarios) if name in known]
         return str((usual + known + [""])[0])
     if each and asked not in known:
-        near = get_close_matches(asked, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+        hint = meant(asked, known, f"known: {', '.join(known)}")
         raise ScenarioError([f"--show {asked}: unknown order parameter; {hint}"])
     return asked

@@ -8,7 +8,6 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from airflock.replays.layers import flown_layers, layers
 from airflock.replays.pack import pack
 from airflock.scenarios.events import Event, events_of
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
 
@@ -126,8 +126,7 @@ def _motion(axes: int) -> list[str]:
 
 def _check_colour(colour: str, ways: Sequence[str], whose: str) -> None:
     if colour not in ways:
-        near = get_close_matches(colour, ways, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = meant(colour, ways, lead="; ")
         raise RecordingError(f"colour = {colour!r} is none that {whose} knows: {', '.join(ways)}{hint}")
 
 

@@ -1,7 +1,6 @@
 """Checks of a scenario that take more than one key: the body's kind, the order of updates, the metrics."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.own_code import own_code
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
+from airflock.spelling import meant
 
 
 def body_of(
@@ -35,8 +35,7 @@ def body_of(
     elif isinstance(kind, str) and kind in BODIES:
         carried = BODIES[kind]
     else:
-        near = get_close_matches(str(kind), BODIES, n=1, cutoff=0.4)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(BODIES)}, or a file that ends in .py"
+        hint = meant(kind, BODIES, f"known: {', '.join(BODIES)}, or a file that ends in .py", cutoff=0.4)
         return BODIES[usual], [f"body.kind = {kind!r}: unknown body; {hint}"]
     faults = carries(carried, found, kind)
     return BODIES[usual] if faults else carried, faults
@@ -76,8 +75,7 @@ def sensor_of(table: Any, folder: Path | None = None, *, trust: bool = False) ->
             return sensor(own_code("sensors.kind", kind, folder, trust=trust), Path(kind).stem), []
         except AirflockError as fault:
             return usual, str(fault).splitlines()
-    near = get_close_matches(str(kind), SENSORS, n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(SENSORS)}, or a file that ends in .py"
+    hint = meant(kind, SENSORS, f"known: {', '.join(SENSORS)}, or a file that ends in .py", cutoff=0.4)
     return usual, [f"sensors.kind = {kind!r}: unknown sensor; {hint}"]
 
 
@@ -102,8 +100,7 @@ def radio_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> 
             return radio(own_code("radio.kind", kind, folder, trust=trust), Path(kind).stem), []
         except AirflockError as fault:
             return _stand_in(kind), str(fault).splitlines()
-    near = get_close_matches(str(kind), RADIOS, n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(RADIOS)}, or a file that ends in .py"
+    hint = meant(kind, RADIOS, f"known: {', '.join(RADIOS)}, or a file that ends in .py", cutoff=0.4)
     return _stand_in(kind), [f"radio.kind = {kind!r}: unknown radio; {hint}"]
 
 
@@ -123,8 +120,7 @@ def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) 
             return metric_set(own_code("metrics.kind", kind, folder, trust=trust), Path(kind).stem), []
         except AirflockError as fault:
             return SETS[USUAL], str(fault).splitlines()
-    near = get_close_matches(str(kind), SETS, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
+    hint = meant(kind, SETS, lead="; ", cutoff=0.6)
     return SETS[USUAL], [f"metrics.kind = {kind!r} is none of {', '.join(SETS)}, or a file that ends in .py{hint}"]
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from airflock.faults.registry import KINDS
 from airflock.scenarios import schema, units
 from airflock.scenarios.groups import Group, members
 from airflock.scenarios.own_code import own_code
+from airflock.spelling import meant
 
 PERCEPTION = {"sense", "tell", "radio", "clock"}  # rules that disturb what agents know of each other
 MOST = 255  # entries of a file: each draws by a number of its own
@@ -141,8 +141,7 @@ def _kind(
             return fault(own_code(f"{where}.kind", name, folder, trust=trust), Path(name).stem), []
         except AirflockError as wrong:
             return None, str(wrong).splitlines()
-    near = get_close_matches(str(name), kinds, n=1, cutoff=0.5)
-    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(kinds)}, or a file that ends in .py"
+    hint = meant(name, kinds, f"known: {', '.join(kinds)}, or a file that ends in .py")
     return None, [f"{where}.kind = {name!r}: unknown kind of fault; {hint}"]
 
 

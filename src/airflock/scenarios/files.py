@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -27,6 +26,7 @@ from airflock.scenarios.ground import with_ground
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 from airflock.topology.registry import TOPOLOGIES
 
 
@@ -146,8 +146,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     known = presets()
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
-        near = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else "; airflock presets lists the presets"
+        hint = meant(name, known, "; airflock presets lists the presets", lead="; ", cutoff=0.4)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     with from_outside(name):
         document = read_toml(path)
@@ -221,8 +220,7 @@ def _topology(given: Any) -> tuple[Topology | str | None, list[str]]:
     name = str(given)
     if name in TOPOLOGIES or name.endswith(".py"):
         return (name, []) if name in TOPOLOGIES else checks.topology_of({"kind": name}, trust=True)
-    near = get_close_matches(name, TOPOLOGIES, n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(TOPOLOGIES)}, or a file that ends in .py"
+    hint = meant(name, TOPOLOGIES, f"known: {', '.join(TOPOLOGIES)}, or a file that ends in .py", cutoff=0.4)
     return None, [f"topology = {name!r}: unknown topology; {hint}"]
 
 

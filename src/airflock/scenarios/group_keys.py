@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.core.parameters import Declaration, declarations
 from airflock.scenarios.groups import LETTERS
+from airflock.spelling import meant
 
 FIRST = "groups."
 FORM = "write groups.NAME.SECTION.KEY, for instance groups.heavy.body.tau"
@@ -45,8 +46,7 @@ def with_groups(
             hint = _advice(key, document, dict(zip(map(str, names), tables, strict=True)))
             faults.append(f"{key}: unknown key; {hint}")
         elif group not in names:
-            near = get_close_matches(group, [str(known) for known in names], n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(map(str, names))}"
+            hint = meant(group, [str(known) for known in names], f"known: {', '.join(map(str, names))}")
             faults.append(f"{key}: unknown group {group!r}; {hint}")
         else:
             table = tables[names.index(group)]

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from airflock.core.contract import Model, model
 from airflock.errors import ScenarioError
 from airflock.scenarios.own_code import own_code
+from airflock.spelling import meant
 
 MODELS = (
     "vasarhelyi_2018", "viragh_2014", "reynolds_1987", "vicsek_1995", "couzin_2002", "kidger", "formation",
@@ -25,8 +25,7 @@ def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):
         return model(own_code(told, kind, folder, trust=trust), Path(kind).stem)
-    near = get_close_matches(kind, MODELS, n=1, cutoff=0.4)
-    hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(MODELS)}, or a file that ends in .py"
+    hint = meant(kind, MODELS, f"known: {', '.join(MODELS)}, or a file that ends in .py", cutoff=0.4)
     raise ScenarioError([f"{told} = {kind!r}: unknown model; {hint}"])
 
 

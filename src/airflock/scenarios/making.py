@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +40,7 @@ from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
 from airflock.sensors.registry import SENSORS
 from airflock.sensors.registry import USUAL as USUAL_SENSOR
+from airflock.spelling import meant
 from airflock.topology.registry import TOPOLOGIES
 
 TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
@@ -229,8 +229,7 @@ def _merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[d
             merged[section] = value
     for key in merged:
         if key not in TOP:
-            near = get_close_matches(key, TOP, n=1, cutoff=0.5)
-            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(TOP)}")
+            faults.append(f"{key}: unknown key; {meant(key, TOP, 'known: ' + ', '.join(TOP))}")
     return merged, faults
 
 

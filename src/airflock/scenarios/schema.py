@@ -21,6 +21,7 @@ from airflock.core.parameters import (
     quantity_fault,
     with_unit,
 )
+from airflock.spelling import meant
 
 LONG_FORM = {"value", "unit", "source", "note", "interval"}
 
@@ -115,8 +116,7 @@ def _line(name: str, value: Any, declared: Declaration) -> str:
             return f"{name} = {with_unit(_number(value), declared.unit)} lies outside {declared.span}"
         return f"{name} = {value!r} is not a number; give {declared.span}"
     if isinstance(declared, Choice):
-        near = get_close_matches(str(value), declared.options, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = meant(value, declared.options, lead="; ", cutoff=0.6)
         return f"{name} = {value!r} is none of {', '.join(declared.options)}{hint}"
     if isinstance(declared, Text):
         return f"{name} = {value!r} is not text"

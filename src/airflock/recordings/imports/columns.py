@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from airflock.errors import RecordingError
 from airflock.recordings.imports import expressions, headers
 from airflock.recordings.imports.track import COMMAND, POSITION, TARGETS, VELOCITY, Options
+from airflock.spelling import meant
 
 MOST_COLUMNS = 2000
 OF_A_TRACKER = ("probability", "likelihood", "score", "confidence")
@@ -72,8 +72,7 @@ def _mapped(found: Layout, columns: Sequence[str], options: Options) -> None:
     for target, text in options.map.items():
         try:
             if target not in TARGETS:
-                near = get_close_matches(target, TARGETS, n=1)
-                hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(TARGETS)}"
+                hint = meant(target, TARGETS, f"known: {', '.join(TARGETS)}", cutoff=0.6)
                 raise RecordingError(f"--map {target}:={text}: no target {target}; {hint}")
             if target == "id" and text.strip() == "file":
                 continue
