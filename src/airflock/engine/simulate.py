@@ -22,9 +22,9 @@ from airflock.scenarios.timing import clock
 from airflock.threads import in_threads
 
 
-def driver_text(scenario: Scenario, *, precision: int = 32, record: bool = False) -> str:
+def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
     """Text of the driver that flies a scenario: all rules are inside, so equal texts are equal physics."""
-    return flight_text(plan_of(scenario, precision=precision, record=record))
+    return flight_text(plan_of(scenario, precision=precision))
 
 
 def fly(
@@ -180,10 +180,10 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
     return scenario.judged(fly(scenario, seed, precision=precision).values)
 
 
-def compile_for(scenario: Scenario, *, precision: int = 32, record: bool = False) -> None:
+def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
     """Compile what flies a scenario, if that has not been done; scenarios that differ by numbers share it."""
-    if not is_loaded(flight_driver(plan_of(scenario, precision=precision, record=record))):
-        opened(scenario, 0, precision, record).compile()
+    if not is_loaded(flight_driver(plan_of(scenario, precision=precision))):
+        opened(scenario, 0, precision).compile()
 
 
 def score_flights(

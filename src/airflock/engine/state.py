@@ -102,7 +102,7 @@ class State:
         """Fly the steps first to last - 1; returns the next step, or minus the first agent (from 1) without a place.
 
         half   : as in `passes.driver.flight`
-        frames : (sample, component, agent), filled with the samples of these steps where the plan records
+        frames : (sample, component, agent), filled with the samples of these steps; None keeps none
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """

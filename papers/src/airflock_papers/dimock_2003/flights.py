@@ -71,7 +71,7 @@ class Birds:
         chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
-            compile_for(base, record=True)  # compiled once, before threads ask for it
+            compile_for(base)  # compiled once, before threads ask for it
         count = 0
 
         def done() -> None:
