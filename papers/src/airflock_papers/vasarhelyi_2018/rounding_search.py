@@ -35,10 +35,10 @@ FIRST = {"map": 1_000_000, "near": 2_000_000, "judge": 3_000_000}  # seeds: no s
 class Budget(NamedTuple):
     """Trajectories of the map and flights a point; rounds of the search and flights a set."""
 
-    trajectories: int = 16
-    flights: int = 8
-    rounds: int = 10
-    near: int = 40
+    trajectories: int = 10
+    flights: int = 4
+    rounds: int = 6
+    near: int = 20
 
 
 QUICK = Budget(2, 2, 1, 4)
