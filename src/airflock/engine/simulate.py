@@ -133,15 +133,20 @@ def opened(
     device      : cpu, or python, in double precision and with all pairs
     Raises FlightError where `start` cannot be flown.
     """
-    plan = plan_of(scenario, precision=precision, record=record, absence=absence)
-    if device == "python":
-        plan = plan.built(grid=False, bits=64)
-    needs.check(scenario, plan)
-    given = None
-    if start is not None:
-        given = sound_start(scenario, plan, start)
-    plan = plan.built(given_start=given_start or start is not None)
+    given_start = given_start or start is not None
+    plan = to_fly(scenario, precision, record, given_start=given_start, absence=absence, device=device)
+    given = None if start is None else sound_start(scenario, plan, start)
     return State.of(plan, scenario, seed, world, given, device)
+
+
+def to_fly(
+    scenario: Scenario, precision: int, record: bool, *, given_start: bool, absence: bool, device: str
+) -> Plan:  # fmt: skip
+    """The plan that `opened` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
+    plan = plan_of(scenario, precision=precision, record=record, absence=absence)
+    plan = plan.built(grid=False, bits=64) if device == "python" else plan
+    needs.check(scenario, plan)
+    return plan.built(given_start=given_start)
 
 
 def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
