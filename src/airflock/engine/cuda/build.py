@@ -48,6 +48,7 @@ class Stage:
 class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
+    abreast = False
     apart = False
     by_pairs = True
 
