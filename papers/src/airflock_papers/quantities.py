@@ -15,6 +15,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "f_corr": ("F^corr",),
     "f_speed": ("F^speed",),
     "fitness": ("fitness", "F 0", "effect", "F^max"),
+    "joint p": (),
     "four partial fitnesses": ("partial fitnesses",),
     "share of the loss by f_coll": ("collisions",),
     "instants in range": ("distance",),
