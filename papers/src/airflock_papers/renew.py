@@ -7,7 +7,7 @@ pictures of the page stay; `reproduce.py` beside it writes them anew.
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
@@ -26,9 +26,16 @@ PAGES = {"README.md": ("claims.toml", "report"), "EVOLVED.md": ("evolved.toml", 
 
 
 def renewed(
-    statements: Mapping[str, Statement], old: Sequence[Claim], found: Sequence[Measured], command: str
+    statements: Mapping[str, Statement],
+    old: Sequence[Claim],
+    found: Sequence[Measured],
+    command: str,
+    new: Collection[str] = (),
 ) -> list[Claim]:
-    """Claims of a page in the order of the statements: those that were measured, and those of before, judged again."""
+    """Claims of a page in the order of the statements: those that were measured, and those of before, judged again.
+
+    new : statements that stand on no page yet and come to this one
+    """
     kept = {claim.id: claim for claim in old}
     fresh = {claim.id: claim for claim in judge(statements, found)}
     claims = []
@@ -43,6 +50,8 @@ def renewed(
                 claims += unflown({name: statement}, [], kept[name].command or command)
             else:
                 claims.append(Claim(**asdict(statement)))
+        elif name in new:
+            claims += unflown({name: statement}, [], command) if statement.quantity else [Claim(**asdict(statement))]
     return claims
 
 
@@ -73,7 +82,10 @@ def renew(
     for part in parts:
         with progress_bar() as bar:
             found += paper.fly((part,), Flights(threads=threads, progress=bar))[0]
-    claims = renewed(load(paper.package), old, found, str(header["command"]))
+    statements = load(paper.package)
+    tables = folder.glob("*.toml") if table == "claims.toml" else ()
+    new = set(statements) - {claim.id for path in tables for claim in records.read_claims(path)[1]} if tables else set()
+    claims = renewed(statements, old, found, str(header["command"]), new)
     sections = [replace(s, words=words(text, s.title) or s.words) for s in report.SECTIONS]
     told = {key: value for key, value in header.items() if key not in ("paper", "command", "seeds")}
     if parts:
