@@ -29,6 +29,8 @@ def identity(scenario: Scenario) -> str:
     }
     stands = hashlib.sha256(scenario.stands().shapes.tobytes()).hexdigest() if scenario.scene.draw == "once" else ""
     told["scene"] = {**told["scene"], "file": "", "stands": stands}
+    if not told["start"]["wall_clearance"]:  # as in flights from before there was one
+        del told["start"]["wall_clearance"]
     told["laws"] = [scenario.model.name, scenario.vehicle.name]
     if scenario.sensor.name != USUAL:  # so that certificates from before there were others stay what they are
         told["laws"].append(scenario.sensor.name)
