@@ -126,6 +126,21 @@ def test_a_replay_is_refused_after_a_restart_too():
     assert fresh(packet(utc=NOW + 600_000), NOW + 600_000) is not None
 
 
+def test_the_copy_by_another_radio_is_a_replay_and_any_other_bytes_need_a_signature():
+    ours, told = receiver(), packet()
+    assert ours(told, NOW) and ours(told, NOW) is None and ours(bytearray(told), NOW) is None
+    assert ours.refused["replay"] == 2 and ours.accepted == 1
+    assert ours(told, NOW + 10**8) is None and ours.refused["clock"] == 1
+    for bit in range(8 * len(told)):
+        bent = bytearray(told)
+        bent[bit // 8] ^= 1 << bit % 8
+        assert ours(bytes(bent), NOW) is None
+    assert ours.refused["signature"] > 400 and ours.refused["replay"] == 2 and ours.accepted == 1
+    ahead = told[:-12] + (int.from_bytes(told[-12:-6], "little") + 1).to_bytes(6, "little") + told[-6:]
+    assert ours(ahead, NOW) is None, "a newer stamp under the old signature"
+    assert ours(packet(utc=NOW + 10), NOW + 10) is not None
+
+
 @pytest.mark.parametrize("off", [-61.0, -1.01, 1.01, 60.0, 2.4e9])
 def test_a_clock_that_is_wrong_moves_nobody_elses(off):
     """A member with the key whose clock says 2104: refused, and our own stamps stay ours."""
