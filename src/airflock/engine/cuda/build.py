@@ -51,6 +51,7 @@ class Stage:
 class CudaBuilder(Builder):
     """Takes the same calls as the builder of a CPU driver; `function` lowers what is a stage."""
 
+    abreast = False
     apart = False
     by_pairs = True
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from airflock.engine.cuda.shape import Shape
+from airflock.engine.replace import ReplacementError
 
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
 
@@ -94,9 +95,11 @@ class Across(ast.NodeTransformer):
         return node
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """A name."""
+        """A name. Raises ReplacementError for a variable that is called as a row is."""
         if node.id not in self.places:
             return node
+        if isinstance(node.ctx, ast.Store):
+            raise ReplacementError(f"{node.id}: a variable of a stage has the name of a row over the others")
         return ast.parse(f"across[{self.places[node.id]}, i]", mode="eval").body
 
 

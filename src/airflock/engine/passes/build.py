@@ -22,6 +22,7 @@ class Builder:
     """Names rules, rows of the work table and records of the parameter row for one plan.
 
     clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    abreast  : whether two agents may go through the others of a pair rule together
     apart    : whether the rows that a stage reads can be arguments of a function
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
@@ -29,6 +30,7 @@ class Builder:
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
+    abreast = True
     apart = True
     by_pairs = False
 
