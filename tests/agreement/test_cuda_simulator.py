@@ -17,7 +17,7 @@ HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
     *covering.PLANS, "split", "torus", "table", "couzin", "vicsek", "groups", "together", "city", "herd", "stop",
     "display", "wings", "vee", "echelon", "weights", "jitter", "species", "in turn", "lonely", "leavers", "collided",
-    "herd leaves", "display fails", "wing fails", "in turn, fewer",
+    "herd leaves", "display fails", "wing fails", "in turn, fewer", "pair 51",  # laws that remember several numbers
 )  # fmt: skip
 
 

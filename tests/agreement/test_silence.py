@@ -66,9 +66,9 @@ def test_a_law_that_cannot_stop_for_a_neighbour_is_refused(name, why):
         airflock.load(name, {"silence.rule": "stop"})
 
 
-def test_a_gpu_says_that_it_does_not_fly_it():
+def test_a_gpu_flies_it():
     from airflock.engine import plan_of
     from inside import no_cuda
 
     plan = plan_of(airflock.load("vasarhelyi_2018/4ms", {"silence.rule": "stop"}))
-    assert "silence.rule" in str(no_cuda(plan, 100))
+    assert no_cuda(plan, 100) is None

@@ -134,7 +134,8 @@ def arrays(
             own[name] = cuda.to_device(np.full((len(jobs), *size[name]), np.nan, real))
     own["owns"] = cuda.to_device(np.stack([_wide(t.own, size["owns"], real) for t in jobs]))
     if plan.laws:
-        own["all_mem"] = cuda.to_device(np.stack([_remembered(plan, t, size["all_mem"], real) for t in jobs]))
+        remembered = [_remembered(plan, t, size["all_mem"], real) for t in jobs]
+        own["all_mem"] = cuda.to_device(np.ascontiguousarray(np.stack(remembered)))
     if not shape.registers:
         own["works"] = cuda.to_device(np.zeros((len(jobs), *size["works"]), real))
     given = {

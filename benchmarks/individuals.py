@@ -1,0 +1,70 @@
+"""What agents that differ or fail cost: processor time of a step beside the plain flight, N = 100.
+
+    python benchmarks/individuals.py [--rounds 600] [--only NAME ...] [--json FILE]
+
+All flights are open at once and take turns, some hundred steps each; the least of many turns counts, by the time of the
+thread. Faults begin in the first second, last to the end, and hit one agent; one row has a fault of each kind.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import airflock
+from airflock.core.parameters import number_names
+from airflock.faults.registry import KINDS
+
+PRESET, STEPS = "vasarhelyi_2018/4ms", 400
+
+
+def own(record, letter_of):
+    """Numbers of a record with half a percent of tolerance each."""
+    return {name: {"spread": 0.005 * abs(getattr(record, name))} for name in letter_of}
+
+
+def cases():
+    """Settings by the name of a row."""
+    plain = airflock.load(PRESET)
+    p = own(plain.parameters, number_names(type(plain.parameters)))
+    b = own(plain.body, number_names(type(plain.body)))
+    faults = {kind: [{"kind": kind, "at": 0.1, "agents": [3]}] for kind in KINDS if KINDS[kind].leaves is None}
+    leave = [{"kind": "fails", "at": 1e5 - 1.0, "agents": [3]}]  # somebody may leave, and nobody has
+    return {
+        "plain": {},
+        "the same again": {"start.speed": plain.start.speed},
+        "one number": {"groups": [{"name": "a", "agents": 50, "model": {"p_rep": 0.2}}, {"name": "b"}]},
+        "all of p": {"groups": [{"name": "a", "model": p}]},
+        "all of p and b": {"groups": [{"name": "a", "model": p, "body": b}]},
+        **{kind: {"faults": found} for kind, found in faults.items()},
+        "fails": {"faults": leave},
+    }
+
+
+def main():
+    """Measure, and print a table."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--rounds", type=int, default=600)
+    options.add_argument("--only", nargs="*", default=[])
+    options.add_argument("--json", type=Path)
+    given = options.parse_args()
+    flights = {}
+    for name, settings in cases().items():
+        if name == "plain" or not given.only or name in given.only:
+            flights[name] = airflock.open(airflock.load(PRESET, {"duration": 1e5, **settings}), 1).advance(steps=STEPS)
+            print(f"{name}: ready", flush=True)
+    least = dict.fromkeys(flights, float("inf"))
+    for _ in range(given.rounds):
+        for name, flight in flights.items():
+            begun = time.thread_time()
+            flight.advance(steps=STEPS)
+            least[name] = min(least[name], time.thread_time() - begun)
+    rows = {name: {"us_per_step": 1e6 * t / STEPS, "ratio": t / least["plain"]} for name, t in least.items()}
+    for name, row in rows.items():
+        print(f"{name:16s} {row['us_per_step']:7.3f} µs a step  {row['ratio']:.3f}")
+    if given.json:
+        given.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
