@@ -72,7 +72,7 @@ class Birds:
         chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
-            compile_for(with_changes(base, self.changes), record=True)  # once, before threads ask for it
+            compile_for(with_changes(base, self.changes))  # once, before threads ask for it
         count = 0
 
         def done() -> None:
