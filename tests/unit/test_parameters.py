@@ -19,6 +19,8 @@ from airflock.core.parameters import (
     quantity,
     quantity_fault,
 )
+from airflock.core.silence import Parameters as Silence
+from airflock.core.silence import complete
 from airflock.errors import ParameterError, ScenarioError
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
@@ -89,3 +91,8 @@ def test_declared_parameters_of_a_class_that_is_no_dataclass_are_not_lost():
 
     with pytest.raises(ParameterError, match=r"^Bare declares speed, but is not a dataclass; write @dataclass"):
         list(declarations(Bare))
+
+
+@pytest.mark.parametrize("speed", [0.0, 1000.0, 1e4])
+def test_the_reach_of_a_lost_neighbour_grows_at_twice_the_speed_of_the_fastest_laws_too(speed):
+    assert complete(Silence(), speed).closing == 2.0 * (speed or 4.0)

@@ -35,7 +35,7 @@ class Parameters(Record):
         "than radio.delay",
     )  # fmt: skip
     closing: float | None = quantity(
-        None, "m/s", low=0.0, high=1000.0, source=OURS,
+        None, "m/s", low=0.0, high=1e5, source=OURS,
         meaning="speed at which the reach of a lost neighbour grows with the age of its data; by default twice the "
         "speed that the law prefers",
     )  # fmt: skip

@@ -36,7 +36,7 @@ MODULES = {
 PAPER = Paper(
     "Vásárhelyi et al. 2018, Optimized flocking of autonomous drones in confined environments",
     __name__,
-    ("s2", "fig1", "fig2", "fig34", "pressure", "tuning"),
+    ("s2", "fig1", "fig2", "fig34", "pressure", "tuning", "real"),
     by_modules(MODULES),
-    long=("s1", "optima", "rounding", "real"),
+    long=("s1", "optima", "rounding"),
 )

@@ -39,6 +39,12 @@ SECTIONS = (
     Section("fig4.", "Fig. 4: patterns"),
     Section("pressure.", "30 to 1000 drones", "At 4 m/s, side of the arena 250 m · sqrt(N/100).", ("pressure",)),
     Section(
+        "model.",
+        "Sentences on the model",
+        "Wall term: Eqs 8 and 9, m/s, mean over drones that any wall acts on; 10 recorded flights a side.",
+    ),
+    Section("drones.", "Sentences on the real drones"),
+    Section(
         "tuning.",
         "Tables S3 and S4: what each parameter does",
         "Paired flights on the same seeds, 40 scored and 10 recorded a side: the changed side less the other. "
