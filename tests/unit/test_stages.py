@@ -164,7 +164,7 @@ class World:
             plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
         )  # fmt: skip
         state["fastest"] = motion.move(
-            range(n), range(n), flock, numbers, step,
+            range(n), range(n), flock, numbers, step, n,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
             lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), plan=plan,
         )  # fmt: skip
@@ -217,7 +217,7 @@ class World:
                 least = judging.measure(
                     self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts, *[None] * len(BY_CELLS),
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
-                    plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None,
+                    plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
                 )  # fmt: skip
             found.append((least, values, memory, work))
         return found

@@ -21,8 +21,11 @@ ROWS = 40  # numbers that a driver keeps of an agent besides its memory; the law
 
 def check(scenario: Scenario, plan: Plan) -> None:
     """Refuse a flight that memory cannot hold or nobody can wait for; raises FlightError with the number that fits."""
-    cost.check_time(scenario)
-    needed = bytes_of(scenario, plan, scenario.agents)
+    key = "needs", plan
+    if key not in scenario.prepared:
+        cost.check_time(scenario)
+        scenario.prepared[key] = bytes_of(scenario, plan, scenario.agents)
+    needed: int = scenario.prepared[key]
     free = free_memory() if needed > SMALL else None
     if free is None:
         return

@@ -38,6 +38,29 @@ def plan_of(
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
+    key = "plan", precision, record, metrics, grid, given_start, absence
+    if key not in scenario.prepared:
+        build = _build(scenario, precision, record, grid, given_start, absence)
+        scenario.prepared[key] = _planned(scenario, metrics, build)
+    found: Plan = scenario.prepared[key]
+    return found
+
+
+def _build(
+    scenario: Scenario, precision: int, record: bool, grid: bool | None, given_start: bool, absence: bool
+) -> Build:
+    """How the driver of a scenario is built."""
+    return Build(
+        bits=precision,
+        record=record,
+        given_start=given_start,
+        grid=(takes_all_cores(scenario) if grid is None else grid) and has_room(scenario) and by_cells(scenario),
+        absence=absence or any(kind.leaves is not None for kind in scenario.fault_kinds),
+    )
+
+
+def _planned(scenario: Scenario, metrics: tuple[Metric, ...] | None, build: Build) -> Plan:
+    """The plan itself."""
     _probe_rules(scenario)
     laws, kinds = scenario.laws, scenario.fault_kinds
     return make_plan(
@@ -46,13 +69,7 @@ def plan_of(
         scenario.order_parameters if metrics is None else metrics,
         scenario.world,
         scenario.numbers,
-        build=Build(
-            bits=precision,
-            record=record,
-            given_start=given_start,
-            grid=(takes_all_cores(scenario) if grid is None else grid) and has_room(scenario) and by_cells(scenario),
-            absence=absence or any(kind.leaves is not None for kind in kinds),
-        ),
+        build=build,
         body=scenario.vehicle,
         body_choices=_chosen(scenario.body),
         sequential=scenario.flight.update == "sequential",

@@ -16,10 +16,14 @@ def _written(number: float) -> str:
 
 DECLARED = "\n".join(f"{constant.spelled} = real({_written(constant)})" for constant in CONSTANTS)
 
-INTEGERS = """
+MACHINE = """
 u32 = np.uint32
 u64 = np.uint64
-
+"""
+# Words of 32 bits as such, for processors that multiply them as fast as they add them: those of a GPU.
+NARROW = (
+    MACHINE
+    + """
 @njit(**INLINE)
 def word(a):
     return u32(a)
@@ -44,13 +48,43 @@ def xor32(a, b):
 def uniform(word):
     return (real(np.int32(word >> u32(9))) + real(0.5)) * real(1.0 / 8388608.0)
 """
+)
+# Words of 32 bits in lanes of 64: one product has both halves. In lanes of 32, LLVM multiplies three times for them.
+WIDE = (
+    MACHINE
+    + """
+@njit(**INLINE)
+def word(a):
+    return u64(u32(a))
+
+@njit(**INLINE)
+def multiply_high(a, b):
+    return (word(a) * word(b)) >> u64(32)
+
+@njit(**INLINE)
+def multiply_low(a, b):
+    return word(word(a) * word(b))
+
+@njit(**INLINE)
+def add32(a, b):
+    return word(a + b)
+
+@njit(**INLINE)
+def xor32(a, b):
+    return a ^ b
+
+@njit(**INLINE)
+def uniform(word):
+    return (real(np.int32(u32(word) >> u32(9))) + real(0.5)) * real(1.0 / 8388608.0)
+"""
+)
 
 # log: x = 2^e m with m near 1; log m by a polynomial (Cephes' logf coefficients), or by the series of atanh.
 LOG32 = """
 @njit(**INLINE)
 def log_uniform(u):
     bits = np.float32(u).view(np.int32)
-    e = np.int32((bits - np.int32(0x3F3504F3)) >> np.int32(23))
+    e = np.int32(np.int32(bits - np.int32(0x3F3504F3)) >> np.int32(23))  # Numba would go on in 64 bits
     m = np.int32(bits - np.int32(e << np.int32(23))).view(np.float32)
     f = m - real(1.0)
     z = f * f
@@ -128,8 +162,9 @@ def sine_cosine(g):
 NORMAL = """
 @njit(**INLINE)
 def normal_pair(a, b):
+    b = u32(b)
     radius = math.sqrt(real(-2.0) * log_uniform(uniform(a)))
-    s, c = sine_cosine(real(np.int32(u32(b) << u32(2))) * real(0.7853981633974483 / 2147483648.0))
+    s, c = sine_cosine(real(np.int32(b << u32(2))) * real(0.7853981633974483 / 2147483648.0))
     radius = -radius if (b & u32(0x80000000)) != u32(0) else radius
     swap = (b & u32(0x40000000)) != u32(0)
     return radius * (s if swap else c), radius * (c if swap else s)
@@ -138,4 +173,4 @@ def normal_pair(a, b):
 
 def primitives(bits: int) -> str:
     """Text of all primitives for float32 or float64, after those of `vectors`."""
-    return vectors.TEXT + INTEGERS + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL
+    return vectors.TEXT + WIDE + (LOG32 + TURN32 if bits == 32 else LOG64 + TURN64) + NORMAL

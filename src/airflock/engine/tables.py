@@ -19,6 +19,7 @@ from airflock.world.place import edge_rows, half_sizes
 from airflock.world.surfaces import faces
 
 EMPTY = make_scene([])
+SEEDED = [WHOLE.index(name) for name in ("world", "seed_low", "seed_high")]
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,22 @@ def geometry(scenario: Scenario) -> Geometry:
 def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     """Numbers of one world for a plan's driver."""
     scenario = scenario.in_flight(seed)
+    key = "tables", plan
+    if key not in scenario.prepared:
+        scenario.prepared[key] = _common(scenario, plan)
+    common: Tables = scenario.prepared[key]
+    whole = common.whole.copy()
+    whole[SEEDED] = world, seed & 0xFFFFFFFF, (seed >> 32) & 0xFFFFFFFF
+    return replace(
+        common,
+        whole=whole,
+        own=row_values(scenario, plan, seed).astype(common.row.dtype) if plan.columns else common.own,
+        due=onsets(scenario, seed, world) if plan.faults else (),
+    )
+
+
+def _common(scenario: Scenario, plan: Plan) -> Tables:
+    """Numbers that the flights of a scenario have in common; of the seed there is nothing in them."""
     real = np.float32 if plan.bits == 32 else np.float64
     dt, times = scenario.flight.dt, clock(scenario)
     surfaces, families = faces(scenario.world)
@@ -122,9 +139,9 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
     whole = times | {
         "agents": scenario.agents,
         "born": scenario.agents,
-        "world": world,
-        "seed_low": seed & 0xFFFFFFFF,
-        "seed_high": (seed >> 32) & 0xFFFFFFFF,
+        "world": 0,
+        "seed_low": 0,
+        "seed_high": 0,
         "corners": corners,
         "obstacles": len(spans),
         "faces_0": counts[0],
@@ -141,8 +158,7 @@ def tables(scenario: Scenario, plan: Plan, seed: int, world: int = 0) -> Tables:
         nodes=scene.nodes.astype(real),
         links=scene.links,
         goals=scenario.waypoints().astype(real),
-        own=row_values(scenario, plan, seed).astype(real),
-        due=onsets(scenario, seed, world) if plan.faults else (),
+        own=np.zeros((0, scenario.agents), real),
     )
 
 

@@ -1,6 +1,7 @@
 """Totals: what a flight's sums over time say, as named order parameters."""
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
     """Named order parameters from the sums over time."""
-    found = columns(plan.metrics)
+    found = _columns(plan)
     counts = {"sample": sums[len(found)], "collision": sums[len(found) + 1]}
     over_time = {
         name: float(sums[c] / max(counts[when], 1.0) if how == "mean" else sums[c])
@@ -30,6 +31,11 @@ def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
         own = {name: over_time[name] for name in metric.Sample._fields}  # type: ignore[attr-defined]
         named |= metric.total(own) if metric.total else own
     return named
+
+
+@lru_cache(maxsize=64)
+def _columns(plan: Plan) -> list[tuple[str, str, str]]:
+    return columns(plan.metrics)
 
 
 def goals_reached(plan: Plan, reached: NDArray[Any]) -> dict[str, Any]:

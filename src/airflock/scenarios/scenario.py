@@ -1,7 +1,7 @@
 """Scenario: model, body, radio, sensors, world, number of agents, duration and sampling; frozen data."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -85,6 +85,15 @@ class Scenario:
         """Tables of all keys that differ from their defaults, for a notebook."""
         return html(self)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what follows from them is found again wherever it is asked for."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @cached_property
+    def prepared(self) -> dict[Any, Any]:
+        """What an engine has made of this scenario for flights with other seeds, by keys of its own; empty at first."""
+        return {}
+
     @property
     def agents(self) -> int:
         """Number of agents."""
@@ -95,12 +104,13 @@ class Scenario:
         """2 or 3."""
         return int(self.world.dimensions)
 
-    @property
+    @cached_property
     def errs(self) -> bool:
         """Whether agents measure themselves with errors."""
         own = [{key: v for (letter, key), v in group.numbers.items() if letter == "s"} for group in self.groups]
         spread = any(letter == "s" and sd > 0.0 for group in self.groups for (letter, _), sd in group.spread.items())
-        return spread or not all(self.sensor.is_exact(replace(self.sensors, **numbers)) for numbers in ({}, *own))
+        kinds = (self.sensors, *(replace(self.sensors, **numbers) for numbers in own))
+        return spread or not all(map(self.sensor.is_exact, kinds))
 
     @property
     def unerring(self) -> "Scenario":
@@ -118,7 +128,7 @@ class Scenario:
         """Key of a section → its record of parameters; the empty key holds those at the top."""
         return {section.key: getattr(self, section.field) for section in ORDER}
 
-    @property
+    @cached_property
     def numbers(self) -> dict[str, tuple[str, ...]]:
         """Letter of each record that drivers read → its numbers: the columns of a driver's row, in order."""
         records = self.records
@@ -129,7 +139,7 @@ class Scenario:
         }
         return found | {f"p{k}": number_names(law.parameters) for k, law in enumerate(self.laws) if k}
 
-    @property
+    @cached_property
     def order_parameters(self) -> tuple[Metric, ...]:
         """The metrics that measure a flight."""
         return self.measures.of(self.metrics)
@@ -139,13 +149,13 @@ class Scenario:
         """Which of those whom an agent hears it meets; None: all of them."""
         return self.own_topology or TOPOLOGIES[self.topology.kind]
 
-    @property
+    @cached_property
     def fault_kinds(self) -> tuple[Fault, ...]:
         """Kinds of fault that may occur."""
         duration = self.flight.duration
         return tuple(dict.fromkeys(entry.fault for entry in self.faults if entry.occurs(duration)))
 
-    @property
+    @cached_property
     def varied(self) -> tuple[tuple[str, str], ...]:
         """Numbers that differ among agents, as (letter, name); of laws that groups fly by their own: `laws`."""
         return self.laws[0].varied + varied(self.groups, {"b": self.body, "s": self.sensors})
@@ -194,7 +204,7 @@ class Scenario:
         document = {**self.document, "scene": {**self.document.get("scene", {}), **own}}
         return replace(self, scene=replace(self.scene, **own), document=document)
 
-    @property
+    @cached_property
     def scenic(self) -> bool:
         """Whether something stands in the world that agents see with rays, feel, or must not touch."""
         return self.scene.draw == "flight" or bool(len(self.stands().shapes))
@@ -245,6 +255,10 @@ class Scenario:
 
     def silent_by(self) -> Silence:
         """The rule of silence with everything that was left to the scenario filled in."""
+        return self._silent
+
+    @cached_property
+    def _silent(self) -> Silence:
         speed = self.model.preferred_speed
         return complete(self.silence, float(speed(self.parameters)) if speed is not None else 0.0, self.radio.delay)
 

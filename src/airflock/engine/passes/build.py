@@ -22,6 +22,7 @@ class Builder:
     """Names rules, rows of the work table and records of the parameter row for one plan.
 
     clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
+    abreast  : whether two agents may go through the others of a pair rule together
     apart    : whether the rows that a stage reads can be arguments of a function
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
@@ -29,6 +30,7 @@ class Builder:
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
+    abreast = True
     apart = True
     by_pairs = False
 
@@ -177,10 +179,11 @@ def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:
 def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:
     """Lines in which those of a function stand in place of its call. Raises ReplacementError where they do not fit."""
     (call,) = (line for line in lines if f"{name}(" in line)
-    at, answer = lines.index(call), call.rpartition(" = ")[0] or "0"
+    at, answer, margin = lines.index(call), call.strip().rpartition(" = ")[0] or "0", call[: -len(call.lstrip())]
     if part[-1] not in (f"return {answer}", f"return ({answer})"):
         raise ReplacementError(f"{name} ends with {part[-1]!r}, but is called as {call!r}")
-    return [*lines[:at], *part[:-1], *lines[at + 1 :]]
+    inner = [margin + line for text in part[:-1] for line in text.splitlines()]
+    return [*lines[:at], *inner, *lines[at + 1 :]]
 
 
 def loop(over: str, lines: Iterable[str]) -> list[str]:

@@ -35,7 +35,7 @@ def measure(build: Builder, clock: str) -> None:
     parts |= {f"clusters_{name}": lines for name, lines in grouped.items()}
     made = specialise(
         build, measuring.measure, metrics=metrics, nearest=clock == "collision",
-        over=pairs_by_cells if cells else None,
+        over=pairs_by_cells if cells else None, abreast=build.abreast,
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
         clustered={

@@ -6,7 +6,7 @@ from typing import Any
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
 from airflock.engine.stages.state import Flock, column_of, numbers_of
-from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, most, real, wants
+from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, integer, most, real, wants
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
@@ -41,7 +41,7 @@ def respond(
 
 
 def move(
-    agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int,
+    agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int, n: int,
     noise: Callable[[], None], gusts: Callable[[], Any], *, plan: Plan,
 ) -> Any:  # fmt: skip
     """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
@@ -63,8 +63,9 @@ def move(
     if plan.integration != "old":
         respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     fastest = ZERO
-    for i in agents:
-        fastest = most(fastest, sum(v[a][i] * v[a][i] for a in range(plan.dimensions)))
+    for i in lanes:  # whole vectors, of which some lanes have no agent
+        speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
+        fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
     for a in range(plan.dimensions):
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
