@@ -243,8 +243,10 @@ def again(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] 
     low, high = place - ends, place + ends
     low[below], high[above] = 0.0, 1.0
     noise = flights.noise(place, kinds[0], fitted)[0]
-    shares = np.array([steps[0] for steps in noises])
-    shift = float(np.log(noise.law / kinds[0].law)) + float(np.median(shares))
+    shares = np.array([steps[0] for steps in noises[:: len(kinds)]])  # flights of this kind of noise
+    shift = float(np.log(noise.law / kinds[0].law))
+    # it is matched by one flight, and put right by the others
+    noise = noise.moved(np.array([-float(np.median(shares)), 0.0, 0.0]))
     half = float(np.hypot(np.hypot(wide * shares.std(ddof=1), ONE * BEYOND[1]), DOUBT * shift))
     return Again(place, low, high, noise, noise.law * float(np.exp(-half)), noise.law * float(np.exp(half)))
 
