@@ -312,6 +312,7 @@ def begin(keys: dict[str, Any], rng: Random, length: float, speed: float) -> Non
         "start.spacing_z": 0.1 * length,
     }
     keys["start.jitter"] = rng.choice((0.0, 0.05 * length))
+    keys["start.wall_clearance"] = keys["start.jitter"]  # as often 0 as not
     keys["start.speed"] = rng.choice((0.0, speed, speed))
 
 

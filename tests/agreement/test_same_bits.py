@@ -11,7 +11,7 @@ import pytest
 from airflock.engine import fly, plan_of
 from airflock.threads import in_threads
 from flocks import flown, interpreted, scenario
-from inside import cpu, tables
+from inside import cpu, flight_driver, tables
 
 PAPER = {
     "agents": 30, "duration": 20.0, "world__side": 120.0, "world__walls": "nearest_per_axis", "start__separation": 6.0,
@@ -68,6 +68,17 @@ def test_agents_keep_their_noise_when_others_join(seed):
     keys = {"duration": 3.0, "world__side": 1e5, "radio__range": 1.0}
     three, five = (interpreted(scenario(**keys, agents=n), seed).frames for n in (3, 5))
     np.testing.assert_array_equal(three, five[:, :, :3])
+
+
+def test_recording_a_flight_changes_nothing_and_takes_no_driver_of_its_own(seed):
+    found = scenario(**SMALL)
+    plain, recorded = (plan_of(found, precision=64, record=record) for record in (False, True))
+    assert flight_driver(plain) is flight_driver(recorded)
+    alone, kept = (cpu.fly(plan, tables(found, plan, seed), device="python") for plan in (plain, recorded))
+    assert alone.frames is None and kept.frames is not None
+    np.testing.assert_array_equal(alone.state, kept.state)
+    np.testing.assert_array_equal(alone.state, kept.frames[-1][: len(alone.state)])
+    assert alone.values == kept.values
 
 
 def test_skipped_collision_checks_change_nothing(seed):

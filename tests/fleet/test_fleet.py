@@ -1,11 +1,11 @@
 """Fleets in lock-step fly what the simulator flies, the same bits each time, and get home whatever fails."""
 
-import asyncio
 import io
 import math
 import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from random import Random
@@ -465,23 +465,25 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
         open_port(f"udp:127.0.0.1:{radio_port}>127.0.0.1:{far_port}"),
     ]
 
-    async def live():
-        while True:
+    over = threading.Event()
+
+    def live():
+        while not over.wait(0.02):
             now = time.monotonic() - begun
             for data in line.read():
                 line.write(craft.receive(data, now))
             line.write(craft.telemetry(now))
-            await asyncio.sleep(0.02)
 
-    async def both():
-        task = asyncio.create_task(live())
-        await fly_node(
+    beside = threading.Thread(target=live)
+    beside.start()
+    try:
+        fly_node(
             made, 1, KEY, ports, tmp_path / "memory", log, said.append,
             until=lambda: any("CLEARED" in s for s in said) or time.monotonic() - begun > 20.0,
         )  # fmt: skip
-        task.cancel()
-
-    asyncio.run(both())
+    finally:
+        over.set()
+        beside.join()
     for port in (*ports, line):
         port.close()
     assert any("READY → CLEARED" in text for text in said), said

@@ -16,6 +16,7 @@ from airflock.mavlink.autopilots import AUTOPILOTS, Speaker
 from airflock.mavlink.frames import frames_in
 from airflock.onboard.mission import AIR
 from airflock.onboard.ports import Place, Udp
+from airflock.onboard.resting import Rest
 from fleets import PRIVATE, card, scenario
 
 SHORT = {"radio.delay": 0.1, "world.side": 120.0}
@@ -63,10 +64,10 @@ def test_a_client_joins_where_a_vehicle_calls():
     found = scenario(1)
     made, client = compare.software_card(found, live=True), Udp(Place((live.HOST, 0), None))
     ports, now = live.Ports.opened(1, client.here), time.monotonic()
-    plan = live.Plan(found, made, 0, None, (), ports, [now, now + 60.0, 0.0], 1_800_000_000_000_000)
+    plan = live.Plan(found, made, 0, None, (), ports, [now, now + 60.0, 0.0], [0.0] * 4, 1_800_000_000_000_000)
 
     async def joined():
-        life = asyncio.create_task(live.craft_life(plan, 0))
+        life = asyncio.create_task(realtime.together(live.craft_life(plan, 0)))
         heard = []
 
         async def hear(count):
@@ -92,7 +93,8 @@ def test_a_client_joins_where_a_vehicle_calls():
 
 
 def test_a_process_that_fails_ends_the_fleet_in_a_line(monkeypatch, capfd):
-    async def fails(plan, i):
+    def fails(plan, i):
+        yield Rest(0.0)
         raise RuntimeError("a wing came off")
 
     monkeypatch.setattr(realtime, "craft_life", fails)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airflock.fleet import compare, live  # noqa: E402
+from airflock.fleet import compare, live, realtime  # noqa: E402
 from airflock.onboard.ports import Place, Udp  # noqa: E402
 from fleets import scenario  # noqa: E402
 
@@ -38,8 +38,8 @@ async def flown(kind, python, patience):
     card = compare.software_card(found, vehicle=kind, live=True)
     ports, now = live.Ports.opened(1, (live.HOST, join)), time.monotonic()
     epoch = time.time_ns() // 1000 - round(now * 1e6)
-    plan = live.Plan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], epoch)
-    vehicle = asyncio.create_task(live.craft_life(plan, 0))
+    plan = live.Plan(found, card, 0, None, (), ports, [now, now + LONGEST, 0.0], [0.0] * 4, epoch)
+    vehicle = asyncio.create_task(realtime.together(live.craft_life(plan, 0)))
     try:
         client = await asyncio.create_subprocess_exec(
             python, str(FLIGHT), str(join), str(patience), stdout=subprocess.PIPE, stderr=subprocess.STDOUT

@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
+from airflock.errors import ScenarioError
 from airflock.scenarios.surroundings import Place as Seen
 from airflock.stage.scene import prism as drawn_prism
 from airflock.world import arena, polygon
@@ -193,3 +194,22 @@ def test_a_law_that_casts_sees_a_prism_between_its_heights():
         for z in (3.0, 14.0):
             seen = place.cast(*at, z, *u, 60.0, 0.0)
             assert seen == pytest.approx(min(60.0, polygon.ray_to_prism(*at, z, *u, edges, first, last)), abs=1e-6)
+
+
+def test_nobody_starts_nearer_than_the_wall_clearance(seed):
+    near, solids = [], [Polygon(L).exterior, Polygon(POND)]
+    for room in (0.0, 4.0, 9.0):
+        found = scenario(
+            agents=60, duration=0.1, dt=0.1, world__arena="polygon", world__corners=L, world__obstacles=[POND],
+            start__wall_clearance=room, start__separation=0.0,
+        )  # fmt: skip
+        spots = [Point(spot) for spot in interpreted(found, seed).frames[0, :2].T]
+        near.append(min(solid.distance(spot) for spot in spots for solid in solids))
+        assert near[-1] >= room * (1.0 - 1e-12) and all(map(Polygon(L, [POND]).contains, spots))
+        assert all(Place(found.world).excursion(*spot.coords[0], 0.0) <= -room for spot in spots)
+    assert near[0] < 4.0 and near[1] < 9.0  # who is not asked for room comes nearer
+
+
+def test_a_wall_clearance_that_leaves_no_place_is_refused():
+    with pytest.raises(ScenarioError, match="start.wall_clearance = 25 m: no place is left"):
+        scenario(agents=2, world__arena="polygon", world__corners=L, start__wall_clearance=25.0)

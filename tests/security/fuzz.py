@@ -119,6 +119,7 @@ def main():
     parser.add_argument("count", type=int, nargs="?", default=1000)
     parser.add_argument("--seed", type=int, default=2018)
     parser.add_argument("--begin", type=int, default=0, help="number of the first case")
+    parser.add_argument("--batch", type=int, help="cases of a child")
     parser.add_argument("--only", type=int, help="repeat one case in this process, with its traceback")
     parser.add_argument("--kept", type=Path, help="file of what has been done, to go on after it was cut off")
     asked = parser.parse_args()
@@ -138,7 +139,7 @@ def campaign(case, asked, folder):
         done = json.loads(asked.kept.read_text())
     limit = time.monotonic() + float(os.environ.get("AIRFLOCK_LIMIT", "inf"))
     told = 0.0
-    how = {"batch": 25 if asked.what in SLOW else BATCH, "hang": PATIENCE.get(asked.what, HANG)}
+    how = {"batch": asked.batch or (25 if asked.what in SLOW else BATCH), "hang": PATIENCE.get(asked.what, HANG)}
     while done["cases"] < asked.count and time.monotonic() < limit:
         began, count = time.monotonic(), min(how["batch"], asked.count - done["cases"])
         first = asked.begin + done["cases"]

@@ -133,6 +133,19 @@ def test_the_drivers_that_were_not_used_for_longest_go_first(tmp_path, monkeypat
     assert cache.clear_cache() == (1, 1000) and (tmp_path / "studies").is_dir()
 
 
+def test_one_new_driver_in_64_looks_through_the_cache(tmp_path, monkeypatch):
+    from inside import store
+
+    looked = []
+    (tmp_path / cache.DRIVERS).mkdir()
+    monkeypatch.setattr(store, "shrink", looked.append)
+    for begin in range(256):
+        store._written(tmp_path / cache.DRIVERS / f"{begin:02x}{'0' * 18}", "a", "text")
+    assert looked == [tmp_path] * 4
+    store._written(tmp_path / cache.DRIVERS / ("0" * 20), "a", "text")  # not a new one
+    assert len(looked) == 4
+
+
 COMMAND = [sys.executable, "-m", "airflock"]
 
 

@@ -62,6 +62,17 @@ def test_an_acceleration_that_was_never_reached_is_a_bound_only():
     assert "tau" not in found.refused
 
 
+@pytest.mark.parametrize("size", [2.9, 3.2])
+def test_a_limit_that_hides_behind_a_longer_lag_is_no_lower_bound_above_itself(size):
+    """Few rows at the limit look like a longer lag without one: a descent stays there, and asks for more than flies."""
+    logs, dt = fly(1.3, 3.5, 0.3, 0.1, size=size, seed=2)
+    found = body.fit_body(logs, dt)
+    assert "at least" in found.refused["a_max"]
+    assert 2.0 < found.seen < 3.5
+    low, high = found.interval["tau"]
+    assert low < 1.3 < high
+
+
 def test_commands_that_the_vehicle_runs_ahead_of_are_no_lag():
     """Feed-forward: the vehicle is where the set-point is, whatever its own lag."""
     g = np.random.default_rng(3)

@@ -71,7 +71,7 @@ ROWS = [
 
 def at(phase, given):
     safety = replace(SAFE, operator_lost=given.get("says", "ignore"))
-    return look(phase, replace(WELL, **{k: v for k, v in given.items() if k != "says"}), safety)
+    return look(phase, WELL._replace(**{k: v for k, v in given.items() if k != "says"}), safety)
 
 
 @pytest.mark.parametrize(("number", "phase", "given", "to", "higher", "then"), ROWS)

@@ -22,7 +22,7 @@ class Flights:
     """How a paper's flights are flown.
 
     quick : fewer seeds, coarser maps; seeds : flights per number instead of the paper's
-    changes : keys that are set in every scenario, for `airflock_papers.breaks`
+    changes : keys that are set in every scenario, for `airflock_papers.breaks`; those of `search` are of an evolution
     """
 
     quick: bool = False
@@ -38,7 +38,7 @@ class Flights:
 
     def as_changed(self, scenario: Scenario) -> Scenario:
         """The scenario with the changes set."""
-        return with_changes(scenario, self.changes) if self.changes else scenario
+        return with_changes(scenario, scenario_keys(self.changes))
 
     def score(self, title: str, scenarios: Mapping[Any, Scenario], seeds: int | Mapping[Any, int]) -> pd.DataFrame:
         """Order parameters of every scenario with seeds 0, 1, ...; index (key, seed), in the order given."""
@@ -80,8 +80,15 @@ class Flights:
         return count
 
 
+def scenario_keys(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Of some changes those of a scenario, not of a search."""
+    return {key: value for key, value in changes.items() if not key.startswith("search.")}
+
+
 def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """A scenario with keys set anew; a text like "times 0.5" multiplies what the scenario has."""
+    if not changes:
+        return scenario
     settings = {}
     for key, value in changes.items():
         if isinstance(value, str) and value.startswith("times "):

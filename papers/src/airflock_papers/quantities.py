@@ -75,4 +75,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "overruled": ("overruling", "overruled"),
     "erratic": ("erratic",),
     "bank": ("bank",),
+    "climb": ("ascension",),
+    "fall": ("fall",),
+    "focus on the goal": ("focused on the goal",),
 }

@@ -44,7 +44,7 @@ class Statement:
     unit      : of the numbers, if not SI
     fails_if  : a change of a rule, a number or a time under which the bound is missed, in words
     breaks    : the same as keys of a scenario, set in every flight of the part, as `airflock_papers.breaks` flies it;
-                `times 0.5` halves a number
+                `times 0.5` halves a number, keys of `search` change an evolution
     part      : which part of the paper measures it; else the first word of the id
     verdict   : of a statement without a bound: qualitative only, not testable or not flown yet
     reason    : why it has none; command : what would fly it
@@ -109,9 +109,16 @@ def _expanded(entries: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     for entry in entries:
         plain = {key: value for key, value in entry.items() if key != "each"}
         for values in entry.get("each", [{}]):
-            filled = {k: v.format(**values) if isinstance(v, str) and values else v for k, v in plain.items()}
+            filled = {k: _filled(v, values) if values else v for k, v in plain.items()}
             found.append(filled | {k: v for k, v in values.items() if k in ("published", "published_sd", "bound")})
     return found
+
+
+def _filled(value: Any, values: Mapping[str, Any]) -> Any:
+    """A text, or the texts of a table, with names in braces replaced."""
+    if isinstance(value, Mapping):
+        return {key: _filled(each, values) for key, each in value.items()}
+    return value.format(**values) if isinstance(value, str) else value
 
 
 def faults(s: Statement) -> list[str]:

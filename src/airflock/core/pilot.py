@@ -250,9 +250,12 @@ class Pilot:
         if self.silence is None:
             return False
         for packet in self.packets.values():
+            age = now - packet.sent_at
+            if counts(age, self.silence) > 0.5:
+                continue  # it is not lost
             at, rule = self.place.beside(own, packet.state), self._of_standing if packet.stands else self.silence
             distance = norm(at.x - own.x, at.y - own.y, 0.0 if self.flat else at.z - own.z)
-            if could_be_near(distance, now - packet.sent_at, rule) > 0.5:
+            if could_be_near(distance, age, rule) > 0.5:
                 return True
         return False
 

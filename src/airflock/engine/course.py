@@ -13,13 +13,14 @@ from airflock.engine import cpu, failure
 from airflock.engine.carry import carry
 from airflock.engine.drivers import flying, is_compiled
 from airflock.engine.moments import Snapshot, Window
-from airflock.engine.simulate import opened
+from airflock.engine.simulate import opened, to_fly
 from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.change import begun
 from airflock.scenarios.events import Event
 from airflock.scenarios.onsets import onsets
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.timing import clock
 from airflock.threads import in_background
 
 
@@ -126,16 +127,19 @@ class Course:
 
     def change(self, new: Scenario, event: Event, wait: bool) -> None:
         """Go on as another scenario: now, or once its driver has been compiled. Raises FlightError."""
-        known = self._coming[1] if self._coming else []
-        state = self._opened(new, self.state.plan.absence)
-        if state.whole("steps") < self.step:
+        said = [*(self._coming[1] if self._coming else []), event]
+        old = self.state.plan
+        if clock(new)["steps"] < self.step:
             raise FlightError(f"duration = {new.flight.duration:g} s: the flight is at t = {self.time:g} s already")
-        said = [*known, event]
-        if state.driver is self.state.driver or wait:
+        plan = to_fly(
+            new, self.precision, self.record, given_start=old.given_start, absence=old.absence, device=self.device
+        )
+        if wait or plan == old:
+            state = self._opened(new, old.absence)
             self._coming = None
             self._take(new, said, state)
         else:
-            self._coming = (new, said, in_background(state.compile))
+            self._coming = (new, said, in_background(lambda: self._opened(new, old.absence).compile()))
 
     def take_over(self) -> None:
         """Take the change over that has been compiled meanwhile."""

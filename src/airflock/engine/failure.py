@@ -6,9 +6,12 @@ from airflock.scenarios.scenario import Scenario
 
 def no_place(scenario: Scenario, seed: int, agent: int) -> str:
     """One line for an agent that found no place at the start."""
+    walls = scenario.start.wall_clearance
+    keys = ["start.separation", *(["start.wall_clearance"] if walls else [])]
+    room = f"{keys[0]} = {scenario.separation():g} m" + (f" and {keys[1]} = {walls:g} m" if walls else "")
     return (
-        f"{scenario.name}: seed {seed}: agent {agent} of {scenario.agents} found no place at "
-        f"start.separation = {scenario.separation():g} m; enlarge the arena or lower start.separation"
+        f"{scenario.name}: seed {seed}: agent {agent} of {scenario.agents} found no place at {room}; "
+        f"enlarge the arena or lower {' or '.join(keys)}"
     )
 
 

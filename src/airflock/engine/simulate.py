@@ -22,9 +22,9 @@ from airflock.scenarios.timing import clock
 from airflock.threads import in_threads
 
 
-def driver_text(scenario: Scenario, *, precision: int = 32, record: bool = False) -> str:
+def driver_text(scenario: Scenario, *, precision: int = 32) -> str:
     """Text of the driver that flies a scenario: all rules are inside, so equal texts are equal physics."""
-    return flight_text(plan_of(scenario, precision=precision, record=record))
+    return flight_text(plan_of(scenario, precision=precision))
 
 
 def fly(
@@ -133,15 +133,20 @@ def opened(
     device      : cpu, or python, in double precision and with all pairs
     Raises FlightError where `start` cannot be flown.
     """
-    plan = plan_of(scenario, precision=precision, record=record, absence=absence)
-    if device == "python":
-        plan = plan.built(grid=False, bits=64)
-    needs.check(scenario, plan)
-    given = None
-    if start is not None:
-        given = sound_start(scenario, plan, start)
-    plan = plan.built(given_start=given_start or start is not None)
+    given_start = given_start or start is not None
+    plan = to_fly(scenario, precision, record, given_start=given_start, absence=absence, device=device)
+    given = None if start is None else sound_start(scenario, plan, start)
     return State.of(plan, scenario, seed, world, given, device)
+
+
+def to_fly(
+    scenario: Scenario, precision: int, record: bool, *, given_start: bool, absence: bool, device: str
+) -> Plan:  # fmt: skip
+    """The plan that `opened` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
+    plan = plan_of(scenario, precision=precision, record=record, absence=absence)
+    plan = plan.built(grid=False, bits=64) if device == "python" else plan
+    needs.check(scenario, plan)
+    return plan.built(given_start=given_start)
 
 
 def sound_start(scenario: Scenario, plan: Plan, start: Any) -> NDArray[Any]:
@@ -175,10 +180,10 @@ def score_flight(scenario: Scenario, seed: int = 0, *, precision: int = 32) -> d
     return scenario.judged(fly(scenario, seed, precision=precision).values)
 
 
-def compile_for(scenario: Scenario, *, precision: int = 32, record: bool = False) -> None:
+def compile_for(scenario: Scenario, *, precision: int = 32) -> None:
     """Compile what flies a scenario, if that has not been done; scenarios that differ by numbers share it."""
-    if not is_loaded(flight_driver(plan_of(scenario, precision=precision, record=record))):
-        opened(scenario, 0, precision, record).compile()
+    if not is_loaded(flight_driver(plan_of(scenario, precision=precision))):
+        opened(scenario, 0, precision).compile()
 
 
 def score_flights(

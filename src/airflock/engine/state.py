@@ -60,6 +60,9 @@ class State:
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in plan.motion]
+        together = np.split(self._motion, np.flatnonzero(np.diff(self._motion) != 1) + 1)  # mostly one run of rows
+        self._moving = [own["work"][rows[0] : rows[-1] + 1].reshape(-1) for rows in together]
+        self._nothing = [np.zeros_like(run) for run in self._moving]
         components = plan.dimensions
         self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
         self.no_frames = np.zeros((0, 3 * components, agents), real)
@@ -100,7 +103,7 @@ class State:
         """Fly the steps first to last - 1; returns the next step, or minus the first agent (from 1) without a place.
 
         half   : as in `passes.driver.flight`
-        frames : (sample, component, agent), filled with the samples of these steps where the plan records
+        frames : (sample, component, agent), filled with the samples of these steps; None keeps none
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
@@ -190,7 +193,7 @@ class State:
     @property
     def finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
-        return math.isfinite(self.arrays["work"][self._motion].sum())
+        return math.isfinite(sum(map(np.dot, self._moving, self._nothing)))  # 0 times what is not finite is nan
 
     def compile(self) -> "State":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""

@@ -16,6 +16,8 @@ from airflock import atomic
 from airflock.cache import DRIVERS, cache_folder, shrink, spare
 from airflock.machine import toolchain
 
+SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
+
 _loading = Lock()
 
 
@@ -52,6 +54,6 @@ def _written(folder: Path, label: str, text: str) -> Path:
     if not path.is_file() or path.read_bytes() != text.encode():
         atomic.write(path, text)  # written beside and renamed: another process may be doing the same
     os.utime(folder)
-    if new:
+    if new and int(folder.name[:2], 16) < 256 * SWEPT:
         shrink(folder.parent.parent)
     return path

@@ -95,6 +95,7 @@ def geometry(scenario: Scenario) -> Geometry:
         separation=scenario.separation(),
         speed=begin.speed,
         clearance=begin.clearance,
+        wall_clearance=begin.wall_clearance,
         goal_radius=goals.radius,
         goal_speed=goals.speed,
         goal_spread=goals.spread,

@@ -42,35 +42,42 @@ class Ether:
         self._site = site
         self._asks = frozenset(name for name in ("dx", "dy", "dz", "talkers", "clear") if radio.asks(name))
         self._reach, self._drawn = reach, PacketDice(seed, len(members))
-        self._queue: list[tuple[float, int, int, int, bytes]] = []
+        self._others = [tuple(to for to in range(len(members)) if to != who) for who in range(len(members))]
+        self._alike = radio.late is None and "jitter" not in self._faults  # a packet reaches all at the same time
+        self._sure = radio.receive is None and radio.missed is None and k.loss == 0.0  # in range, nothing is lost
+        self._queue: list[tuple[float, int, int, Sequence[int], bytes]] = []
         self._count = 0
         self._dice = dice.Random(f"ether {seed}")
         self.sent = self.arrived = 0
 
     def send(self, now: float, who: int, datagram: bytes, at: Sequence[Vector] = ()) -> None:
         """A drone, by its place in the list of members, sends a datagram to all; at: true positions, m."""
-        for to in range(len(self._members)):
-            if to != who:
-                late = self._late(to, now) + self._slow(now, who, to, at)
-                self._push(now + self._k.delay + late, who, to, datagram)
+        reached: dict[float, list[int]] = {}
+        for to in () if self._alike else self._others[who]:
+            late = self._late(to, now) + self._slow(now, who, to, at)
+            reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
+        for due, whom in reached.items():
+            self._push(due, who, whom, datagram)
+        if self._alike:
+            self._push(now + self._k.delay, who, self._others[who], datagram)
         for f in self._forgers:
             if f.holds(self._members[who], now) and self._site is not None:
                 false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")
-                for to in range(len(self._members)):
-                    self._push(now + self._k.delay, who, to, false)
+                self._push(now + self._k.delay, who, range(len(self._members)), false)
 
     def _slow(self, now: float, who: int, to: int, at: Sequence[Vector]) -> float:
         """How much later a packet comes by the rule of the radio, s."""
         if self._radio.late is None or not at:
             return 0.0
-        return self._reception.late(to, who, round((now + self._k.delay) / self._period), self._known(who, to, at))
+        known = self._known(who, to, at, math.dist(at[to], at[who]))
+        return self._reception.late(to, who, round((now + self._k.delay) / self._period), known)
 
-    def _known(self, who: int, to: int, at: Sequence[Vector]) -> dict[str, float]:
+    def _known(self, who: int, to: int, at: Sequence[Vector], distance: float) -> dict[str, float]:
         """What rules of the radio may ask for of a pair."""
-        here, there = at[to], at[who]
-        known = {"distance": math.dist(here, there)}
+        known = {"distance": distance}
         if not self._asks:
             return known
+        here, there = at[to], at[who]
         known |= {name: b - a for name, a, b in zip(("dx", "dy", "dz"), here, there, strict=True)}
         if "talkers" in self._asks:
             near = [math.dist(here, other) <= self._k.range for other in at]
@@ -79,8 +86,8 @@ class Ether:
             known["clear"] = 1.0 if self._clear(here, there) else 0.0
         return known
 
-    def _push(self, due: float, who: int, to: int, datagram: bytes) -> None:
-        heapq.heappush(self._queue, (round(due, 6), self._count, who, to, datagram))
+    def _push(self, due: float, who: int, whom: Sequence[int], datagram: bytes) -> None:
+        heapq.heappush(self._queue, (round(due, 6), self._count, who, whom, datagram))
         self._count += 1
 
     def _late(self, to: int, now: float) -> float:
@@ -94,28 +101,31 @@ class Ether:
         """Datagrams that arrive by now, each with the place of its receiver; at: true positions, m."""
         number = max(round(now / self._period), 0)
         while self._queue and self._queue[0][0] <= now + SLACK:
-            _, _, who, to, datagram = heapq.heappop(self._queue)
-            self.sent += 1
-            if not self._passes(now, number, who, to, at):
-                continue
-            self.arrived += 1
-            if not self._faults:
-                yield to, datagram
-                continue
-            yield to, self._bent(to, now, datagram)
-            if any(self._dice.random() < f.amount for f in self._of("duplicate", to, now)):
-                yield to, datagram
+            _, _, who, whom, datagram = heapq.heappop(self._queue)
+            self.sent += len(whom)
+            for to in whom:
+                if not self._passes(now, number, who, to, at):
+                    continue
+                self.arrived += 1
+                if not self._faults:
+                    yield to, datagram
+                    continue
+                yield to, self._bent(to, now, datagram)
+                if any(self._dice.random() < f.amount for f in self._of("duplicate", to, now)):
+                    yield to, datagram
 
     def _passes(self, now: float, number: int, who: int, to: int, at: Sequence[Vector]) -> bool:
         """Whether a packet gets through between two drones at these places, m."""
-        known = self._known(who, to, at)
-        distance = known["distance"]
+        distance = math.dist(at[to], at[who])
         if distance > self._k.range or (self._reach is not None and distance > self._reach(who, to, now)):
             return False
         if self._faults and (
             self._cut(now, who, to) or any(self._dice.random() < f.amount for f in self._of("loss", to, now))
         ):
             return False
+        if self._sure:
+            return True
+        known = self._known(who, to, at, distance)
         if not self._reception.hears(to, who, number, known):
             return False
         missed = unheard(self._radio, self._k, number, self._period, known)

@@ -2,14 +2,12 @@
 
 A node lives by the code that flies on board (`onboard.run.live`). A vehicle talks to its node, and to whoever joins:
 like PX4's simulator it calls at a port of its own, and a client that answers there gets everything. The ether hears
-every packet and where each vehicle is. The flight begins when every node has heard its vehicle, and all have hovered
-and heard each other for a while.
+every packet; where each vehicle is stands in memory that all share. The flight begins when every node has heard its
+vehicle, and all have hovered and heard each other for a while.
 """
 
-import asyncio
-import struct
 import time
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Generator, MutableSequence, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,22 +24,22 @@ from airflock.onboard.card import Card
 from airflock.onboard.mission import Phase
 from airflock.onboard.node import Node
 from airflock.onboard.ports import Place, Udp
+from airflock.onboard.resting import Rest
 from airflock.onboard.run import Ticks, live
 from airflock.scenarios.scenario import Scenario
 
 HOST = "127.0.0.1"
 WARM = 1.0  # s beyond the radio's delay for which all hover before the flight begins
-LOOK = 0.02  # s between two looks of a vehicle at its ports
-HOP = 0.005  # s between two looks of the ether
+LOOK = 0.025  # s between two looks of a vehicle at its ports: twice as often as it tells its state
+HOP = 0.01  # s between two looks of the ether
 BEAT = 0.5  # s between two calls of a vehicle at a port where nobody has answered yet
 SINCE = 60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
-WHERE = struct.Struct("<Hddd?")  # place among the members, position (m), whether it is armed
 NEVER = -1e9
 
 
 class Ports(NamedTuple):
     """Sockets of a fleet: of each node to its autopilot and of its radio, of each vehicle to its node and to clients,
-    of the ether for packets and for places, and of whoever watches.
+    of the ether, and of who gives orders.
     """
 
     nodes: list[Udp]
@@ -49,14 +47,13 @@ class Ports(NamedTuple):
     vehicles: list[Udp]
     clients: list[Udp]
     ether: Udp
-    places: Udp
-    watch: Udp
+    station: Udp
 
     @classmethod
     def opened(cls, count: int, join: tuple[str, int]) -> "Ports":
         """Ports for so many drones; vehicle i calls clients at the port `join` + i."""
         nodes, radios, vehicles, clients = ([_port() for _ in range(count)] for _ in range(4))
-        found = cls(nodes, radios, vehicles, clients, _port(), _port(), _port())
+        found = cls(nodes, radios, vehicles, clients, _port(), _port())
         for i in range(count):
             nodes[i].aim(vehicles[i].here)
             vehicles[i].aim(nodes[i].here)
@@ -66,7 +63,7 @@ class Ports(NamedTuple):
 
     def close(self) -> None:
         """Close all."""
-        for port in (*self.nodes, *self.radios, *self.vehicles, *self.clients, self.ether, self.places, self.watch):
+        for port in (*self.nodes, *self.radios, *self.vehicles, *self.clients, self.ether, self.station):
             port.close()
 
 
@@ -81,6 +78,7 @@ class Plan:
     start : states of drones that begin in the air; None: on the ground
     clock : time.monotonic of the flight's time 0, and of its end, s; then for each node 1 once it has heard its
             vehicle; shared by all
+    seen  : of each vehicle its position (m) and whether it is armed, four numbers; shared by all
     epoch : Unix time at which time.monotonic was 0, µs
     watcher : address at which somebody hears all packets, and what the ether tells; None: nobody does
     """
@@ -92,6 +90,7 @@ class Plan:
     faults: tuple[Fault, ...]
     ports: Ports
     clock: MutableSequence[float]
+    seen: MutableSequence[float]
     epoch: int
     watcher: tuple[str, int] | None = None
 
@@ -104,6 +103,16 @@ class Plan:
     def ready(self) -> bool:
         """Whether every node has heard its vehicle."""
         return all(self.clock[2 + i] > 0.5 for i in range(len(self.card.members)))
+
+    @property
+    def places(self) -> list[tuple[float, float, float]]:
+        """Where the vehicles are, m."""
+        return list(zip(self.seen[0::4], self.seen[1::4], self.seen[2::4], strict=True))
+
+    @property
+    def armed(self) -> list[bool]:
+        """Which vehicles are armed."""
+        return [armed > 0.5 for armed in self.seen[3::4]]
 
     @property
     def over(self) -> bool:
@@ -129,7 +138,7 @@ class Life(NamedTuple):
     processor: float
 
 
-async def node_life(plan: Plan, i: int) -> Life:
+def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     """Life of a node, from now until the end of the flight or its own."""
     card, began = plan.card, time.process_time()
     member = card.members[i]
@@ -157,7 +166,7 @@ async def node_life(plan: Plan, i: int) -> Life:
     def tell(note: str) -> None:
         notes.append((time.monotonic(), member, note))
 
-    ticks = await live(node, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
+    ticks = yield from live(node, [plan.ports.nodes[i], plan.ports.radios[i]], card.safety.tick, tell, until)
     return Life(rows, notes, ticks, node.phase, time.process_time() - began)
 
 
@@ -181,6 +190,7 @@ class Craft:
             in_the_air(made, card, plan.start[i])
             made.state = State(*made.state[:3], 0.0, 0.0, 0.0)  # it hovers until the flight begins
         self._node.write(made.frame_origin())
+        self._show()
 
     def look(self) -> None:
         """Read what came, move up to now, and tell."""
@@ -188,21 +198,31 @@ class Craft:
         now = time.monotonic() - zero
         vehicle.started, vehicle.booted = plan.utc(zero), self._booted - zero
         for data in self._node.read():
-            self._node.write(vehicle.receive(data, now))
+            self._tell(vehicle.receive(data, now))
         for data, sender in self._clients.read_from():
             self._client = sender
-            self._clients.send(vehicle.receive(data, now), sender)
+            self._tell(vehicle.receive(data, now), sender)
         self._move(now)
         told = vehicle.telemetry(now)
-        self._node.write(told)
+        self._tell(told)
         if self._client is not None:
-            self._clients.send(told, self._client)
+            self._tell(told, self._client)
         elif now - self._beat_at >= BEAT:
             self._beat_at = now
             self._clients.write(vehicle.frame(MESSAGES["heartbeat"](vehicle)))
-        at = WHERE.pack(self.place, *vehicle.state[:3], vehicle.armed)
-        for port in (plan.ports.places, plan.ports.watch):
-            self._node.send(at, port.here)
+        self._show()
+
+    def _tell(self, data: bytes, client: tuple[str, int] | None = None) -> None:
+        """Tell the node or a client, if there is anything to tell: an empty datagram would wake them as well."""
+        if data and client is not None:
+            self._clients.send(data, client)
+        elif data:
+            self._node.write(data)
+
+    def _show(self) -> None:
+        """Write down where it is, for the ether and for who watches."""
+        at = 4 * self.place
+        self.plan.seen[at : at + 4] = (*self.vehicle.state[:3], float(self.vehicle.armed))
 
     def _move(self, now: float) -> None:
         vehicle, plan, dt = self.vehicle, self.plan, self.plan.scenario.flight.dt
@@ -219,7 +239,7 @@ class Craft:
             self.steps += 1
 
 
-async def craft_life(plan: Plan, i: int) -> Life:
+def craft_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     """Life of a vehicle until the end of the flight."""
     began, craft = time.process_time(), Craft(plan, i)
     count, late, worst, due = 0, 0, 0.0, time.monotonic()
@@ -228,16 +248,16 @@ async def craft_life(plan: Plan, i: int) -> Life:
         count, late, worst = count + 1, late + (behind > 0.5 * LOOK), max(worst, behind)
         craft.look()
         due = max(due + LOOK, time.monotonic() - LOOK)
-        await asyncio.sleep(max(0.0, due - time.monotonic()))
+        yield Rest(due)
     return Life(craft.rows, [], Ticks(count, late, worst), Phase.DONE, time.process_time() - began)
 
 
-async def ether_life(plan: Plan) -> Life:
+def ether_life(plan: Plan) -> Generator[Rest, None, Life]:
     """Life of the ether: packets of nodes reach those whom the radio lets them reach, orders reach all at once."""
     began, card, ports = time.process_time(), plan.card, plan.ports
     flown, period = plan.scenario, card.safety.status_period
     ether = Ether(flown.transceiver, flown.radio, card.members, plan.seed, period, plan.faults, site=card.site)
-    at: list[tuple[float, float, float]] = [(0.0, 0.0, 0.0)] * len(card.members)
+    station = ports.station.here
     radios = [port.here for port in ports.radios]
     who = {here: i for i, here in enumerate(radios)}
     teller = Teller(card.members, plan.faults) if plan.watcher else None
@@ -247,15 +267,12 @@ async def ether_life(plan: Plan) -> Life:
             ports.ether.send(data, plan.watcher)
 
     while not plan.over:
-        for data in ports.places.read():
-            i, x, y, z, _ = WHERE.unpack(data)
-            at[i] = (x, y, z)
-        now = plan.now
+        now, at = plan.now, plan.places
         for data, sender in ports.ether.read_from():
             if sender in who:
                 ether.send(now, who[sender], data, at)
                 watched(data)
-            elif sender == ports.watch.here:
+            elif sender == station:
                 for radio in radios:
                     ports.ether.send(data, radio)
                 watched(data)
@@ -265,19 +282,5 @@ async def ether_life(plan: Plan) -> Life:
                 teller.arrived(to, data, now)
         for data in () if teller is None else teller.report(now, plan.utc(time.monotonic())):
             watched(data)
-        await asyncio.sleep(HOP)
+        yield Rest(time.monotonic() + HOP)
     return Life([], [], Ticks(0, 0, 0.0), Phase.DONE, time.process_time() - began)
-
-
-class Watched:
-    """What whoever watches knows: where each vehicle is, and whether it is armed."""
-
-    def __init__(self, plan: Plan):
-        self._port, count = plan.ports.watch, len(plan.card.members)
-        self.armed = [plan.start is not None] * count
-
-    def look(self) -> None:
-        """Read what came."""
-        for data in self._port.read():
-            i, _, _, _, armed = WHERE.unpack(data)
-            self.armed[i] = armed

@@ -154,7 +154,7 @@ class Observer:
 
     def flying(self, now: float) -> list[int]:
         """Members that are heard now and fly."""
-        return [who for who in self.heard(now) if self.peers[who].flies()]
+        return [who for who in self.heard(now) if self.peers[who].flies]
 
     def named(self, systems: frozenset[int]) -> str:
         """System ids in words."""

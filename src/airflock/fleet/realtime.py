@@ -10,7 +10,7 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Generator, Sequence
 from functools import partial
 from multiprocessing.connection import wait
 from typing import Any, NamedTuple
@@ -21,11 +21,13 @@ from numpy.typing import NDArray
 from airflock.core.agent import State
 from airflock.errors import LinkError, ScenarioError
 from airflock.fleet.faults import Fault
-from airflock.fleet.live import NEVER, WARM, Life, Plan, Ports, Watched, craft_life, ether_life, node_life
+from airflock.fleet.live import NEVER, WARM, Life, Plan, Ports, craft_life, ether_life, node_life
 from airflock.fleet.starting import READY_TIME, Station, lift_of
+from airflock.mavlink import dialect
 from airflock.mavlink.orders import Do
 from airflock.onboard.card import Card
 from airflock.onboard.mission import Phase
+from airflock.onboard.resting import Rest, alone, take
 from airflock.scenarios.scenario import Scenario
 
 MODES = ("lockstep", "tasks", "processes")
@@ -36,6 +38,7 @@ HOME = 600.0  # s in which all must have landed
 LONG = 1e6  # s; longer than anybody waits
 WATCH = 0.1  # s between two looks of whoever watches
 ENDED = "a process of the fleet ended with status {}"
+Begun = Generator[Rest, None, Life]
 Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
 OURSELVES = 0  # place of the ether among the lives
 
@@ -147,10 +150,11 @@ def fly(
             now + 2.0 * LONG,
             *(0.0,) * len(card.members),
         ]  # the watch sets the clock when all are there
-        clock: Any = first if mode == "tasks" else multiprocessing.RawArray("d", first)
+        kept: Callable[[list[float]], Any] = list if mode == "tasks" else partial(multiprocessing.RawArray, "d")
+        clock, seen = kept(first), kept([0.0] * (4 * len(card.members)))
         epoch = time.time_ns() // 1000 - round(now * 1e6)
-        plan = Plan(scenario, card, seed, start, tuple(faults), ports, clock, epoch, watcher)
-        lives: list[Callable[[], Coroutine[Any, Any, Life]]] = [partial(ether_life, plan)]
+        plan = Plan(scenario, card, seed, start, tuple(faults), ports, clock, seen, epoch, watcher)
+        lives: list[Callable[[], Begun]] = [partial(ether_life, plan)]
         lives += [partial(node_life, plan, i) for i in range(len(card.members))]
         lives += [partial(craft_life, plan, i) for i in range(len(card.members))]
         watching = partial(_watch, plan, operator, done)
@@ -161,18 +165,39 @@ def fly(
         ports.close()
 
 
-async def _tasks(plan: Plan, lives: Sequence[Callable[[], Any]], watching: Watching) -> tuple[list[Life], float]:
+async def _tasks(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """All lives in one event loop; what is left of each, and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(life()) for life in lives]
+        tasks = [group.create_task(together(life())) for life in lives]
         await watching(lambda: None)
     return [task.result() for task in tasks], time.process_time() - began
 
 
-def _forked(plan: Plan, lives: Sequence[Callable[[], Any]], watching: Watching) -> tuple[list[Life], float]:
+async def together(life: Begun) -> Life:
+    """Live a life among others in one event loop, as `alone` does in a process of its own."""
+    loop, hears = asyncio.get_running_loop(), Rest(0.0).hears
+    try:
+        while True:
+            try:
+                rest = next(life)
+            except StopIteration as end:
+                found: Life = end.value
+                return found
+            if rest.hears is not hears:
+                hears = rest.hears
+                for port, hand in hears:
+                    loop.add_reader(port.fileno(), take, port, hand)
+            await asyncio.sleep(max(0.0, rest.until - time.monotonic()))
+    finally:
+        for port, _ in hears:
+            loop.remove_reader(port.fileno())
+
+
+def _forked(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """Each life in a process of its own; what is left of each, and the processor time of all, s."""
     context, began = multiprocessing.get_context("fork"), time.process_time()
+    dialect.common()  # once here, so that no process imports it for itself
     pipes = [context.Pipe() for _ in lives]
     processes = [
         context.Process(target=_child, args=(life, pipe[1]), daemon=True)
@@ -219,24 +244,23 @@ def _alive(processes: Sequence[Any]) -> None:
             raise LinkError(ENDED.format(process.exitcode))
 
 
-def _child(life: Callable[[], Any], pipe: Any) -> None:
+def _child(life: Callable[[], Begun], pipe: Any) -> None:
     """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it
     pipe.send("ready")
     pipe.recv()
-    pipe.send(asyncio.run(life()))
+    pipe.send(alone(life()))
 
 
 async def _watch(plan: Plan, operator: bytes, done: Callable[[], None] | None, check: Callable[[], None]) -> None:
     """Give the orders of a flight from the ground, end the flight, and tell how far it is; check raises what failed."""
     seconds = plan.scenario.flight.duration
-    watched, told = Watched(plan), 0
+    told = 0
 
     async def until(holds: Callable[[], bool]) -> None:
         nonlocal told
         while not holds():
             await asyncio.sleep(WATCH)
-            watched.look()
             check()
             while done is not None and told < min(plan.now, seconds + READY_TIME):
                 told += 1
@@ -247,28 +271,28 @@ async def _watch(plan: Plan, operator: bytes, done: Callable[[], None] | None, c
     if plan.start is not None:
         await until(lambda: plan.now > seconds + plan.card.period)
     else:
-        await _from_the_ground(plan, Station(plan.card, operator), watched, until)
+        await _from_the_ground(plan, Station(plan.card, operator), until)
     plan.clock[1] = time.monotonic()
 
 
-async def _from_the_ground(plan: Plan, station: Station, watched: Watched, until: Callable[..., Any]) -> None:
+async def _from_the_ground(plan: Plan, station: Station, until: Callable[..., Any]) -> None:
     """Order a start, a return when the time is over, and wait until all stand on the ground again."""
 
     def order(do: Do) -> None:
         utc = plan.utc(time.monotonic())
-        plan.ports.watch.send(station.order(do, utc, at=utc), plan.ports.ether.here)
+        plan.ports.station.send(station.order(do, utc, at=utc), plan.ports.ether.here)
 
     await until(lambda: plan.now > READY_TIME)
     begun = plan.now
-    while not all(watched.armed) and plan.now < begun + STARTS:
+    while not all(plan.armed) and plan.now < begun + STARTS:
         order(Do.START)
         next_ = plan.now + AGAIN
-        await until(lambda: plan.now > next_ or all(watched.armed))  # noqa: B023
+        await until(lambda: plan.now > next_ or all(plan.armed))  # noqa: B023
     begun = plan.now
     await until(lambda: plan.now > begun + plan.scenario.flight.duration)
     order(Do.RETURN)
     begun = plan.now
-    await until(lambda: plan.now > begun + HOME or not any(watched.armed))
+    await until(lambda: plan.now > begun + HOME or not any(plan.armed))
 
 
 def _load(lives: Sequence[Life], count: int, seconds: float, all_: float, together: bool) -> Load:

@@ -18,14 +18,17 @@ from scipy.optimize import minimize
 from scipy.stats import t as student
 
 from airflock.body import held
+from airflock.identify.body_checks import FEW, dead_time, second_tau, together
 from airflock.identify.logs import Logs
 
 NAMES = ("tau", "a_max", "noise", "white")
 STARTS = ((0.7, 4.0, 0.1, 0.05), (0.25, 8.0, 0.3, 0.02))
+LIMITED = (0.5, 0.7, 0.85, 0.95, 0.99)  # shares of rows below the limit, from which a limit is sought, and
+SHORTER = (1.0, 0.92, 0.84, 0.7)  # shares of the first tau, which without a limit is too long
 BLOCK = 20.0  # s of one drone whose slopes are taken together
 FREE = 1e4  # m/s^2: no limit
+WITHIN, NEWTON = 1.92, 3  # half of the 95 % point of chi-squared with 1 degree of freedom; steps of each fit on the way
 GAIN, SATURATED = 200.0, 100  # least 2 Δ log-likelihood and rows at the limit for an a_max
-FEW = 200  # rows below which nothing is fitted
 DISAGREE = 0.15  # of two estimates of tau
 # Relative standard deviation of what the filter leaves out: commands come from the true velocity, so they know more of
 # it than the filter does. Measured on random fleets with 0.1 m/s of noise in the log (benchmarks/identify.py).
@@ -38,6 +41,7 @@ class BodyFit:
 
     refused : name → reason, for numbers that cannot be told apart
     gain    : 2 Δ log-likelihood of a limited against an unlimited acceleration
+    seen    : least limit that goes with the log, m/s²: of 95 % by its likelihood, and at most what was asked for
     """
 
     value: dict[str, float]
@@ -125,7 +129,8 @@ def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
             return 1e15
         return float(kernel(*arrays, out if blocks is None else blocks, tau, a_max, noise, white, dt))
 
-    z = _lowest(loss)
+    gap = np.linalg.norm(flying.command - flying.velocity, axis=1)
+    z = _lowest(loss, gap)
     lowest = loss(z)
     value = dict(zip(NAMES, np.exp(z), strict=True))
     spread, freedom = _spread(loss, z, len(out))
@@ -135,12 +140,13 @@ def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     }
     low, high = interval["noise"]
     value["noise"], interval["noise"] = value["noise"] - walk, (max(low - walk, 0.0), max(high - walk, 0.0))
-    gap = np.linalg.norm(flying.command - flying.velocity, axis=1)
     saturated = int((gap > value["a_max"] * value["tau"]).sum())
+    asked = float(np.quantile(gap, 0.999) / value["tau"])
+    seen = _least_limit(loss, z, lowest, min(asked, value["a_max"]))
     free = _settled(lambda y: loss([y[0], np.log(FREE), y[1], y[2]]), z[[0, 2, 3]])
     found = BodyFit(
         value, interval, {}, saturated, len(flying.time), 2.0 * (free - lowest),
-        second_tau(flying, value["tau"], value["a_max"]), float(np.quantile(gap, 0.999) / value["tau"]),
+        second_tau(flying, value["tau"], value["a_max"]), seen,
         0.0, together(flying, value), [],
     )  # fmt: skip
     found.dead_time = dead_time(flying, value)
@@ -162,12 +168,45 @@ def _blocks(logs: Logs) -> NDArray[np.int64]:
     return np.unique(logs.who * (part.max() + 1) + part, return_inverse=True)[1].astype(np.int64)
 
 
-def _lowest(loss: Callable[[Any], float]) -> NDArray[np.float64]:
+def _lowest(loss: Callable[[Any], float], gap: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log parameters of the highest hill of likelihood.
+
+    Where no row is at the limit, the limit has no slope: a descent that went there with too long a tau stays. So other
+    limits are looked at, with shorter lags beside them.
+    """
     options = {"maxiter": 600, "xatol": 2e-4, "fatol": 2e-2}
-    first = [minimize(loss, np.log(s), method="Nelder-Mead", options={"maxiter": 120}) for s in STARTS]
+    first = [_descent(loss, np.log(s)) for s in STARTS]
     best = min(first, key=lambda found: float(found.fun))
+    tau, _, noise, white = np.exp(best.x)
+    limits = np.quantile(gap, LIMITED) / tau
+    others = [np.log((k * tau, max(limit, 1e-3) / k, noise, white)) for limit in limits for k in SHORTER]
+    best = min(best, _descent(loss, min(others, key=loss)), key=lambda found: float(found.fun))
     again = minimize(loss, best.x, method="Nelder-Mead", options=options)
     return np.asarray(again.x, float)
+
+
+def _least_limit(loss: Callable[[Any], float], z: NDArray[np.float64], lowest: float, top: float) -> float:
+    """Least limit of acceleration whose likelihood, the others fitted, is within 95 % of the highest; at most `top`."""
+    others, unit = [0, 2, 3], 0.01 * np.eye(len(z))[[0, 2, 3]]
+
+    def fitted(limit: float) -> float:
+        y = np.array([z[0], np.log(limit), z[2], z[3]])
+        best = loss(y)
+        for _ in range(NEWTON):
+            up, down = np.array([loss(y + u) for u in unit]), np.array([loss(y - u) for u in unit])
+            y[others] -= np.clip(0.01 * 0.5 * (up - down) / np.maximum(up + down - 2.0 * loss(y), 1e-3), -0.1, 0.1)
+            best = min(best, loss(y))
+        return best
+
+    low, high = top / 8.0, top
+    for _ in range(8):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if fitted(middle) < lowest + WITHIN else (middle, high)
+    return high
+
+
+def _descent(loss: Callable[[Any], float], start: Any) -> Any:
+    return minimize(loss, start, method="Nelder-Mead", options={"maxiter": 120})
 
 
 def _settled(loss: Callable[[Any], float], start: Any) -> float:
@@ -196,71 +235,6 @@ def _spread(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.
     robust = inverse @ (slopes @ slopes.T) @ inverse * blocks / max(blocks - 1, 1)
     sampled = np.maximum(np.diag(robust), np.clip(np.diag(inverse), 0.0, None))
     return np.minimum(np.sqrt(sampled + BEYOND**2), 3.0), blocks - 1
-
-
-def second_tau(logs: Logs, tau: float, a_max: float) -> float:
-    """Give tau (s) by another way: increments against the gap, with the gap to an earlier velocity as instrument.
-
-    White noise of the row is not in the earlier velocity, so it does not bias the ratio of covariances. Rows at the
-    limit are left out. Where commands run ahead of the vehicle (feed-forward) the two ways disagree.
-    """
-    lag = 3
-    gap = logs.command - logs.velocity
-    run = np.cumsum(logs.new)
-    k = np.arange(lag, len(logs.time) - 1)
-    sound = run[k - lag] == run[k + 1]
-    earlier = logs.command[lag:-1] - logs.velocity[: -lag - 1]  # to the velocity of `lag` rows before
-    calm = sound & (np.linalg.norm(earlier, axis=1) < 0.7 * a_max * tau)
-    k, earlier = k[calm], earlier[calm]
-    if len(k) < FEW:
-        return float("nan")
-    h = logs.time[k + 1] - logs.time[k]
-    moved = logs.velocity[k + 1] - logs.velocity[k]
-    instrument = earlier - earlier.mean(axis=0)
-    share = float((moved * instrument).sum() / (gap[k] * instrument).sum())
-    if not 0.0 < share < 1.0:
-        return float("nan")
-    return float(-np.median(h) / np.log1p(-share))
-
-
-def together(logs: Logs, value: dict[str, float]) -> float:
-    """Mean correlation of drones' unexplained accelerations: gusts that all feel, rather than noise of each one."""
-    if logs.drones < 2:
-        return 0.0
-    h = np.diff(logs.time)
-    gap = logs.command[:-1] - logs.velocity[:-1]
-    size = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
-    pull = np.minimum(size / value["tau"], value["a_max"])
-    off = np.diff(logs.velocity, axis=0) / np.maximum(h, 1e-9)[:, None] - gap * (pull / size)[:, None]
-    sound = ~logs.new[1:] & (h > 0.0)
-    slot = np.floor(logs.time[1:] - logs.time.min()).astype(np.int64)  # means over 1 s
-    table = np.full((logs.drones, int(slot.max()) + 1), np.nan)
-    total, count = np.zeros_like(table), np.zeros_like(table)
-    np.add.at(total, (logs.who[1:][sound], slot[sound]), off[sound, 0])
-    np.add.at(count, (logs.who[1:][sound], slot[sound]), 1.0)
-    table = np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
-    shared = np.isfinite(table).all(axis=0)
-    if shared.sum() < 30:
-        return 0.0
-    alike = np.corrcoef(table[:, shared])
-    return float((alike.sum() - logs.drones) / (logs.drones * (logs.drones - 1)))
-
-
-def dead_time(logs: Logs, value: dict[str, float]) -> float:
-    """Delay of commands that explains the increments best, s, to a row: a body has none, so it is only told."""
-    best, kept = np.inf, 0.0
-    run = np.cumsum(logs.new)
-    for late in range(0, 11):
-        k = np.arange(late, len(logs.time) - 1)
-        k = k[run[k - late] == run[k + 1]]
-        gap = logs.command[k - late] - logs.velocity[k]
-        size = np.maximum(np.linalg.norm(gap, axis=1), 1e-12)
-        pull = np.minimum(size / value["tau"], value["a_max"])
-        h = (logs.time[k + 1] - logs.time[k])[:, None]
-        off = float(((logs.velocity[k + 1] - logs.velocity[k] - gap * (pull / size)[:, None] * h) ** 2).mean())
-        if off < 0.98 * best:
-            best, kept = off, late * logs.step
-    return kept
 
 
 def _judge(found: BodyFit, logs: Logs) -> None:

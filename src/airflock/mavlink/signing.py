@@ -2,7 +2,8 @@
 
 A signature is the first six bytes of SHA-256 over secret, frame, link and stamp; a stamp counts 10 µs since 2015. The
 receiver checks in an order in which nothing that is wrong can change its state: header, length, sender, signature,
-then the stamp against the own clock and against the last one of this sender, and only then is the stamp kept.
+then the stamp against the own clock and against the last one of this sender, and only then is the stamp kept. Of a
+packet that comes by two radios the second has the bytes of the first, whose signature has been found right.
 pymavlink's check keeps the stamp first, so that one forged datagram locks a neighbour out.
 """
 
@@ -96,6 +97,7 @@ class Receiver:
         self._senders = {message: frozenset(systems) for message, systems in senders.items()}
         self._floor, self._spread = stamp_at(started), round(spread * STAMPS_PER_SECOND)
         self.heard = {int(system): stamp for system, stamp in (heard or {}).items() if 0 <= stamp <= LAST_STAMP}
+        self._last: dict[int, bytes] = {}  # system → the last datagram of it that was accepted
         self.refused = dict.fromkeys(REFUSALS, 0)
         self.accepted = 0
         self.own_heard: int | None = None  # stamp of the last genuine, fresh frame that bears our own system id
@@ -110,6 +112,7 @@ class Receiver:
             return None
         system, stamp, message = datagram[5], _stamp_of(datagram), message_number(datagram)
         self.heard[system] = stamp
+        self._last[system] = bytes(datagram)
         self.accepted += 1
         payload = bytes(datagram[HEADER : HEADER + datagram[1]])
         return Received(system, stamp, message, payload)
@@ -127,9 +130,10 @@ class Receiver:
             return "length"
         if data[5] != self._own and data[5] not in self._senders[message]:
             return "stranger"
-        tag = hashlib.sha256(self._key + data[:-6]).digest()[:6]
-        if not hmac.compare_digest(tag, bytes(data[-6:])):
-            return "signature"
+        if data != self._last.get(data[5]):
+            tag = hashlib.sha256(self._key + data[:-6]).digest()[:6]
+            if not hmac.compare_digest(tag, bytes(data[-6:])):
+                return "signature"
         stamp = _stamp_of(data)
         if abs(stamp - stamp_at(utc)) > self._spread:
             return "clock"

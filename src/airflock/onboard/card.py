@@ -9,6 +9,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,12 @@ class Card:
     def law_state(self, own: State) -> State:
         """A local state as the law counts heights: from the arena's centre, or from the ground of a scene."""
         x, y, z, vx, vy, vz = own
-        return own if self.document["shapes"].get("shapes") else State(x, y, z - self.height, vx, vy, vz)
+        return own if self._has_ground else State(x, y, z - self.height, vx, vy, vz)
+
+    @cached_property
+    def _has_ground(self) -> bool:
+        """Whether it flies over the ground of a scene."""
+        return bool(self.document["shapes"].get("shapes"))
 
 
 def hash_of(document: Mapping[str, Any]) -> str:

@@ -47,6 +47,8 @@ def limit(
     for _ in range(2):  # a corner: what one side turns, another may have to turn again
         for distance, nx, ny, nz in walls:
             outward = -(vx * nx + vy * ny + vz * nz)
+            if outward <= 0.0:
+                continue
             lag = max(-(own.vx * nx + own.vy * ny + own.vz * nz), 0.0) * s.response  # flown before it slows down
             most = braking_curve(distance - s.soft_margin - lag, s.brake, s.brake_gain)
             if outward > most:

@@ -5,7 +5,6 @@ what is flown, not the phase, and hide nothing below them. The pilot and the aut
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -38,8 +37,7 @@ AIR = FLY | {Phase.LAND, Phase.MANUAL}
 STANDING = frozenset({Phase.HOLD, Phase.RETURN})  # they do not fly with the flock (decision 0111)
 
 
-@dataclass(frozen=True)
-class Facts:
+class Facts(NamedTuple):
     """What is known at one tick. As they stand here a drone flies well and nobody asks for anything.
 
     *_for : for how long something has held, s
@@ -180,13 +178,14 @@ TABLE: tuple[Row, ...] = (
     Row("27", _of(P.LAND), "landed", lambda f, s: f.landed or not f.armed, P.DONE),
 )  # fmt: skip
 CALMED = next(row for row in TABLE if row.number == "25")
+ROWS = {phase: tuple(row for row in TABLE if phase in row.phases) for phase in Phase}
 
 
 def look(phase: Phase, facts: Facts, safety: Safety) -> Step:
     """The first row of the table that fires in a phase, and all rows that change what is flown meanwhile."""
     effects: set[str] = set()
-    for row in TABLE:
-        if phase not in row.phases or not row.holds(facts, safety):
+    for row in ROWS[phase]:
+        if not row.holds(facts, safety):
             continue
         if row is CALMED:
             return Step(row, facts.before, frozenset(effects))

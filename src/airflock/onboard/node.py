@@ -119,7 +119,7 @@ class Node:
         at = (told.time - self._zero) * 1e-6
         if self.peers.take(got.system, told, at, now):
             index, peer = self.card.members.index(got.system), self.peers.all[got.system]
-            if peer.flies():
+            if peer.flies:
                 assert peer.state is not None, "it was taken"
                 self.pilot.hear(index, self.card.law_state(peer.state), at, now, stands=peer.phase in STANDING)
             else:

@@ -26,10 +26,7 @@ class Peer:
         self.other_card = False
         self.phase = Phase.BOOT  # of its mission as it told it
         self.state: State | None = None  # as it told it
-
-    def flies(self) -> bool:
-        """Whether it is in the air, by its last word."""
-        return self.status is not None and self.phase in AIR and self.status.airborne
+        self.flies = False  # whether it is in the air, by its last word
 
 
 class Peers:
@@ -53,6 +50,7 @@ class Peers:
         was = peer.phase
         peer.status, peer.at, peer.heard_at, peer.other_card = status, at, now, False
         peer.phase, peer.state = PHASES[status.phase], State(*status.position, *status.velocity)
+        peer.flies = peer.phase in AIR and status.airborne
         peer.ages.append(now - at)
         self.joined = self.joined or (was not in FLOCKING and peer.phase in FLOCKING)
         return True
@@ -84,11 +82,11 @@ class Peers:
 
     def heard(self, now: float) -> int:
         """How many members are heard now."""
-        return sum(now - peer.heard_at <= FRESH for peer in self.all.values())
+        return sum([now - peer.heard_at <= FRESH for peer in self.all.values()])
 
     def flying(self) -> dict[int, Peer]:
         """Members that are in the air by their last word."""
-        return {who: peer for who, peer in self.all.items() if peer.flies()}
+        return {who: peer for who, peer in self.all.items() if peer.flies}
 
     def clocks_suspect(self) -> bool:
         """Whether two or more members, and all that are known, seem to have a wrong clock: then it is the own."""

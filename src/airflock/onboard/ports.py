@@ -13,13 +13,15 @@ from typing import NamedTuple, Protocol
 from airflock.errors import LinkError
 
 LONGEST = 2048  # bytes read at once
+MOST = 1000  # datagrams read at one look; what a flood brings beyond waits, or is lost as on a jammed radio
+KEPT = 1 << 20  # bytes that wait unread in a socket, as far as the system allows
 
 
 class Port(Protocol):
     """One open port."""
 
     def fileno(self) -> int:
-        """Number of the open file, for the event loop."""
+        """Number of the open file."""
 
     def read(self) -> list[bytes]:
         """What has arrived: datagrams, or one piece of a stream."""
@@ -70,6 +72,7 @@ class Udp:
         self._there = place.there
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KEPT)
         self._socket.setblocking(False)
         try:
             self._socket.bind(place.here)
@@ -93,20 +96,21 @@ class Udp:
         self._there, self._answers = there, False
 
     def read(self) -> list[bytes]:
-        """All datagrams that have arrived."""
+        """The datagrams that have arrived."""
         return [data for data, _ in self.read_from()]
 
     def read_from(self) -> list[tuple[bytes, tuple[str, int]]]:
-        """All datagrams that have arrived, each with who sent it."""
+        """The datagrams that have arrived, each with who sent it; at most MOST of them."""
         found: list[tuple[bytes, tuple[str, int]]] = []
-        while True:
+        take = self._socket.recvfrom
+        while len(found) < MOST:
             try:
-                data, sender = self._socket.recvfrom(LONGEST)
+                found.append(take(LONGEST))
             except (BlockingIOError, ConnectionRefusedError):
-                return found
-            if self._answers:
-                self._there = sender
-            found.append((data, sender))
+                break
+        if self._answers and found:
+            self._there = found[-1][1]
+        return found
 
     def write(self, data: bytes) -> bool:
         """Send a datagram."""
@@ -152,7 +156,7 @@ class Serial:
         """The bytes that have arrived."""
         try:
             data = os.read(self._file, LONGEST)
-        except BlockingIOError:
+        except OSError:  # nothing has arrived, or the line was pulled out
             return []
         return [data] if data else []
 

@@ -1,10 +1,9 @@
 """Run a node: its sockets, its clock, its files. The only part on board that does input and output."""
 
 import argparse
-import asyncio
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -17,6 +16,7 @@ from airflock.onboard.card import Card, read_card
 from airflock.onboard.log import Logged, memory_text, read_memory
 from airflock.onboard.node import Node
 from airflock.onboard.ports import Port, Serial, open_port
+from airflock.onboard.resting import Hand, Rest, alone, take
 
 HELP = "Fly one member of a flock: this computer beside its autopilot. Nothing arms before the operator orders it."
 EXAMPLE = """example:
@@ -105,7 +105,7 @@ def _run(given: argparse.Namespace) -> int:
         memory_file = given.card.with_name(f"{stem}.memory")
         log_file = given.log or given.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
-            asyncio.run(fly(card, given.member, key, ports, memory_file, log, say=_say))
+            fly(card, given.member, key, ports, memory_file, log, say=_say)
     except OSError as fault:
         raise LinkError(f"{fault.filename or 'a port'}: {fault.strerror}") from fault
     finally:
@@ -119,7 +119,7 @@ def _say(text: str) -> None:
     sys.stdout.flush()
 
 
-async def fly(
+def fly(
     card: Card, member: int, key: bytes, ports: Sequence[Port], memory_file: Path, log: TextIO,
     say: Callable[[str], None], until: Callable[[], bool] = lambda: False,
 ) -> None:  # fmt: skip
@@ -142,7 +142,7 @@ async def fly(
         say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
 
     try:
-        ticks = await live(logged, ports, s.tick, tell, until, save)
+        ticks = alone(live(logged, ports, s.tick, tell, until, save))
     finally:
         atomic.write(memory_file, memory_text(node.memory))
     tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
@@ -156,56 +156,53 @@ class Ticks(NamedTuple):
     worst: float
 
 
-async def live(
+def live(
     node: Node | Logged, ports: Sequence[Port], period: float, tell: Callable[[str], None],
     until: Callable[[], bool], save: Callable[[], None] = lambda: None,
-) -> Ticks:  # fmt: skip
+) -> Generator[Rest, None, Ticks]:  # fmt: skip
     """Tick a node every `period` s on the real clock until it is told to end, and pass bytes.
+
+    What the autopilot and serial lines send is read as it comes: an own state holds when it arrives, and a line keeps
+    little. Datagrams of radios tell themselves when they hold; they wait for the tick that looks at them, which spares
+    the computer a wake-up for each.
 
     ports : the autopilot's first, then those of the radios; tell: takes the node's notes; save: called every second
     """
-    loop = asyncio.get_running_loop()
-    loop.add_reader(ports[0].fileno(), _take, ports[0], node.autopilot)
+    at_once: list[tuple[Port, Hand]] = [(ports[0], node.autopilot)]
+    at_ticks: list[tuple[Port, Hand]] = []
     for port in ports[1:]:
-        loop.add_reader(port.fileno(), _take, port, _datagrams(port, node.radio))
+        (at_once if isinstance(port, Serial) else at_ticks).append((port, _datagrams(port, node.radio)))
     due = save_at = time.monotonic()
     count, late, worst = 0, 0, 0.0
-    try:
-        while not until():
-            now = time.monotonic()
-            count, late, worst = count + 1, late + (now - due > 0.5 * period), max(worst, now - due)
-            out = node.tick(now)
-            for data in out.autopilot:
-                ports[0].write(data)
-            for port, datagrams in zip(ports[1:], out.radios, strict=True):
-                for datagram in datagrams:
-                    port.write(datagram)
-            for note in out.notes:
-                tell(note)
-            if now >= save_at:
-                save_at = now + SAVE
-                save()
-            due = max(due + period, now)
-            await asyncio.sleep(max(0.0, due - time.monotonic()))
-    finally:
-        for port in ports:
-            loop.remove_reader(port.fileno())
+    while not until():
+        for port, hand in at_ticks:
+            take(port, hand)
+        now = time.monotonic()
+        count, late, worst = count + 1, late + (now - due > 0.5 * period), max(worst, now - due)
+        out = node.tick(now)
+        for data in out.autopilot:
+            ports[0].write(data)
+        for port, datagrams in zip(ports[1:], out.radios, strict=True):
+            for datagram in datagrams:
+                port.write(datagram)
+        for note in out.notes:
+            tell(note)
+        if now >= save_at:
+            save_at = now + SAVE
+            save()
+        due = max(due + period, now)
+        yield Rest(due, at_once)
     return Ticks(count, late, worst)
 
 
-def _take(port: Port, hand: Callable[[bytes, float], None]) -> None:
-    for data in port.read():
-        hand(data, time.monotonic())
-
-
-def _datagrams(port: Port, hand: Callable[[bytes, float], None]) -> Callable[[bytes, float], None]:
+def _datagrams(port: Port, hand: Hand) -> Hand:
     """Hand on whole signed frames: a serial radio gives pieces of a stream, UDP gives datagrams."""
     if not isinstance(port, Serial):
         return hand
     line = Stream()
 
-    def take(data: bytes, now: float) -> None:
+    def whole(data: bytes, now: float) -> None:
         for raw in line.raw(data):
             hand(raw, now)
 
-    return take
+    return whole

@@ -138,7 +138,7 @@ def recording_of(flight: Flight) -> xr.Dataset:
 
 def provenance(scenario: Scenario, seed: int, precision: int) -> dict[str, Any]:
     """Everything that decides the bits of a flight, as plain attributes."""
-    text = driver_text(scenario, precision=precision, record=True)
+    text = driver_text(scenario, precision=precision)
     own = scenario.document.get("model", {}).get("kind") not in MODELS
     return {
         "airflock_scenario": json.dumps(flown_document(scenario)),

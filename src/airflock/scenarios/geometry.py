@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from shapely import union_all
 from shapely.geometry import MultiPoint, Point, Polygon, box
 from shapely.validation import explain_validity
 
@@ -120,15 +121,15 @@ def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) 
     return found
 
 
-def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[float, float]:
-    """Area (m²) and height (m) of the region in which agents start."""
+def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[Any, float]:
+    """Ground plan (None: without an end) and height (m) of the region in which agents start, obstacles included."""
     if begin.kind == "ball":
-        return math.pi * begin.radius**2, 4.0 / 3.0 * begin.radius
+        return Point(0.0, 0.0).buffer(begin.radius, quad_segs=64), 4.0 / 3.0 * begin.radius
     if begin.kind == "box":
-        return begin.side**2, begin.side
-    plan = ground_plan(world)
+        return box(*(-0.5 * begin.side,) * 2, *(0.5 * begin.side,) * 2), begin.side
+    plan, room = ground_plan(world), begin.wall_clearance
     low, high = arena.heights_of(world)
-    return (plan.area if plan is not None else math.inf), high - low
+    return None if plan is None else plan.buffer(-room), max(high - low - 2.0 * room, 0.0)
 
 
 def height_faults(world: arena.Parameters) -> list[str]:
@@ -163,8 +164,9 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
     if world.arena != "square" and world.walls == "nearest_per_axis":
         found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
     plan = None if found else ground_plan(world)
-    free, height = (math.inf, 1.0) if found else _region(world, begin)
+    region, height = (None, 1.0) if found else _region(world, begin)
     found += [] if found else start_faults(world, begin, agents)
+    solid: list[Polygon] = []
     for number, corners in enumerate(world.obstacles):
         fault = polygon_fault(corners)
         if fault:
@@ -173,15 +175,19 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
         shape = Polygon(corners)
         if plan is not None and not plan.covers(shape):
             found.append(f"world.obstacles[{number}] reaches outside the arena")
-        free -= shape.area
+        solid.append(shape.buffer(begin.wall_clearance))
+    free = math.inf if region is None else region.difference(union_all(solid)).area
     if world.dimensions == "3":
         need = agents * math.pi / 6.0 * separation**3 / max(free * height, 1e-9)
     else:
         need = agents * math.pi / 4.0 * separation**2 / max(free, 1e-9)
     if not found and need > (JAMMED if world.dimensions == "2" else 0.35):
         found.append(
-            f"agents = {agents} do not fit at start.separation = {separation:g} m: they would cover {need:.0%} of the "
-            "region they start in; enlarge world.side, or lower agents or start.separation"
+            f"agents = {agents} do not fit at start.separation = {separation:g} m"
+            + (f" and start.wall_clearance = {begin.wall_clearance:g} m" if begin.wall_clearance else "")
+            + (f": they would cover {need:.0%} of" if free * height > 0.0 else ": no place is left in")
+            + " the region they start in; enlarge world.side, or lower agents or "
+            + ("start.separation or start.wall_clearance" if begin.wall_clearance else "start.separation")
         )
     if not found and world.arena == "none" and agents > 1 and begin.kind == "arena":
         found.append("world.arena = 'none' has no room to start in; give an arena, or start.kind = 'ball'")

@@ -40,7 +40,7 @@ class Geometry(NamedTuple):
     """What drivers read of world, start and goals: derived at set-up, m and m/s.
 
     half_*   : half sizes of the arena; extent_*: of the box about the origin from which starts are drawn
-    speed    : at the start; clearance: from what stands in the scene
+    speed    : at the start; clearance: from what stands in the scene; wall_clearance: from that, walls and obstacles
     goal_*   : radius in which a goal counts as reached, speed, spread, distance of a shepherd
     spacing_*, jitter : of a start formation
     """
@@ -54,6 +54,7 @@ class Geometry(NamedTuple):
     separation: float
     speed: float
     clearance: float
+    wall_clearance: float
     goal_radius: float
     goal_speed: float
     goal_spread: float

@@ -27,6 +27,7 @@ class Place(Map):
             look=reach_of_walls(scenario.model, scenario.parameters), casts=casts,
         )  # fmt: skip
         self.later, self.clearance = later.tolist(), scenario.start.clearance
+        self.wall_clearance = scenario.start.wall_clearance
         self.meshed = scenario.scene.kind == "mesh"
 
     @property
@@ -35,12 +36,12 @@ class Place(Map):
         return self._scene[0]
 
     def roomy(self, x: float, y: float, z: float) -> bool:
-        """Whether an agent may start here: inside the arena, at start.clearance from what stands in the scene."""
+        """Whether an agent may start here: start.wall_clearance off walls, start.clearance off the scene."""
         if self.shapes and bvh.nearest(x, y, z, self.clearance, *self._scene).distance < self.clearance:
             return False
         if self.meshed and inside(x, y, z, *self._scene) > 0.5:
             return False
-        return self.excursion(x, y, z) <= 0.0
+        return self.excursion(x, y, z) <= -self.wall_clearance
 
     def touches(self, a: State, b: State, radius: float) -> float:
         """1.0 if a sphere of this radius (m) met the scene on its way from a to b."""

@@ -28,14 +28,13 @@ from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
 from airflock.evolve.steps import Measured
 from airflock.evolve.study import make_study
-from airflock.metrics.registry import numbers_of
 from airflock.scenarios import formats
 from airflock.scenarios.change import variant
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import USUAL, Plan, plan_of
-from airflock.tune.start import start_of
+from airflock.tune.start import has_walls, start_of
 
 PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
     "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
@@ -209,9 +208,7 @@ def _mine(
 
 def usual_limits(scenario: Scenario) -> list[str]:
     """Collisions, and contacts where there are walls or obstacles, rarer than once in a hundred flock hours each."""
-    known = numbers_of(scenario.measures, scenario.metrics)
-    walls = scenario.world.arena != "none" or bool(scenario.world.obstacles)
-    contacts = ["clearance<0 at 0.01/h"] if walls and "clearance" in known else []
+    contacts = ["clearance<0 at 0.01/h"] if has_walls(scenario) else []
     return [f"r_min<{scenario.metrics.r_coll:g} at 0.01/h", *contacts]
 
 

@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
+from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import remade
 from airflock.scenarios.scaling import starting_set
 from airflock.scenarios.scenario import Scenario
@@ -16,10 +17,21 @@ def start_of(scenario: Scenario) -> tuple[Scenario, list[str]]:
 
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
+    values, told = _scaled(scenario)
+    away, why = _off_the_walls(scenario)
+    return remade(scenario, values | away) if values or away else scenario, [*told, *why]
+
+
+def has_walls(scenario: Scenario) -> bool:
+    """Whether its order parameters tell how near agents come to walls and obstacles, and some stand there."""
+    stand = scenario.world.arena != "none" or bool(scenario.world.obstacles)
+    return stand and "clearance" in numbers_of(scenario.measures, scenario.metrics)
+
+
+def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
+    """Numbers of the law, scaled to the speed of the scenario."""
     if scenario.model.name != SCALES:
-        return scenario, [
-            f"{scenario.model.name}: no scaling with the speed is published; its own values are the start"
-        ]
+        return {}, [f"{scenario.model.name}: no scaling with the speed is published; its own values are the start"]
     speed = float(scenario.parameters.v_flock)
     scaled: Mapping[str, Any] = tomllib.loads(starting_set(speed))["model"]
     given = scenario.document.get("model", {})
@@ -29,6 +41,19 @@ def start_of(scenario: Scenario) -> tuple[Scenario, list[str]]:
         if isinstance(entry, dict) and name not in given and name != "v_max"
     }
     if not values:
-        return scenario, ["all numbers of the law are given; they are the start"]
-    told = f"{len(values)} numbers of the law scaled to {speed:g} m/s, as Tables S1 and S3 of {SCALES} say"
-    return remade(scenario, values), [told]
+        return {}, ["all numbers of the law are given; they are the start"]
+    return values, [f"{len(values)} numbers of the law scaled to {speed:g} m/s, as Tables S1 and S3 of {SCALES} say"]
+
+
+def _off_the_walls(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
+    """Room at walls and obstacles when a flight begins: half of what agents have between them, at least r_coll.
+
+    Else the nearest that most flights come to a wall is where somebody was put at the start, whatever the law does.
+    """
+    drawn = scenario.start.kind in ("arena", "ball", "box")
+    room = max(float(scenario.metrics.r_coll), 0.5 * scenario.separation())
+    if not (has_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
+        return {}, []
+    return {"start.wall_clearance": room}, [
+        f"nobody starts nearer than {room:g} m to walls and obstacles (start.wall_clearance, which is not given)"
+    ]

@@ -43,6 +43,14 @@ class Parameters(Record):
     clearance: float = quantity(
         1.0, "m", low=0.0, high=1e3, source="our choice", meaning="free distance to what stands in the scene"
     )
+    wall_clearance: float = quantity(
+        0.0,
+        "m",
+        low=0.0,
+        high=1e3,
+        source="none in the authors' programs",
+        meaning="free distance to walls, obstacles and the scene; in a formation not asked",
+    )
     speed: float = quantity(
         0.0,
         "m/s",

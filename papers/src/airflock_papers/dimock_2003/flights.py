@@ -1,7 +1,7 @@
 """Flights of five birds: many controllers and starts, side by side on all cores."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
 from airflock_papers.dimock_2003.units import FOOT, Gains
-from airflock_papers.flights import Progress
+from airflock_papers.flights import Progress, with_changes
 
 V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
 
@@ -56,10 +56,11 @@ class Flight(NamedTuple):
 
 @dataclass
 class Birds:
-    """How flights are flown."""
+    """How flights are flown; changes : keys that are set in every flight, for `airflock_papers.breaks`."""
 
     threads: int | None = None
     progress: Progress | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(
         self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str | float
@@ -71,7 +72,7 @@ class Birds:
         chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
-            compile_for(base, record=True)  # compiled once, before threads ask for it
+            compile_for(with_changes(base, self.changes))  # once, before threads ask for it
         count = 0
 
         def done() -> None:
@@ -81,7 +82,7 @@ class Birds:
                 self.progress(title, count, len(tasks))
 
         def job(task: Task) -> Callable[[], Flight]:
-            return lambda: _flown(bases[task.start.flat], task)
+            return lambda: _flown(bases[task.start.flat], task, self.changes)
 
         return list(in_threads([job(task) for task in tasks], self.threads, done))
 
@@ -95,7 +96,7 @@ def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, 
     return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **model})
 
 
-def _flown(base: Scenario, task: Task) -> Flight:
+def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
     s = task.start
     box = s.kind == "box"
     begin = replace(
@@ -103,9 +104,8 @@ def _flown(base: Scenario, task: Task) -> Flight:
         jitter=s.jitter * FOOT, side=s.sx * FOOT if box else base.start.side,
         separation=s.sy * FOOT if box else None,
     )  # fmt: skip
-    found = fly(
-        replace(base, parameters=replace(base.parameters, **task.gains.si()), start=begin), task.seed, record=True
-    )
+    scenario = replace(base, parameters=replace(base.parameters, **task.gains.si()), start=begin)
+    found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
     assert found.frames is not None
     return Flight(found.values, found.frames)
 

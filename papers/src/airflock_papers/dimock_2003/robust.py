@@ -64,13 +64,19 @@ def compare(birds: Birds, winners: Sequence[Gains], count: int, quick: bool = Fa
     def fly(name: str, controller: Gains, **readings: Any) -> list[Flight]:
         return birds.fly(f"held out: {name}", held_out(controller, count), DURATION, NOISE, **readings)
 
-    flights = {"published": fly("published", BEST, centroid="n")}
+    flights = {"published": published(birds, count)}
     flights |= {name: fly(name, winner, centroid="others") for name, winner in names.items()}
     flights["robust"] = fly("robust", found, **SOUND)
     best = nondominated(tried)
     best = [best[k] for k in sorted({round(x) for x in np.linspace(0, len(best) - 1, 2 if quick else 8)})]
     again = [candidate(c.gains, fly("front", c.gains, **SOUND)[: max(count // 3, 6)]) for c in best]
     return Comparison(flights, list(names), found, tried, again)
+
+
+def published(birds: Birds, count: int) -> list[Flight]:
+    """Flights of the published gains on `count` held-out starts."""
+    tasks = held_out(BEST, count)
+    return birds.fly("held out: published", tasks, DURATION, NOISE, centroid="n")
 
 
 def held_out(controller: Gains, count: int) -> list[Task]:

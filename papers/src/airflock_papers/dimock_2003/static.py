@@ -15,8 +15,10 @@ from airflock.scenarios.files import load
 from airflock_papers import statistics
 from airflock_papers.claims import Measured
 from airflock_papers.dimock_2003.units import FOOT, FT_LBF, HORSEPOWER, both
+from airflock_papers.flights import Flights
 
 Places = NDArray[np.float64]
+ROUNDS = 40  # in which each bird may move by one cell
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,13 @@ def vee(n: int, sx: float, sy: float) -> Places:
     return np.column_stack([-rank * sx, side * rank * sy, np.zeros(n)])
 
 
-def descent(air: Air, places: Places, selfish: bool, rounds: int = 40) -> tuple[Places, float]:
+def column(n: int, sx: float, sy: float) -> Places:
+    """A line of n birds, one behind the other; spacings in m."""
+    rank = np.arange(n, dtype=float)
+    return np.column_stack([-rank * sx, rank * sy, np.zeros(n)])
+
+
+def descent(air: Air, places: Places, selfish: bool, rounds: int = ROUNDS) -> tuple[Places, float]:
     """Birds in turn move by one cell while that saves them 0.01 W (selfish) or everybody on average."""
     x = np.round(places / air.h) * air.h
     steps = [np.array(step) * air.h for step in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
@@ -108,9 +116,12 @@ def descent(air: Air, places: Places, selfish: bool, rounds: int = 40) -> tuple[
     return x, float(air.powers(x).mean())
 
 
-def measure() -> dict[str, float]:
-    """All static numbers, W per bird."""
-    wing = load("dimock_2003/published").wing
+def measure(flights: Flights) -> dict[str, float]:
+    """All static numbers, W per bird; birds that save for themselves start as the scenario does, and need K_d."""
+    scenario = flights.as_changed(load("dimock_2003/published"))
+    wing, aside = scenario.wing, scenario.start.spacing_y
+    formation = column if scenario.start.kind == "echelon" else vee
+    rounds = ROUNDS if scenario.parameters.k_d > 0.0 else 0
     air = Air(wing)
     five = {m: Air(wing, m) for m in (1, 5, 9, 10)}
     alone = np.zeros((1, 3))
@@ -121,7 +132,7 @@ def measure() -> dict[str, float]:
     found |= {"abreast": float(air.powers(tips).mean()), "munk": air.munk(tips)}
     starts = [tips, deep, vee(5, 2.5 * FOOT, wing.span), vee(5, 0.5 * FOOT, 5.5 * FOOT)]
     found["best"] = min(descent(air, start, selfish=False)[1] for start in starts)
-    selfish = [descent(air, vee(5, sx * FOOT, 6.5 * FOOT), selfish=True)[1] for sx in (2.5, 5.0, 7.5)]
+    selfish = [descent(air, formation(5, sx * FOOT, aside), True, rounds)[1] for sx in (2.5, 5.0, 7.5)]
     found["selfish"] = float(np.median(selfish))
     # one horseshoe a wing, off the grid: a control point may come as near to a filament as it likes
     row = np.array([(-2.5 * FOOT * i, 0.52 * wing.span * i, 0.0) for i in range(5)])

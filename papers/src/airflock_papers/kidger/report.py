@@ -43,6 +43,9 @@ def sections(readings_flown: pd.DataFrame, schemes: pd.DataFrame) -> tuple[Secti
         Section("readings.", "The reading of separation", f"{READINGS}\n\n{readings.shown(readings_flown)}"),
         Section("conduct.", "Collisions, and how boids behave", "Final set, 20 seeds; 120 s in each scene."),
         Section(
+            "only.", "One rule alone", "30 s in open air, 20 seeds, against boids without the rule on the same seeds."
+        ),
+        Section(
             "schemes.",
             "Five recombination schemes in a city and a forest",
             f"Ten boids, 120 s, 20 seeds, the final set; means.\n\n{_table(schemes)}",

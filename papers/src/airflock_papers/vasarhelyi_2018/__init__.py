@@ -2,15 +2,16 @@
 
 Parts: s2 (Table S2), fig1 (algorithm A against B), fig2 (range and delay), fig34 (outdoor flights), pressure (30 to
 1000 drones), tuning (what Tables S3 and S4 say of each parameter). Each part flies and measures; statements.toml says
-what the paper prints of it. And s1 (Table S1, the evolution itself), which takes hours and is flown only when it is
-asked for by name.
+what the paper prints of it. Flown only when they are asked for by name: s1 (Table S1, the evolution itself), which
+takes hours, and optima, the same sentences of the optima that ship.
 """
 
 from airflock_papers.paper import Paper, by_modules
-from airflock_papers.vasarhelyi_2018 import fig1, fig2, outdoor, pressure, table_s1, table_s2, tuning
+from airflock_papers.vasarhelyi_2018 import fig1, fig2, optima, outdoor, pressure, table_s1, table_s2, tuning
 
 MODULES = {
     "s1": table_s1,
+    "optima": optima,
     "s2": table_s2,
     "fig1": fig1,
     "fig2": fig2,
@@ -23,5 +24,5 @@ PAPER = Paper(
     __name__,
     ("s2", "fig1", "fig2", "fig34", "pressure", "tuning"),
     by_modules(MODULES),
-    long=("s1",),
+    long=("s1", "optima"),
 )

@@ -75,44 +75,40 @@ def fly(flights: Flights, runs: Mapping[int, int] = RUNS) -> Data:
 
 def measured(data: Data) -> list[Measured]:
     """Everything that is said of the evolution."""
-    found = [_exponent(data, name) for name in ("r0_rep", "v_shill")] if len(data.runs) > 2 else []
+    optima = {v: {name: runs[0].parameters[f"model.{name}"] for name in COLUMNS} for v, runs in data.runs.items()}
+    found = [exponent(optima, name) for name in ("r0_rep", "v_shill")] if len(optima) > 2 else []
     for v, runs in data.runs.items():
-        ours, theirs, best = data.ours[v], data.published[v], runs[0]
-        p = {name: best.parameters[f"model.{name}"] for name in COLUMNS}
-        gap, reach = float(ours["r_min_mean"].mean()), optimum(v).radio.range
-        at = f"{v} m/s"
+        best, at = runs[0], f"{v} m/s"
+        ranges = {name: _range(best, name) for name in COLUMNS}
+        luckiest = statistics.one(max(run.largest for run in runs))
         found += [
-            Measured(
-                f"s1.largest.{v}ms",
-                "fitness",
-                f"{at}, luckiest candidate",
-                statistics.one(max(run.largest for run in runs)),
-            ),
-            Measured(f"s1.mean.{v}ms", "fitness", at, statistics.mean(ours["fitness"])),
-            *gains(v, ours, theirs, data.refitted.get(v)),
-            Measured(
-                f"s1.soft.{v}ms",
-                "r0_rep over r_min_mean",
-                at,
-                statistics.one(p["r0_rep"] / gap),
-                f"r0_rep = {p['r0_rep']:.1f} m, nearest neighbours {gap:.1f} m apart",
-            ),
-            Measured(
-                f"s1.long.{v}ms",
-                "r0_frict over range",
-                at,
-                statistics.one(p["r0_frict"] / reach),
-                f"v_frict {p['v_frict'] / v:.2f} of v_flock",
-            ),
-            Measured(f"s1.twice.{v}ms", "v_shill over v_flock", at, statistics.one(p["v_shill"] / v)),
+            Measured(f"s1.largest.{v}ms", "fitness", f"{at}, luckiest candidate", luckiest),
+            *gains(v, data.ours[v], data.published[v], data.refitted.get(v)),
             Measured(f"s1.count.{v}ms", "evaluations above the mean", at, statistics.one(best.above, best.candidates)),
-            *(
-                Measured(f"s1.range.{name}.{v}ms", f"evolved {name}", at, statistics.one(p[name]), _range(best, name))
-                for name in COLUMNS
-            ),
+            *of_optimum(v, optima[v], data.ours[v], ranges),
             *([_alike(v, runs)] if len(runs) > 1 else []),
         ]
     return found
+
+
+def of_optimum(
+    v: int, p: Mapping[str, float], ours: pd.DataFrame, ranges: Mapping[str, str] | None = None
+) -> list[Measured]:
+    """What is said of one optimum: its parameters p, its flights, and a note on the working range of each."""
+    at, gap, reach = f"{v} m/s", float(ours["r_min_mean"].mean()), optimum(v).radio.range
+    apart = f"r0_rep = {p['r0_rep']:.1f} m, nearest neighbours {gap:.1f} m apart"
+    slack = f"v_frict {p['v_frict'] / v:.2f} of v_flock"
+    one = statistics.one
+    return [
+        Measured(f"s1.mean.{v}ms", "fitness", at, statistics.mean(ours["fitness"])),
+        Measured(f"s1.soft.{v}ms", "r0_rep over r_min_mean", at, one(p["r0_rep"] / gap), apart),
+        Measured(f"s1.long.{v}ms", "r0_frict over range", at, one(p["r0_frict"] / reach), slack),
+        Measured(f"s1.twice.{v}ms", "v_shill over v_flock", at, one(p["v_shill"] / v)),
+        *(
+            Measured(f"s1.range.{name}.{v}ms", f"evolved {name}", at, one(p[name]), (ranges or {}).get(name, ""))
+            for name in COLUMNS
+        ),
+    ]
 
 
 def gains(v: int, ours: pd.DataFrame, printed: pd.DataFrame, refitted: pd.DataFrame | None) -> list[Measured]:
@@ -141,11 +137,10 @@ def _range(best: Result, name: str) -> str:
     return f"our working range {low:.3g} to {high:.3g}"
 
 
-def _exponent(data: Data, name: str) -> Measured:
+def exponent(optima: Mapping[int, Mapping[str, float]], name: str) -> Measured:
     """Exponent of the flocking speed with which an evolved parameter grows; 1 is linear through 0."""
-    speeds = np.log(list(data.runs))
-    values = np.log([runs[0].parameters[f"model.{name}"] for runs in data.runs.values()])
-    fit = stats.linregress(speeds, values)
+    speeds = np.log(list(optima))
+    fit = stats.linregress(speeds, np.log([p[name] for p in optima.values()]))
     half = float(stats.t.ppf(0.975, len(speeds) - 2)) * fit.stderr
     value = statistics.Estimate(fit.slope, None, fit.slope - half, fit.slope + half, len(speeds))
     return Measured(f"s1.linear.{name}", f"exponent of {name}", "optima of all speeds", value)

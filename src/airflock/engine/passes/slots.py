@@ -24,11 +24,10 @@ def sorted_by_cells(plan: Plan) -> bool:
 
 def rearrange(build: Builder) -> None:
     """Function rearrange: moves all agents to where they were just sorted to; sums lend their memory meanwhile."""
-    body = [*opened(build), "kept = totals_[:n]"]
-    for table in ("work", "mem", "memory"):
-        rows = [f"lane = {table}[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
-        body += loop(f"c in range({table}.shape[0])", rows)
-    build.function("rearrange(n, work, mem, memory, cells)", body, "return 0", parallel=True)
+    rows = ["lane = table[c]", *_spread("kept[i] = lane[whose[i]]"), *_spread("lane[i] = kept[i]")]
+    build.function("put(n, table, kept, whose)", loop("c in range(table.shape[0])", rows), "return 0", parallel=True)
+    each = [f"put(n, {table}, kept, whose)" for table in ("work", "mem", "memory")]  # one function, compiled once
+    build.function("rearrange(n, work, mem, memory, cells)", [*opened(build), "kept = totals_[:n]", *each], "return 0")
 
 
 def _spread(line: str) -> list[str]:

@@ -41,11 +41,12 @@ def forget(metrics: tuple[Measured, ...], memory: Any, n: int) -> None:
 
 
 def record(step: int, first: int, flock: Flock, frames: Any, whole: Any, n: int, *, plan: Plan) -> None:
-    """Keep positions, velocities and commands as a frame, where a plan records: frames[frame, component, agent].
+    """Keep positions, velocities and commands as a frame, where there are any: frames[frame, component, agent].
 
-    The first frame is that of the first sample at or after the step `first`.
+    The first frame is that of the first sample at or after the step `first`. Whether a flight is recorded is asked of
+    its frames, not of its plan: the same driver then flies it with and without a recording.
     """
-    if plan.record:
+    if frames.shape[0] > 0:
         frame = step // whole.sample_every - (first + whole.sample_every - 1) // whole.sample_every
         for i in range(n):
             for part, row in enumerate((flock.position, flock.velocity, flock.command)):
@@ -155,7 +156,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
             held[3] = ONE
             following = step
             break
-        if (order["sample"] or plan.record) and step % whole.sample_every == 0:
+        if step % whole.sample_every == 0:
             for name in order["sample"]:
                 take(name, time, values, sums, stages=stages, sampled=sampled)
             record(step, first, flock, frames, whole, n, plan=plan)

@@ -1,0 +1,112 @@
+"""What one rule does by itself, boids out of sight of the others, and swarms that split in the plane.
+
+Alignment or cohesion alone is compared with boids that fly by none of the four rules, over the same seeds; gravity with
+boids without it. A straggler is a boid with nobody within `r_cohes`, the farthest that it sees others; its focus is the
+cosine between its heading and the way to the goal, while it is more than a second's flight away from it.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from xarray import Dataset
+
+from airflock.recordings.flights import simulate
+from airflock.scenarios.files import load
+from airflock.scenarios.scenario import Scenario
+from airflock.threads import in_threads
+from airflock_papers import statistics
+from airflock_papers.claims import Measured
+from airflock_papers.flights import Flights
+from airflock_papers.kidger.conduct import GOAL, OPEN, SHORT, STILL
+
+SEEDS = 20
+NONE = {**OPEN, **SHORT, **dict.fromkeys(("model.s_sep", "model.s_align", "model.s_cohes", "model.s_goal"), 0.0)}
+SCORED: dict[str, tuple[str, dict[str, Any]]] = {
+    "none": ("kidger/city", NONE),
+    "alignment": ("kidger/city", {**NONE, "model.s_align": 0.125}),
+    "cohesion": ("kidger/city", {**NONE, "model.s_cohes": 0.25}),
+    "plane": ("kidger/final_2d", {"metrics.r_cluster": 40.0}),
+    "plane without obstacles": ("kidger/final_2d", {**OPEN, "metrics.r_cluster": 40.0}),
+}
+RECORDED: dict[str, tuple[str, dict[str, Any]]] = {
+    "gravity": ("kidger/inspector", {**OPEN, **SHORT, "model.gravity": 3.0}),
+    "no gravity": ("kidger/inspector", {**OPEN, **SHORT, "model.gravity": 0.0}),
+    "low goal": ("kidger/city", {**STILL, **SHORT, "model.s_goal": 0.0625}),
+}
+FAST = 0.95  # quantile of the vertical speeds
+FAR = 60.0  # m, a second's flight at the speed limit
+
+
+class Flown(NamedTuple):
+    """Order parameters by (case, seed); measures by case and seed."""
+
+    scored: pd.DataFrame
+    recorded: dict[str, list[dict[str, float]]]
+
+
+def measures(recording: Dataset, sight: float) -> dict[str, float]:
+    """Measures of a recording; sight: how far boids see each other, m.
+
+    climb, fall : m/s, 95 % quantiles of the speeds upwards and downwards
+    focus       : focus of stragglers less that of the others; nan if there are none of either
+    """
+    velocity, position = (recording[name].values[:, :, 0, :].astype(float) for name in ("velocity", "position"))
+    rising = velocity[:, 2]
+    apart = np.linalg.norm(position[:, :, :, None] - position[:, :, None, :], axis=1)
+    alone = (apart < sight).sum(axis=2) == 1  # nobody but oneself: (time, boid)
+    away = np.asarray(GOAL)[None, :, None] - position
+    distance = np.linalg.norm(away, axis=1)
+    speed = np.linalg.norm(velocity, axis=1)
+    focus = (velocity * away).sum(axis=1) / np.maximum(speed * distance, 1e-9)
+    stragglers, others = (focus[which & (distance > FAR)] for which in (alone, ~alone))
+    both = stragglers.size and others.size
+    return {
+        "climb": float(np.quantile(np.maximum(rising, 0.0), FAST)),
+        "fall": float(np.quantile(np.maximum(-rising, 0.0), FAST)),
+        "focus": float(stragglers.mean() - others.mean()) if both else float("nan"),
+        "alone": float(alone.mean()),
+    }
+
+
+def fly(flights: Flights) -> Flown:
+    """Fly every case."""
+    seeds = flights.count(SEEDS, 4)
+    cases = {name: flights.as_changed(load(preset, keys)) for name, (preset, keys) in RECORDED.items()}
+
+    def job(scenario: Scenario, seed: int) -> Callable[[], dict[str, float]]:
+        return lambda: measures(simulate(scenario, seed), scenario.parameters.r_cohes)
+
+    scored = flights.score(
+        "One rule alone", {name: load(preset, keys) for name, (preset, keys) in SCORED.items()}, seeds
+    )
+    count = flights.counter("Gravity and stragglers", len(cases) * seeds)
+    rows = {n: list(in_threads([job(s, k) for k in range(seeds)], flights.threads, count)) for n, s in cases.items()}
+    return Flown(scored, rows)
+
+
+def measured(flown: Flown) -> list[Measured]:
+    """Differences on the same seeds."""
+    pairs = (
+        ("only.alignment", "polarisation", "alignment", "none"),
+        ("only.cohesion", "flocked", "cohesion", "none"),
+        ("tuning.split.plane", "n_clusters", "plane", "plane without obstacles"),
+    )
+    found = []
+    for name, column, a, b in pairs:
+        x, y = (flown.scored.loc[case, column] for case in (a, b))
+        note = f"{column} {x.mean():.3g} against {y.mean():.3g}"
+        found.append(Measured(name, column, f"{a} less {b}", statistics.mean(x - y), note))
+    for name, column in (("only.gravity", "climb"), ("only.gravity.fall", "fall")):
+        x, y = (np.array([row[column] for row in flown.recorded[case]]) for case in ("gravity", "no gravity"))
+        note = f"{column} {x.mean():.3g} m/s against {y.mean():.3g} m/s"
+        at = "open air, gravity of 3 m/s less none"
+        found.append(Measured(name, column, at, statistics.mean(x - y), note))
+    low = flown.recorded["low goal"]
+    focus = [row["focus"] for row in low if np.isfinite(row["focus"])]
+    note = f"{len(focus)} of {len(low)} flights have both; {np.mean([row['alone'] for row in low]):.0%} of boids alone"
+    if len(focus) > 1:
+        at = "open air, s_goal = 0.0625, stragglers less others"
+        found.append(Measured("tuning.stragglers", "focus on the goal", at, statistics.mean(focus), note))
+    return found

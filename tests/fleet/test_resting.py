@@ -1,0 +1,107 @@
+"""Rests on the real clock: ports are heard however late a life is, and neither a flood nor a lost line stops it."""
+
+import os
+import pty
+import socket
+import threading
+import time
+
+import pytest
+
+from airflock.onboard import ports as ports_module
+from airflock.onboard.ports import Place, Serial, Udp
+from airflock.onboard.resting import Rest, alone
+
+HOST = "127.0.0.1"
+
+
+@pytest.fixture
+def port():
+    found = Udp(Place((HOST, 0), None))
+    yield found
+    found.close()
+
+
+def test_a_life_that_is_late_hears_its_ports_at_each_rest(port):
+    heard, count = [], 5
+
+    def life():
+        hears = [(port, lambda data, now: heard.append((data, now)))]
+        for number in range(count):
+            port.send(bytes([number]), port.here)
+            yield Rest(time.monotonic() - 1.0, hears)
+            assert len(heard) == number + 1, "loopback delivers before it returns"
+        return "ended"
+
+    assert alone(life()) == "ended"
+    assert [data for data, _ in heard] == [bytes([number]) for number in range(count)]
+    assert [now for _, now in heard] == sorted(now for _, now in heard)
+
+
+def test_a_rest_ends_at_its_time_and_no_sooner(port):
+    def life():
+        for rest in (0.0, 0.003, 0.02):
+            until = time.monotonic() + rest
+            yield Rest(until)
+            assert time.monotonic() >= until
+
+    alone(life())
+
+
+def test_a_flood_is_read_in_portions(port, monkeypatch):
+    """Whoever sends faster than a node reads must not keep it from its tick."""
+    monkeypatch.setattr(ports_module, "MOST", 10)
+    for number in range(25):
+        port.send(bytes([number]), port.here)
+    portions = [[data[0] for data in port.read()] for _ in range(4)]
+    assert portions == [list(range(10)), list(range(10, 20)), list(range(20, 25)), []]
+
+
+def test_while_somebody_floods_a_port_a_life_goes_on(port):
+    over, ticks = threading.Event(), 5
+
+    def flood():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            while not over.is_set():
+                out.sendto(bytes(100), port.here)
+
+    def life():
+        hears = [(port, lambda data, now: None)]
+        for _ in range(ticks):
+            yield Rest(time.monotonic() + 0.01, hears)
+        return ticks
+
+    beside = threading.Thread(target=flood)
+    beside.start()
+    try:
+        assert alone(life()) == ticks
+    finally:
+        over.set()
+        beside.join()
+
+
+def test_a_serial_line_that_is_pulled_out_says_nothing_and_wakes_nobody():
+    master, slave = pty.openpty()
+    line = Serial(f"{os.ttyname(slave)}:57600", "serial:")
+    heard, looks = [], []
+    read = line.read
+
+    def counted():
+        looks.append(time.monotonic())
+        return read()
+
+    line.read = counted
+
+    def life():
+        hears = [(line, lambda data, now: heard.append(data))]
+        os.write(master, b"last words")
+        yield Rest(time.monotonic(), hears)
+        os.close(slave)
+        os.close(master)
+        for _ in range(20):
+            yield Rest(time.monotonic() + 0.002, hears)
+
+    alone(life())
+    line.close()
+    assert b"".join(heard) == b"last words"
+    assert len(looks) <= 4, "an end that is told again and again would take the whole processor"
