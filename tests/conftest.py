@@ -12,6 +12,12 @@ hypothesis.settings.load_profile("untimed")
 gc.set_threshold(100_000, 50, 50)  # a compilation makes millions of objects that stay: looking at them takes a tenth
 
 
+@pytest.hookimpl(wrapper=True, optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """One worker more than processors: some tests wait for processes of their own."""
+    return (yield) + 1
+
+
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=2018, help="seed of every random test")
     parser.addoption("--nightly", action="store_true", help="also run what .ci/nightly runs")

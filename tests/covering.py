@@ -66,7 +66,7 @@ PLANS = {
         "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "fixed_wing",
         "model.v_flock": 15.0, "start.speed": 15.0, "wind.east": 2.0, "radio.kind": "congestion",
         "radio.airtime": 0.02, "topology.kind": "nearest", "topology.k": 3,
-        "groups": [{"name": "a", "agents": [1, 4, 7], "model": {"kind": "viragh_2014", "v_flock": 14.0}}],
+        "groups": [{"name": "a", "agents": [1, 4], "model": {"kind": "viragh_2014", "v_flock": 14.0}}],
     }),
     "silo": ("viragh_2014", GNSS | {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,

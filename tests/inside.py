@@ -62,6 +62,7 @@ NAMES = {
     "layout_of": ("cuda.launch", "layout_of"),
     "head": ("cuda.primitives", "head"),
     "Forms": ("cuda.reciprocals", "Forms"),
+    "Across": ("cuda.rows", "Across"),
     "spelled": ("cuda.reciprocals", "spelled"),
     "with_reciprocals": ("cuda.reciprocals", "with_reciprocals"),
     "MOST_THREADS": ("cuda.shape", "MOST_THREADS"),

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import pytest
 
+import covering
 from needed import needed
 
 needed("numba_cuda")
 
 HERE = Path(__file__).resolve().parents[1] / "gpu"
 CASES = (
-    "paper", "split", "storm", "polygon", "silo", "links", "torus", "table", "couzin", "vicsek", "groups", "together",
-    "city", "herd", "stop", "display", "wings", "vee", "echelon", "weights", "crowded air", "shadow", "bursts",
-    "jitter", "seen", "species", "in turn",
+    *covering.PLANS, "split", "torus", "table", "couzin", "vicsek", "groups", "together", "city", "herd", "stop",
+    "display", "wings", "vee", "echelon", "weights", "jitter", "species", "in turn", "lonely", "leavers", "collided",
+    "herd leaves", "display fails", "wing fails", "in turn, fewer",
 )  # fmt: skip
 
 

@@ -1,7 +1,9 @@
 """Fleets in lock-step fly what the simulator flies, the same bits each time, and get home whatever fails."""
 
+import errno
 import io
 import math
+import os
 import socket
 import subprocess
 import sys
@@ -21,6 +23,7 @@ from airflock.fleet import compare
 from airflock.fleet.dice import OuterNoise, PacketDice, SensorDice
 from airflock.fleet.ether import Ether
 from airflock.fleet.faults import KINDS, Fault, read_faults
+from airflock.fleet.holding import GAIN, STOOD
 from airflock.fleet.individuals import sensors_of
 from airflock.fleet.lockstep import KEY
 from airflock.fleet.vehicle import Vehicle
@@ -376,6 +379,38 @@ def test_after_the_last_setpoint_a_vehicle_stops_within_its_time_out(kind, trave
     assert v.mode == ("LAND" if kind == "px4" else "OURS")
 
 
+@pytest.mark.parametrize(("kind", "mode"), [("px4", "LAND"), ("ardupilot", "HOLD"), ("px4", "PILOT")])
+def test_an_autopilot_holds_its_place_where_it_hovers_or_lands(kind, mode):
+    """It brakes from 4 m/s, and then is a damped spring in white noise: variance D τ² / gain along each axis."""
+    found, rng = scenario(1, noisy=True), np.random.default_rng(7)
+
+    def noise(step):
+        return tuple(rng.standard_normal(3).tolist())
+
+    v = Vehicle(kind, 1, Site(47.5, 19.0, 120.0), (0.0, 0.0, 0.0), found.vehicle, found.body, noise)
+    v.state, v.armed, v.mode = State(0.0, 0.0, 900.0, 4.0, 0.0, 0.0), True, mode
+    rows = []
+    for k in range(40_000):
+        v.step(0.01 * k, 0.01)
+        rows.append(v.state)
+    stood = next(k for k, s in enumerate(rows) if math.hypot(s.vx, s.vy) < STOOD)
+    assert 1.0 < rows[stood].x < 5.0
+    off = np.array([(s.x - rows[stood].x, s.y - rows[stood].y) for s in rows[stood:]])
+    assert np.mean(off**2) == pytest.approx(found.body.noise * found.body.tau**2 / GAIN, rel=0.25)
+    assert 900.0 - rows[-1].z == pytest.approx(400.0 if mode == "LAND" else 0.0, abs=60.0)
+
+
+def test_an_autopilot_does_not_hold_a_place_by_a_navigation_that_stands_still():
+    v = vehicle()
+    v.state, v.armed, v.mode = State(0.0, 0.0, 90.0, 0.0, 0.0, 0.0), True, "HOLD"
+    v.step(0.0, 0.01)
+    v.frozen = v.measured
+    v.state = v.state._replace(x=30.0)
+    assert v.wish() == (0.0, 0.0, 0.0)
+    v.frozen = None
+    assert v.wish() == pytest.approx((-1.0, 0.0, 0.0)), "back to its place, at most at a metre a second"
+
+
 @pytest.mark.parametrize(("action", "mode"), [(3, "RTL"), (4, "LAND"), (5, "HOLD")])
 def test_px4_does_what_its_parameter_says_when_setpoints_end(action, mode):
     v = vehicle()
@@ -491,3 +526,26 @@ def test_a_node_on_sockets_gets_ready_and_its_log_is_flown_again(tmp_path):
     ticks = list(replay(log.getvalue().splitlines(), made, KEY))
     assert ticks and all(tick.same for tick in ticks)
     assert (tmp_path / "memory").exists()
+
+
+def test_a_full_disk_does_not_bring_a_drone_down(tmp_path):
+    """Its log and its memory cannot be written any more: it says so, once for each, and ticks on."""
+
+    class Full(io.StringIO):
+        def write(self, text):
+            if self.tell() + len(text) > 2000:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return super().write(text)
+
+    ports, said, log = [open_port(f"udp:127.0.0.1:{number}") for number in free_ports(2)], [], Full()
+    begun = time.monotonic()
+    fly_node(
+        card(scenario(1, 60.0), members=[1]), 1, KEY, ports, tmp_path / "absent" / "memory", log, said.append,
+        until=lambda: len([s for s in said if "goes on" in s]) >= 2
+        or time.monotonic() - begun > 20.0,
+    )  # fmt: skip
+    for port in ports:
+        port.close()
+    told = [text for text in said if "goes on without it" in text]
+    assert len(told) == 2 and any("log" in t and "No space" in t for t in told) and any("memory" in t for t in told)
+    assert "ticks" in said[-1] and len(log.getvalue()) <= 2000

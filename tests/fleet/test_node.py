@@ -122,7 +122,7 @@ def test_a_neighbour_that_jumps_is_not_believed():
 
 
 @pytest.mark.parametrize("phase", [Phase.FLOCK, Phase.GOTO, Phase.MANUAL, Phase.LAND, Phase.HOLD, Phase.RETURN])
-def test_whom_it_lost_is_feared_less_if_its_last_packet_said_that_it_holds_or_returns(phase):
+def test_whom_it_lost_is_feared_less_if_its_last_packet_said_that_it_does_not_fly_with_the_flock(phase):
     """60 m away, 8 s ago: at twice the flock's 4 m/s it could be near by now, at half of that it could not."""
     found = scenario(3, **{"silence.rule": "stop"})
     made = document(found)
@@ -132,7 +132,7 @@ def test_whom_it_lost_is_feared_less_if_its_last_packet_said_that_it_holds_or_re
     said = Status(sent, (60.0, 0.0, 20.0), (0.0, 0.0, 0.0), 1.0, int(phase), True, card.mission, told_hash)
     node.radio(Signer(KEY, 2)(status.message(said, card.site), sent), 0.01)
     assert 1 in node.pilot.packets
-    assert node.pilot.lost_near(State(*(0.0,) * 6), 8.0) is (phase not in (Phase.HOLD, Phase.RETURN))
+    assert node.pilot.lost_near(State(*(0.0,) * 6), 8.0) is (phase in (Phase.FLOCK, Phase.GOTO, Phase.LAND))
 
 
 def order(do, private=PRIVATE, given=STARTED + 100_000, mission=7, sender=orders.OPERATOR, **more):

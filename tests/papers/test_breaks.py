@@ -9,9 +9,10 @@ import airflock_papers
 from airflock.errors import AirflockError
 from airflock_papers import breaks, quick, statistics
 from airflock_papers.claims import Measured
-from airflock_papers.flights import Flights, with_changes
+from airflock_papers.flights import Flights, scenario_keys, with_changes
 from airflock_papers.paper import Paper
-from airflock_papers.statements import Statement
+from airflock_papers.statements import Statement, read
+from airflock_papers.vasarhelyi_2018.optima import STOPS, evolved
 
 
 def statement(name: str, bound: str, changes: dict) -> Statement:
@@ -63,17 +64,43 @@ def test_a_change_sets_or_multiplies_what_a_scenario_has() -> None:
 def test_every_change_is_of_keys_that_scenarios_have(name: str) -> None:
     presets = {
         "kidger": "kidger/city", "vasarhelyi_2018": "vasarhelyi_2018/4ms", "zapotecatl_2016": "zapotecatl_2016/best",
+        "dimock_2003": "dimock_2003/published",
     }  # fmt: skip
+    searches = {"search.stops": set(STOPS), "search.generations": {1}}
     for found in breaks.load(f"airflock_papers.{name}").values():
         if found.breaks and found.breaks != breaks.EXCHANGED:
             before = airflock.load(presets[name])
-            after = with_changes(before, found.breaks)
-            for key, value in found.breaks.items():
+            keys = scenario_keys(found.breaks)
+            after = with_changes(before, keys)
+            assert all(found.breaks[key] in searches[key] for key in set(found.breaks) - set(keys)), found.id
+            for key, value in keys.items():
                 section, _, field = key.rpartition(".")
                 old, new = (
                     getattr(each.records[section] if section else each.flight, field) for each in (before, after)
                 )
-                assert new == (old * float(value[6:]) if str(value).startswith("times ") else value), found.id
+                wanted = old * float(value[6:]) if str(value).startswith("times ") else value
+                assert list(new) == wanted if isinstance(wanted, list) else new == wanted, found.id
+
+
+def test_a_search_that_stops_at_an_end_of_its_space_has_its_lowest_or_highest_numbers() -> None:
+    low, middle, high = (evolved(4, stops).parameters for stops in STOPS)
+    assert (low.r0_rep, middle.r0_rep, high.r0_rep) == pytest.approx((10.0, 35.0, 60.0))
+    assert evolved(4).parameters.r0_rep == pytest.approx(airflock.load("vasarhelyi_2018/evolved_4ms").parameters.r0_rep)
+
+
+def test_a_table_of_statements_fills_names_in_their_changes_too() -> None:
+    text = """
+    [[statement]]
+    id = "part.{v}"
+    kind = "ours"
+    statement = "at {v} m/s"
+    where = "here"
+    breaks = { "search.stops" = "{end}", "model.p_rep" = 0.0 }
+    each = [{ v = 4, end = "low" }, { v = 6, end = "high" }]
+    """
+    found = read(text, "a file")
+    assert found["part.4"].breaks == {"search.stops": "low", "model.p_rep": 0.0}
+    assert found["part.6"].breaks["search.stops"] == "high" and found["part.6"].statement == "at 6 m/s"
 
 
 def test_only_verdicts_that_differ_are_told() -> None:

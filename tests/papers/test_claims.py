@@ -1,7 +1,7 @@
 """Claims and statements: verdicts follow from bounds, and a bound looks where the quote says."""
 
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from airflock.errors import AirflockError
 from airflock_papers import PAPERS, bounds, statistics
 from airflock_papers.claims import Claim, Measured, judge, read_claims, verdict_of, write_claims
+from airflock_papers.renew import above, renewed, words
 from airflock_papers.statements import LONGEST, load, read
 
 ROOT = Path(__file__).parents[2] / "papers"
@@ -131,3 +132,29 @@ def test_claims_survive_a_file(tmp_path: Path) -> None:
     (tmp_path / "claims.toml").write_text(text, encoding="utf-8")
     with pytest.raises(AirflockError, match="its bound says 'not reproduced'"):
         read_claims(tmp_path / "claims.toml")
+
+
+def test_a_renewed_page_keeps_what_was_measured_and_judges_it_by_the_statements_as_they_stand() -> None:
+    statements = read(GENERATION, "a file")
+    name, statement = next(iter(statements.items()))
+    found = Measured(name, statement.quantity, statement.at, statistics.mean([0.7, 0.8, 0.9]), "by seed")
+    old = judge(statements, [found])
+    assert renewed(statements, old, [], "command") == old
+    stricter = {name: replace(statement, bound="ours > 0.95")}
+    again = renewed(stricter, old, [], "command")[0]
+    assert (again.verdict, again.ours, again.note, again.bound) == (
+        "not reproduced",
+        old[0].ours,
+        "by seed",
+        "ours > 0.95",
+    )
+    elsewhere = {name: replace(statement, at="generation 10, elsewhere")}
+    lost = renewed(elsewhere, old, [], "command")[0]
+    assert lost.ours is None and lost.command == "command" and lost.verdict == "not flown yet"
+
+
+def test_words_of_a_page_are_those_above_its_pictures_and_claims() -> None:
+    text = "# T\n\n`c` computes this page again. About it.\n\nMore.\n\n**3 sentences of the paper: 3.**\n\n"
+    text += "## One (a)\n\nWords.\n\n| a | b |\n\n![p](figures/p.png)\n\n| claim | x |\n\n## Two\n\n| claim | x |\n"
+    assert words(text, "One (a)") == "Words.\n\n| a | b |" and words(text, "Two") == words(text, "Three") == ""
+    assert above(text) == "About it.\n\nMore."

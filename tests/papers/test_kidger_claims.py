@@ -69,7 +69,7 @@ def test_measures_of_a_boid_that_turns_to_its_goal(sign):
 
 
 def test_an_unknown_part_is_refused_with_the_known_ones():
-    with pytest.raises(AirflockError, match=r"only = 'scheme': unknown part; known: readings, conduct, schemes"):
+    with pytest.raises(AirflockError, match=r"only = 'scheme': unknown part; known: readings, conduct, alone, schemes"):
         PAPER.run(only="scheme", progress=lambda *_: None)
 
 

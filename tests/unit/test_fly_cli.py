@@ -57,6 +57,11 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
     ):  # fmt: skip
         code, _, lines = airflock("fly", "prepare", REAL, *HERE, *more)
         assert code == 2 and any(part in line for line in lines), (more, lines)
+    code, _, lines = airflock(
+        "fly", "prepare", REAL, "--site", "47,190,0", "--members", "1-3,2", "--limit", "breake=2", "--autopilot", "naza"
+    )
+    for part in ("did you mean brake?", "longitude", "occurs twice", "none of px4, ardupilot"):
+        assert any(part in line for line in lines), (part, lines)
     code, _, lines = airflock("fly", "prepare", "dimock_2003/published", "--site", "47,19,0", "--members", "1-3")
     assert code == 2 and lines
     assert not list(tmp_path.iterdir())

@@ -101,6 +101,30 @@ def test_a_quiet_flock_is_predicted_exactly_by_its_own_law():
     assert settled.any() and np.abs(e[90:].transpose(0, 2, 1)[settled]).max() < 1e-6
 
 
+def test_errors_of_perception_alone_move_nobody():
+    """Who turns to the mean of all flies alike however blurred the places; a small radius takes others in."""
+    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    (own,), _ = candidates.scenarios_of(["vicsek_1995"], BOX)
+    law = candidates.candidate(own, scale_of([tracks]), 2)
+    walk, gains = Walk(law, tracks), Gains((1.0, 1.0), (1.0, 1.0), 0.0)
+    kept = np.zeros((len(tracks.seen), 4, tracks.individuals))
+
+    def apart(radius, blur):
+        numbers = {n.column: (NUMBERS | {"model.r": radius})[n.key] for n in law.numbers if n.key in NUMBERS}
+        walk.errors(numbers, gains, SPEED, None, kept)
+        flights = [
+            bootstrap.flown(
+                walk, (numbers, gains, SPEED), kept, bootstrap.Noise(bootstrap.BLURRED, sd, 0.0, 0.0), [0], 1
+            )
+            for sd in (blur, 0.0)
+        ]
+        end = tracks.spans[0][1]
+        return np.abs(tracks.nearest(flights[0].seen[end - 1] - flights[1].seen[end - 1])).max()
+
+    assert apart(2.0 * SIDE, 0.1) < 1e-9
+    assert apart(RADIUS, 0.1) > 1e-3 and apart(RADIUS, 0.0) == 0.0
+
+
 NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}
 
 

@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 
 from airflock.infer.candidates import Number
-from airflock.infer.fit import Fit, by_powers, climb, curvature, followed, loss_at, settle, spread
+from airflock.infer.fit import (
+    FINE,
+    WIDE,
+    Fit,
+    by_powers,
+    climb,
+    closed_end,
+    curvature,
+    followed,
+    loss_at,
+    open_ends,
+    settle,
+    spread,
+)
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, usual
 from airflock.infer.told import simplify, telling
@@ -148,3 +161,27 @@ def test_a_force_over_a_mass_is_one_number_however_far_it_is_moved():
     moved = by_powers(model, fit, followed(fit, curvature(model, fit, None), 1, 0.1), 1)
     assert moved == pytest.approx([fit.place[0] - fit.place[1] + 0.1, 0.1, fit.place[2]], abs=1e-9)
     assert model.score(moved).loss() == pytest.approx(model.score(fit.place).loss(), abs=1e-6)
+
+
+def test_a_bent_ridge_is_followed_by_fine_slopes():
+    """Wide slopes cut the corners of a ridge that bends, and a climb by them stops at once."""
+
+    def law(x, along, across):  # across is a wave of along, which is told ten times less
+        return 30.0 * (across - 0.5 - 0.2 * np.sin(20.0 * along)) * x + 3.0 * along * x**2
+
+    def ridge(along):
+        return np.array([along, 0.5 + 0.2 * np.sin(20.0 * along)])
+
+    model = Line(law, ("along", "across"), ridge(0.7))
+    best = climb(model, ridge(0.7), [0, 1], steps=40).loss
+    wide, fine = (climb(model, ridge(0.6), [0, 1], steps=40, slopes=ways) for ways in ((WIDE,), (WIDE, FINE)))
+    assert wide.loss > best + 50.0 and fine.loss < best + 10.0
+
+
+def test_a_limit_that_nobody_reaches_has_no_upper_end():
+    model = Line(lambda x, most, weight: np.minimum(weight * x, most), ("most", "weight"), (0.9, 0.5))
+    fit = climb(model, np.array([0.8, 0.5]), [0, 1])
+    below, above = open_ends(model, fit, [0])
+    assert below.tolist() == [False, False] and above.tolist() == [True, False]
+    edge = fit.place[0] - closed_end(model, fit, [0], 0, 0.0)
+    assert 0.4 < edge < 0.5  # the largest that the tracks ask for is 0.5

@@ -1,5 +1,6 @@
 """The Python names as a notebook uses them: names instead of scenarios, laws by name, seeds that can be one."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,10 @@ def test_names_and_files_fly_like_the_scenarios_that_they_stand_for(tmp_path):
     path = tmp_path / "short.toml"
     path.write_text('duration = 1.0\nagents = 4\n[model]\nkind = "vicsek_1995"\n')
     scenario = airflock.load(path)
-    assert airflock.score(path).equals(airflock.score(str(path))) and len(airflock.score(path)) == 1
-    assert airflock.score(path, [2]).equals(airflock.score(scenario, [2]))
-    assert airflock.simulate(path, 2).identical(airflock.simulate(scenario, 2))
+    score, simulate = (partial(door, device="python") for door in (airflock.score, airflock.simulate))
+    assert score(path).equals(score(str(path))) and len(score(path)) == 1
+    assert score(path, [2]).equals(score(scenario, [2]))
+    assert simulate(path, 2).identical(simulate(scenario, 2))
     for door in (airflock.score, airflock.simulate):
         with pytest.raises(ScenarioError, match="did you mean vasarhelyi_2018/4ms?"):
             door("vasarhelyi_2018/4m")

@@ -108,7 +108,7 @@ def test_a_recording_of_a_law_of_ones_own_is_scored_anywhere_without_it_and_flow
     (tmp_path / "sub" / "own.toml").write_text('duration = 2.0\nagents = 5\n[model]\nkind = "mine.py"\n')
     monkeypatch.chdir(tmp_path)
     scenario = airflock.load("sub/own.toml", trust=True)
-    file = airflock.save(airflock.simulate(scenario, 1), tmp_path / "sub.nc")
+    file = airflock.save(airflock.simulate(scenario, 1, device="python"), tmp_path / "sub.nc")
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "mine.py").write_text("raise ValueError('another law')\n")
     monkeypatch.chdir(tmp_path / "elsewhere")

@@ -1,10 +1,13 @@
 """A replacement in generated text that finds nothing to replace is an error that names the text."""
 
+import ast
+from types import SimpleNamespace
+
 import pytest
 
 from airflock.engine import plan_of
 from airflock.scenarios.files import load
-from inside import CudaBuilder, ReplacementError, must_replace
+from inside import Across, CudaBuilder, ReplacementError, must_replace
 from inside import cuda_cells as cells
 from inside import passes_driver as driver
 from inside import passes_grid as grid
@@ -52,3 +55,10 @@ def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(m
         driver.flight(plan)
     with pytest.raises(ReplacementError, match=r"integer\(j\)"):
         cells.crowd(plan)
+
+
+def test_a_variable_that_is_called_as_a_row_over_the_others_is_refused():
+    rows = Across(SimpleNamespace(across={"square": 3}))
+    assert ast.unparse(rows.visit(ast.parse("near = square[j] + far"))) == "near = across[3, i, j] + far"
+    with pytest.raises(ReplacementError, match="square: a variable of a stage has the name of a row"):
+        rows.visit(ast.parse("square = x * x"))

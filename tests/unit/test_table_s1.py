@@ -65,7 +65,10 @@ def test_printed_optima_show_both_surprises_and_lie_in_their_own_ranges():
         ours = flights(np.full(10, 0.8), r_min_mean=optimum(v).published["r_min_mean"][0])
         found = verdicts(data(v, ours, ours, [result(parameters(v))] * (3 if v <= 8 else 1)), v)
         assert found["s1.soft"].verdict == found["s1.long"].verdict == found["s1.twice"].verdict == "reproduced"
-        assert all(found[f"s1.range.{name}"].verdict == "reproduced" for name in table_s1.COLUMNS)
+        ranges = {name: found[f"s1.range.{name}"].verdict for name in table_s1.COLUMNS}
+        everything = {"p_frict", "a_frict"} if v == 4 else set()  # their printed range is all of the space
+        assert {name for name, verdict in ranges.items() if verdict == "not testable"} == everything
+        assert set(ranges.values()) <= {"reproduced", "not testable"}
 
 
 def test_hard_cores_short_alignment_and_values_out_of_range_are_told_apart():

@@ -5,6 +5,7 @@ of its part, or `sides = "exchanged"` for a difference that is taken the other w
 seeds, as they are and changed: the bound has to hold before and fail after.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -21,14 +22,16 @@ EXCHANGED = {"sides": "exchanged"}
 RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
 UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing
+UNMEASURED = "is not measured in the small form"  # it asks for more than a quick flight gives
+RESULTS = (RED, GREEN, UNSHOWN, UNMEASURED)
 
 
 class Break(NamedTuple):
     """One claim under its change.
 
-    id, part : of the claim; change : what was set, in words; result : turned red, still holds, or does not hold with
-    so few flights
-    ours, changed : the measured value as it is, and under the change
+    id, part : of the claim; change : what was set, in words; result : turned red, still holds, does not hold with so
+    few flights, or is not measured in the small form
+    ours, changed : the measured value as it is, and under the change; nan if it is not measured
     """
 
     id: str
@@ -78,7 +81,7 @@ def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights:
                 after = {key: replace(each, value=_mirrored(each.value)) for key, each in plain.items()}
             else:
                 after = _measured(paper, part, flights, changes)
-            found += [_broken(s, part, plain[s.id], after[s.id]) for s in members if s.breaks == changes]
+            found += [_broken(s, part, plain.get(s.id), after.get(s.id)) for s in members if s.breaks == changes]
     return found
 
 
@@ -110,8 +113,11 @@ def _different(found: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return list({in_words(changes): changes for changes in found}.values())
 
 
-def _broken(statement: Statement, part: str, plain: Measured, after: Measured) -> Break:
+def _broken(statement: Statement, part: str, plain: Measured | None, after: Measured | None) -> Break:
     """How a statement is judged as it is and under its change."""
+    if plain is None or after is None:
+        ours, changed = (each.value.ours if each else math.nan for each in (plain, after))
+        return Break(statement.id, part, in_words(statement.breaks), UNMEASURED, ours, changed)
     alone = {statement.id: statement}
     held, holds = (judge(alone, [each])[0].verdict == GOOD[statement.kind] for each in (plain, after))
     result = UNSHOWN if not held else GREEN if holds else RED

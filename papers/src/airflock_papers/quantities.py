@@ -15,6 +15,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "f_corr": ("F^corr",),
     "f_speed": ("F^speed",),
     "fitness": ("fitness", "F 0", "effect", "F^max"),
+    "joint p": (),
     "four partial fitnesses": ("partial fitnesses",),
     "share of the loss by f_coll": ("collisions",),
     "instants in range": ("distance",),
@@ -27,6 +28,9 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "agility": ("sluggish", "agility"),
     "reach": ("wall",),
     "top_speed": ("speed up", "speed"),
+    # what was said of the real drones (vasarhelyi_2018/real.py)
+    "wall term": ("interaction magnitudes at walls",),
+    "tolerated": ("tolerated",),
     # what evolution gives
     "r0_rep over r_min_mean": ("repulsion",),
     "r0_frict over range": ("alignment",),

@@ -84,7 +84,7 @@ def prepare(
     from airflock.fleet.prepare import card_document
     from airflock.mavlink.keys import write_key
     from airflock.mavlink.orders import new_keys
-    from airflock.onboard.card import write_card
+    from airflock.onboard.card import card_of, hash_of, write_card
     from airflock.onboard.safety import Safety
     from airflock.scenarios.files import load
 
@@ -95,6 +95,7 @@ def prepare(
     for path in (out, out.with_suffix(".key"), out.with_suffix(".operator")):
         if path.exists():
             faults.append(f"{path}: exists; a mission is never overwritten")
+    found, safety, known = None, {}, []  # type: ignore[var-annotated]
     with options.gathering(faults):
         found = load(scenario, options.settings(changes), trust=trust)
     with options.gathering(faults):
@@ -103,22 +104,25 @@ def prepare(
         for name in (name for name in safety if name not in known):
             near = get_close_matches(name, known, n=1, cutoff=0.5)
             faults.append(f"--limit {name}: is not a limit; {f'did you mean {near[0]}?' if near else ', '.join(known)}")
-    options.refuse(faults)
     private, public = new_keys()
-    document = card_document(
-        found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
-        expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
-        margin=margin, safety=safety,
-    )  # fmt: skip
-    loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits)
-    full = [
+    document: dict[str, Any] = {}
+    if found is not None:
+        with options.gathering(faults):
+            document = card_document(
+                found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
+                expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
+                margin=margin, safety={name: value for name, value in safety.items() if name in known},
+            )  # fmt: skip
+            card_of({**document, "hash": hash_of(document)}, str(out))
+    loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits) if document else []
+    faults += [
         f"{name} radio: {len(systems)} drones would take {share:.0%} of its time; at most {SHARE:.0%}: "
         f"lower the rate (--limit {key}=...) or raise --{name}-bits"
         for name, key, share in loads
         if share > SHARE
     ]
-    if full:
-        raise CardError(full)
+    if faults:
+        raise CardError(faults)
     files = (out, out.with_suffix(".key"), out.with_suffix(".operator"))
     try:
         made = write_card(files[0], document)

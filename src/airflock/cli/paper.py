@@ -88,9 +88,7 @@ def _breaks(name: str, only: str | None, seeds: int | None, threads: int | None,
     else:
         for row in rows:
             typer.echo(f"{row.id}: {row.result} with {row.change} ({row.ours:.4g}, then {row.changed:.4g})")
-        count = {
-            result: sum(row.result == result for row in rows) for result in (breaks.RED, breaks.GREEN, breaks.UNSHOWN)
-        }
+        count = {result: sum(row.result == result for row in rows) for result in breaks.RESULTS}
         typer.echo(", ".join(f"{number} {result}" for result, number in count.items()))
     if any(row.result == breaks.GREEN for row in rows):
         raise typer.Exit(1)

@@ -87,12 +87,6 @@ def no_room(scenario: Scenario, plan: Plan) -> str | None:
 
 def no_cuda(plan: Plan, agents: int) -> str | None:
     """Why a GPU cannot fly a plan with this many agents; None if it can."""
-    if plan.faults or plan.absence:
-        return "faults and agents that come and go fly on device = cpu or python"
-    if plan.silent:
-        return "silence.rule = 'stop' flies on device = cpu or python"
-    if plan.topology is not None:
-        return f"topology.kind = {plan.topology.name!r} flies on device = cpu or python"
     if agents <= MOST_TOGETHER:
         return None
     from airflock.engine.cuda.crowd import refused

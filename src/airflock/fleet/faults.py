@@ -1,6 +1,7 @@
 """Faults of a fleet: what goes wrong, for whom, and when; read from TOML, checked at once."""
 
 from dataclasses import dataclass, fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,8 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
     wrong = [f"{key} is not known; known: {', '.join(known)}" for key in table if key not in known]
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        wrong.append(f"kind = {kind!r} is none of {', '.join(KINDS)}")
+        near = get_close_matches(str(kind), KINDS, n=1)
+        wrong.append(f"kind = {kind!r} is none of {', '.join(KINDS)}{f'; did you mean {near[0]}?' if near else ''}")
     who = table.get("who", [])
     if not isinstance(who, list) or not all(w in members for w in who):
         wrong.append(f"who = {who!r}: give a list of members of {members[0]}-{members[-1]}")
@@ -79,8 +81,10 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
             wrong.append(f"{key} = {value!r} is not a number")
     if not wrong and kind in AMOUNTS:
         low, high = AMOUNTS[kind]
-        if not low <= numbers.get("amount", low - 1.0) <= high:
-            wrong.append(f"amount = {numbers.get('amount')} lies outside [{low:g}, {high:g}]")
+        if "amount" not in numbers:
+            wrong.append(f"amount is missing: {KINDS[kind]}; give it within [{low:g}, {high:g}]")
+        elif not low <= numbers["amount"] <= high:
+            wrong.append(f"amount = {numbers['amount']:g} lies outside [{low:g}, {high:g}]")
     if not wrong and numbers.get("begin", 0.0) >= numbers.get("end", 1e9):
         wrong.append("begin is not before end")
     return ([] if wrong else [Fault(str(kind), tuple(who), **numbers)]), wrong

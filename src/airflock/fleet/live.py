@@ -30,7 +30,7 @@ from airflock.scenarios.scenario import Scenario
 
 HOST = "127.0.0.1"
 WARM = 1.0  # s beyond the radio's delay for which all hover before the flight begins
-LOOK = 0.025  # s between two looks of a vehicle at its ports: twice as often as it tells its state
+LOOK = 0.02  # s; least time between two looks of a vehicle at its ports
 HOP = 0.01  # s between two looks of the ether
 BEAT = 0.5  # s between two calls of a vehicle at a port where nobody has answered yet
 SINCE = 60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
@@ -192,6 +192,11 @@ class Craft:
         self._node.write(made.frame_origin())
         self._show()
 
+    @property
+    def period(self) -> float:
+        """Time between two looks, s: as often as it tells what it tells most often."""
+        return max(LOOK, 1.0 / max(self.vehicle.rates.values()))
+
     def look(self) -> None:
         """Read what came, move up to now, and tell."""
         vehicle, plan, zero = self.vehicle, self.plan, self.plan.clock[0]  # once: the clock may be set meanwhile
@@ -244,10 +249,10 @@ def craft_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     began, craft = time.process_time(), Craft(plan, i)
     count, late, worst, due = 0, 0, 0.0, time.monotonic()
     while not plan.over:
-        behind = time.monotonic() - due
-        count, late, worst = count + 1, late + (behind > 0.5 * LOOK), max(worst, behind)
+        behind, period = time.monotonic() - due, craft.period
+        count, late, worst = count + 1, late + (behind > 0.5 * period), max(worst, behind)
         craft.look()
-        due = max(due + LOOK, time.monotonic() - LOOK)
+        due = max(due + period, time.monotonic() - period)
         yield Rest(due)
     return Life(craft.rows, [], Ticks(count, late, worst), Phase.DONE, time.process_time() - began)
 

@@ -3,7 +3,8 @@
 receive(bytes) takes frames and gives answers; telemetry(now) gives what is due; step(now, dt) moves it. Inside
 east-north-up, north-east-down only in frames. It keeps the autopilots' rules that matter to a node: PX4 enters
 OFFBOARD only after a second of setpoints and leaves it COM_OF_LOSS_T after the last; ArduPilot takes off by command,
-brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS.
+brakes GUID_TIMEOUT after the last setpoint, and acts FS_GCS_TIMEOUT after the last heartbeat of SYSID_MYGCS. Both hold
+their place where they hover or land by themselves.
 """
 
 import math
@@ -19,6 +20,7 @@ from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.fleet import telemetry
 from airflock.fleet.faults import Fault
+from airflock.fleet.holding import Holding
 from airflock.fleet.individuals import Faults
 from airflock.fleet.modes import HOLD, LAND, MODES, ON_LOSS, ON_SILENCE, OURS, PARAMETERS, PILOT, RTL, TAKEOFF
 from airflock.mavlink import dialect
@@ -66,7 +68,7 @@ class Vehicle:
         self.now, self.due, self.rates = 0.0, dict.fromkeys(telemetry.RATES, 0.0), dict(telemetry.RATES)
         self.error: tuple[float, ...] = (0.0,) * 6
         self.accuracy, self.motor, self.steps = 0.7, True, 0
-        self.lifting = False
+        self.lifting, self._holding = False, Holding()
         asked = asks(body.move, "move", body.name)
         for name in asked:
             if name not in GIVEN:
@@ -274,8 +276,10 @@ class Vehicle:
             action = int(self.parameters["FS_GCS_ENABLE"])
             if action and self.now - self.beat_at > self.parameters["FS_GCS_TIMEOUT"]:
                 self.mode = ON_SILENCE.get(action, RTL)
-        if self.mode == LAND:
-            return 0.0, 0.0, -SINK
+        if self.mode in (LAND, HOLD, PILOT):
+            at, self.lifting = self.navigated if self.frozen is None else None, False
+            return self._holding.velocity(at, -SINK if self.mode == LAND else 0.0)
+        self._holding.leave()
         if self.mode == RTL:
             dx, dy = self.home[0] - self.state.x, self.home[1] - self.state.y
             far = math.hypot(dx, dy)

@@ -13,26 +13,36 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import Fit, climb, settle, spread
+from airflock.infer.fit import FINE, Fit, climb, closed_end, open_ends, settle, spread
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, ENTERS, Tracks, restated
 from airflock.infer.walk import Walk
 
 Array = NDArray[np.float64]
-ROUNDS = (3, 10)  # flights of each round; the last gives the intervals
+ROUNDS = (3, 10)  # flights of each round, and of the last, which gives the intervals
+MOST = 6  # rounds
+LONGEST = 0.1  # of a range: move of a number that is put right, in one round
+MATCHED = 0.005  # sum of squares by which statistics of flights may differ from those of the tracks in the last round
 STEPS = 6  # of a climb
 FREE = 1e-9  # m²: least variance
 # Relative standard deviations of what flights leave out, of numbers and of noise, such as where steps of the motion
 # fall between frames. Measured on tracks of known laws (tests/nightly/infer.py).
 BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
+ONE = 1.96  # standard errors that hold one number in 95 %
+APART = 0.05  # of a range: largest standard deviation by which the laws of the last flights are apart
+SURE = 0.95  # of all numbers together
+PUSHED, BLURRED = -1, -2  # noise that is no number of the law or its body
+LASTING = 1.0  # s; correlation time of errors of what is perceived
+BLUR = 0.05  # of the distance to the nearest neighbour: first guess of these errors
 
 
 @dataclass(frozen=True)
 class Noise:
     """Noise of a flight and of its tracks.
 
-    law   : number of the law or its body that is noise (column), and its value; column -1: velocities are pushed
+    law   : number of the law or its body that is noise (column), and its value; PUSHED: SD of pushes of velocities,
+            m/s; BLURRED: SD of errors of perceived positions, m
     speed : SD of a period's change of own speed, m/s, where speeds are the individuals' own
     seen  : SD of a seen position, m
     """
@@ -61,16 +71,24 @@ def flown(walk: Walk, place: tuple, kept: Array, noise: Noise, spans: Sequence[i
     seen = np.full_like(tracks.seen, np.nan)
     own_speed = walk.law is not None and walk.law.heading
     columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
+    lasts = float(np.exp(-tracks.period / LASTING))
     for s in spans:
         begin, end = tracks.spans[s]
+        blur = generator.normal(0.0, noise.law, (axes, tracks.individuals)) if noise.column == BLURRED else None
         walk.begin(columns, world=(seed * 1009 + s + 1) % 2**31)
         for k in range(begin, end):
             state = tracks.state[k]
             if k > begin:
                 was = walk.now().copy()
-                if noise.column < 0:
+                if noise.column == PUSHED:
                     walk.rows[axes : 2 * axes, : len(state)] += generator.normal(0.0, noise.law, (axes, len(state)))
-                walk.fly(usual)
+                if blur is None:
+                    walk.fly(usual)
+                else:  # everybody decides by displaced positions, and moves from the true one
+                    blur = lasts * blur + np.sqrt(1.0 - lasts**2) * generator.normal(0.0, noise.law, blur.shape)
+                    walk.now()[:axes] += blur
+                    walk.fly(usual)
+                    walk.now()[:axes] -= blur
                 if own_speed:
                     speed = np.linalg.norm(was[axes:], axis=0)
                     new = usual + gains.keep * (speed - usual) + generator.normal(0.0, noise.speed, len(state))
@@ -146,8 +164,8 @@ class Flights:
         twin = Model(self.model.law, tracks, self.model.scale)
         return twin.fixed(sorted(self.model.held))
 
-    def noise(self, place: Array, first: Noise, fitted: Array) -> tuple[Noise, Array]:
-        """Noise with which the flights' statistics are those of the tracks; and how logarithms of noise move them.
+    def noise(self, place: Array, first: Noise, fitted: Array) -> tuple[Noise, Array, float]:
+        """Noise with which the flights' statistics are those of the tracks; how logarithms of noise move them; misfit.
 
         fitted : place at which statistics are taken, that of the fit to the tracks
         """
@@ -168,7 +186,7 @@ class Flights:
         steps[active] = np.clip(found.x, -8.0, 8.0)
         moves = np.zeros((len(self.wanted), 3))
         moves[:, active] = found.jac
-        return first.moved(steps), moves
+        return first.moved(steps), moves, 2.0 * float(found.cost)
 
 
 LADDER = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0)  # of the logarithm of noise
@@ -181,54 +199,74 @@ def again(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] 
     """
     fitted, free = fit.place, fit.free
     flights = Flights(model, fitted, spans)
-    noise = _first_noise(model, fitted, spans)
-    curved = spread(model, fit, spans)
-    place, number, refits = fitted.copy(), 1, np.zeros((0, len(fitted)))
+    kinds = _first_noise(model, fitted, spans)
+    curved, (below, above) = spread(model, fit, spans), open_ends(model, fit, spans)
+    for k in np.flatnonzero(below != above):  # a plateau has no curvature, its edge is an end
+        curved[k] = closed_end(model, fit, spans, int(k), 0.0 if above[k] else 1.0) / ONE
+    place, number, misses = fitted.copy(), 1, np.zeros((1, len(fitted)))
     noises: list[Array] = []
     named = [k for k in free if k < model.named]
-    for count in ROUNDS:
-        noise, moves = flights.noise(place, noise, fitted)
-        back = np.linalg.pinv(moves, rcond=1e-3)
+    generator = np.random.default_rng(len(flights.spans))
+    for turns in range(MOST):
+        matched = [flights.noise(place, each, fitted) for each in kinds]
+        kinds = [noise for noise, _, _ in matched]
+        # noise and numbers go together, as that of a heading and the limit of its turns: each is put right in turn
+        last = turns == MOST - 1 or (turns > 0 and min(off for _, _, off in matched) < MATCHED)
+        # how far fits miss depends on the law: the last flights are of laws as far apart as the first fits were
+        apart = np.minimum(np.maximum(curved, misses.std(axis=0)), APART) if len(misses) > 1 else np.zeros(len(fitted))
         found, noises = [], []
-        for _ in range(count):
+        for turn in range(ROUNDS[last]):
             number += 1
-            twin = flights.model_of(flights.tracks(place, noise, number))
-            refit = settle(twin, climb(twin, fitted, free, list(spans), STEPS, rough=True), list(spans)).place
-            found.append(refit)
-            noises.append(back @ (statistics(twin, refit, flights.spans) - flights.wanted))
+            noise, moves, _ = matched[turn % len(matched)]
+            law = place.copy()
+            law[named] = np.clip(law[named] + apart[named] * generator.normal(size=len(named)), 0.0, 1.0)
+            twin = flights.model_of(flights.tracks(law, noise, number))
+            refit = settle(twin, climb(twin, fitted, free, list(spans), STEPS, slopes=(FINE,)), list(spans)).place
+            found.append(refit - law)
+            noises.append(np.linalg.pinv(moves, rcond=1e-3) @ (statistics(twin, refit, flights.spans) - flights.wanted))
             say()
-        refits = np.array(found)
-        place[named] = np.clip(place[named] + fitted[named] - np.median(refits[:, named], axis=0), 0.0, 1.0)
+        misses = np.array(found)
+        moved = fitted[named] - np.median(misses[:, named], axis=0)
+        place[named] = np.clip(moved, place[named] - LONGEST, place[named] + LONGEST).clip(0.0, 1.0)
+        if last:
+            break
+    from scipy.stats import norm as normal
     from scipy.stats import t as student
 
-    count = len(refits)
-    wide = float(student.ppf(0.975, count - 1)) * np.sqrt(1.0 + 1.0 / count)
+    count, level = len(misses), 0.5 + 0.5 * SURE ** (1.0 / max(len(named), 1))
+    wide = float(student.ppf(level, count - 1)) * np.sqrt(1.0 + 1.0 / count)
     # half of what was put right is doubt about the noise, which is simpler in flights than in animals
-    scatter = np.maximum(wide * refits.std(axis=0, ddof=1), 1.96 * curved)
+    scatter = np.maximum(wide * misses.std(axis=0, ddof=1), float(normal.ppf(level)) * curved)
     ends = np.hypot(scatter, DOUBT * (place - fitted))
     slopes = [n.slope(float(x)) / max(n.value(float(x)), 1e-9) for n, x in zip(model.numbers, place, strict=True)]
-    ends = np.hypot(ends, 1.96 * BEYOND[0] / np.maximum(slopes, 1e-9))
-    law = np.array([steps[0] for steps in noises])
-    half = 1.96 * float(np.hypot(wide / 1.96 * law.std(ddof=1), BEYOND[1]))
-    middle = -float(np.median(law))
-    return Again(
-        place, place - ends, place + ends, noise.moved(np.array([middle, 0.0, 0.0])),
-        noise.law * float(np.exp(middle - half)), noise.law * float(np.exp(middle + half)),
-    )  # fmt: skip
+    ends = np.hypot(ends, ONE * BEYOND[0] / np.maximum(slopes, 1e-9))
+    low, high = place - ends, place + ends
+    low[below], high[above] = 0.0, 1.0
+    noise = flights.noise(place, kinds[0], fitted)[0]
+    shares = np.array([steps[0] for steps in noises])
+    shift = float(np.log(noise.law / kinds[0].law)) + float(np.median(shares))
+    half = float(np.hypot(np.hypot(wide * shares.std(ddof=1), ONE * BEYOND[1]), DOUBT * shift))
+    return Again(place, low, high, noise, noise.law * float(np.exp(-half)), noise.law * float(np.exp(half)))
 
 
-def _first_noise(model: Model, place: Array, spans: Sequence[int]) -> Noise:
-    """Noise to begin with: what the gains say of the noise of the tracks, and a guess of that of the flight."""
+def _first_noise(model: Model, place: Array, spans: Sequence[int]) -> list[Noise]:
+    """Noise to begin with, of each kind that there may be.
+
+    What the gains say of the noise of the tracks, and a guess of that of the flight.
+    """
     along, across = model.score(place, spans).variances()
     _, gains, usual = model.split(place)
     seen = float(np.sqrt(max((1.0 - gains.across[0]) * across, FREE)))
     period = model.tracks[0].period
     push = float(np.sqrt(max(across, FREE))) * gains.across[1] / period
-    column, law = -1, push
+    column, law = PUSHED, push
     assert model.law is not None
     if model.law.noises:
         number = model.law.noises[0]
         column, law = number.column, max(push / max(usual, 1e-6), 1e-3) if number.unit == "rad" else push
     elif model.law.body_noise >= 0:
         column, law = model.law.body_noise, max(push**2 / (2.0 * period), 1e-6)
-    return Noise(column, law, float(np.sqrt(max(along, FREE))) * gains.along[1] / period, seen)
+    found = Noise(column, law, float(np.sqrt(max(along, FREE))) * gains.along[1] / period, seen)
+    if column != PUSHED:
+        return [found]
+    return [found, replace(found, column=BLURRED, law=BLUR * model.scale.near)]

@@ -1,8 +1,9 @@
 """Fit: climb to the numbers of a law under which the next frame is least surprising.
 
 The likelihood is that of the walk (`likelihood`, `walk`). Gauss-Newton steps climb it from a place; `search` says from
-which. A weak prior (a standard deviation of half the range, on the scale that is sought) keeps flat directions in
-place.
+which. Slopes are taken by wide steps first, which look over what is rough, then by steps that change the likelihood by
+about as much as its standard errors do: wider ones cut the corners of a bent ridge. A weak prior (a standard deviation
+of half the range, on the scale that is sought) keeps flat directions in place.
 """
 
 import math
@@ -15,13 +16,19 @@ from numpy.typing import NDArray
 from airflock.infer.likelihood import Model, Score
 
 Array = NDArray[np.float64]
-PROBE = 0.02  # of a range: step by which slopes are taken; wider than what the tracks' noise blurs
+PROBE = 0.02  # of a range: step by which slopes are taken at first; wider than what the tracks' noise blurs
+SHOWN = 1.5  # standard errors, were all others known: steps by which slopes are taken then, and
+FINEST = 3e-4  # of a range: their least
 CLIMBS = 8  # Gauss-Newton steps
 LONGEST = 0.2  # of a range: largest move of a number in one step
 GAINED = 0.05  # loss; a step that gains less is the last
 SHORTER = 6  # times that a step which gains nothing is tried again, shorter
 STRIDES = (0.03, 0.01, 0.003)  # of a range: moves of one number at a time
-SIDES = ((PROBE, True), (PROBE, False), (PROBE / 8.0, False))  # slopes: step, and whether to one side only
+WORSE = 1.92  # loss that a number is worth: what 95 % of numbers that are not needed bring at most (Wilks 1938)
+HALVED = 10  # times that the way to an end is halved
+ON_THE_WAY = (1.0, 0.5, 0.2)  # to the end of a range: where is looked whether anything is explained worse
+WIDE, FINE, BOTH = 0, 1, 2  # how slopes are taken: wide or fine steps to one side, fine ones to both
+CAREFUL = (WIDE, FINE, BOTH)
 
 
 @dataclass
@@ -53,12 +60,15 @@ def jacobian(
     u: Array,
     free: Sequence[int],
     spans: Sequence[int] | None,
-    step: float = PROBE,
+    steps: Array | float = PROBE,
     here: Array | None = None,
 ) -> Array:
-    """Slopes of the differences (step, component, free number); to one side only where those at `u` are given."""
+    """Slopes of the differences (step, component, free number); to one side only where those at `u` are given.
+
+    steps : of all, or of each free number
+    """
     columns = []
-    for k in free:
+    for k, step in zip(free, np.broadcast_to(steps, len(free)).tolist(), strict=True):
         low, high = u.copy(), u.copy()
         if here is not None:
             high[k] += step if u[k] < 0.5 else -step
@@ -75,19 +85,20 @@ def climb(
     free: Sequence[int],
     spans: Sequence[int] | None = None,
     steps: int = CLIMBS,
-    rough: bool = False,
+    slopes: Sequence[int] = CAREFUL,
 ) -> Fit:
     """Gauss-Newton with damping (Levenberg-Marquardt) from a place, over the free numbers.
 
-    rough : slopes to one side only, which cost half; else, where these lead no further, to both sides and then finely
+    slopes : how they are taken; each way until it leads no further
     """
-    free, sides = list(free), iter(SIDES[:1] if rough else SIDES)
-    side = next(sides)
+    free, ways = list(free), iter(slopes)
+    way, probes = next(ways), np.full(len(free), PROBE)
     e, owner = model.differences(start, spans)
     score = model.tally(e, owner)
     fit, damping = Fit(start.copy(), free, score, score.loss() + prior(start, free)), 1e-3
     for _ in range(steps):
-        hessian, gradient = _normal(model, fit, spans, e, side)
+        hessian, gradient = _normal(model, fit, spans, e, PROBE if way == WIDE else probes, way != BOTH)
+        probes = _probes(hessian)
         gained = 0.0
         for _ in range(SHORTER):
             scaled = hessian + damping * np.diag(np.diag(hessian)) + 4.0 * np.eye(len(free))
@@ -103,10 +114,10 @@ def climb(
                 break
             damping = max(10.0 * damping, 1e-3)
         if gained < GAINED:
-            finer, damping = next(sides, None), 1e-3
+            finer, damping = next(ways, None), 1e-3
             if finer is None:
                 break
-            side = finer
+            way = finer
     return fit
 
 
@@ -126,23 +137,67 @@ def settle(model: Model, fit: Fit, spans: Sequence[int] | None) -> Fit:
                     if found >= lowest:
                         break
                     place, lowest = u, found
-    return climb(model, place, fit.free, spans, rough=True)
+    return climb(model, place, fit.free, spans, slopes=(FINE,))
 
 
 def spread(model: Model, fit: Fit, spans: Sequence[int]) -> Array:
     """Standard errors of all numbers, as shares of their ranges, by the curvature at a fit; 0 of those not fitted.
 
-    The prior is part of it: a number that the tracks do not tell has about half its range.
+    The larger of two: by wide slopes, which cut the corners of a bent ridge, and by fine ones, in which single pairs
+    show that a radius takes in or leaves out. The prior is part of it: a number that the tracks do not tell has about
+    half its range.
     """
     found = np.zeros(len(fit.place))
-    found[fit.free] = np.sqrt(np.diag(np.linalg.inv(curvature(model, fit, spans, SIDES[1]))))
+    each = [np.diag(np.linalg.inv(curvature(model, fit, spans, way))) for way in (WIDE, BOTH)]
+    found[fit.free] = np.sqrt(np.maximum(*each))
     return found
 
 
-def curvature(model: Model, fit: Fit, spans: Sequence[int] | None, side: tuple[float, bool] = SIDES[0]) -> Array:
+def open_ends(model: Model, fit: Fit, spans: Sequence[int]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Numbers for which the tracks set no lower, and no upper limit: on the whole way there nothing is explained worse.
+
+    Such as a largest force that nobody ever uses.
+    """
+    found = np.zeros((2, len(fit.place)), bool)
+    for k in [k for k in fit.free if k < model.named]:
+        for side, end in enumerate((0.0, 1.0)):
+            ways = fit.place[k] + np.array(ON_THE_WAY) * (end - fit.place[k])
+            found[side, k] = not any(_worse(model, fit, spans, k, x) for x in ways)
+    return found[0], found[1]
+
+
+def closed_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float) -> float:
+    """Distance of a place, towards an end of its range, beyond which the tracks are explained worse; others stay."""
+    near, far = 0.0, abs(end - float(fit.place[number]))
+    for _ in range(HALVED):
+        middle = 0.5 * (near + far)
+        worse = _worse(model, fit, spans, number, fit.place[number] + math.copysign(middle, end - fit.place[number]))
+        near, far = (near, middle) if worse else (middle, far)
+    return far
+
+
+def _worse(model: Model, fit: Fit, spans: Sequence[int], number: int, x: float) -> bool:
+    return model.score(_moved(fit.place, number, x), spans).loss() > fit.score.loss() + WORSE
+
+
+def _moved(place: Array, number: int, x: float) -> Array:
+    u = place.copy()
+    u[number] = x
+    return u
+
+
+def curvature(model: Model, fit: Fit, spans: Sequence[int] | None, way: int = WIDE) -> Array:
     """Second derivatives of the loss by the free numbers, with the prior."""
     e, _ = model.differences(fit.place, spans)
-    return _normal(model, fit, spans, e, side)[0] + 4.0 * np.eye(len(fit.free))
+    found = _normal(model, fit, spans, e, PROBE, True)[0]
+    if way != WIDE:
+        found = _normal(model, fit, spans, e, _probes(found), way != BOTH)[0]
+    return found + 4.0 * np.eye(len(fit.free))
+
+
+def _probes(hessian: Array) -> Array:
+    """Steps by which slopes are taken finely: so far that the likelihood changes by a little more than 1."""
+    return np.asarray(np.clip(SHOWN / np.sqrt(np.diag(hessian) + 4.0), FINEST, PROBE))
 
 
 def followed(fit: Fit, curved: Array, number: int, place: float) -> Array:
@@ -170,13 +225,12 @@ def by_powers(model: Model, fit: Fit, moved: Array, number: int) -> Array:
 
 
 def _normal(
-    model: Model, fit: Fit, spans: Sequence[int] | None, e: Array, side: tuple[float, bool]
+    model: Model, fit: Fit, spans: Sequence[int] | None, e: Array, steps: Array | float, one: bool
 ) -> tuple[Array, Array]:
-    """Curvature and slope of the loss, without the prior."""
-    step, one = side
+    """Curvature and slope of the loss, without the prior. one : slopes are taken to one side only."""
     along, across = fit.score.variances()
     weights = 1.0 / np.array([along, *[across] * (model.axes - 1)])
-    j = jacobian(model, fit.place, fit.free, spans, step, e if one else None)
+    j = jacobian(model, fit.place, fit.free, spans, steps, e if one else None)
     hessian = np.einsum("scf,c,scg->fg", j, weights, j, optimize=True)
     gradient = np.einsum("sc,c,scf->f", e, weights, j, optimize=True)
     return hessian, gradient

@@ -29,7 +29,10 @@ EDGE = 0.01  # of a range: nearer to its end nothing is told
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a law: value and 95 % interval; an end of it is None where the tracks set no limit."""
+    """A number of a law: value and interval; an end of it is None where the tracks set no limit.
+
+    The intervals of a law hold all its numbers together in 95 % of cases.
+    """
 
     key: str
     value: float

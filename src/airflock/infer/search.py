@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import Fit, climb, curvature, followed, loss_at
+from airflock.infer.fit import WIDE, Fit, climb, curvature, followed, loss_at
 from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
@@ -61,11 +61,11 @@ def race(
     places = [start, *(np.concatenate([x, start[model.named :]]) for x in begin[: RACE[0][0] - 1])]
     fits: list[Fit] = []
     for count, steps in RACE:
-        fits = [climb(model, u, simple, spans, steps, rough=True) for u in places[:count]]
+        fits = [climb(model, u, simple, spans, steps, slopes=(WIDE,)) for u in places[:count]]
         fits.sort(key=lambda each: each.loss)
         places = [each.place for each in fits]
         say()
-    return climb(model, fits[0].place, free, spans, rough=True)
+    return climb(model, fits[0].place, free, spans, slopes=(WIDE,))
 
 
 def scan(model: Model, place: Array, free: Sequence[int], spans: Sequence[int] | None) -> tuple[Array, bool]:
@@ -96,7 +96,7 @@ def profile(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None
                     continue
                 found = _lower(model, (followed(best, curved, k, x), _moved(best.place, k, x)), others, spans)
                 if found.loss < best.loss - BETTER:
-                    best = climb(model, found.place, fit.free, spans, 2 * FOLLOW, rough=True)
+                    best = climb(model, found.place, fit.free, spans, 2 * FOLLOW, slopes=(WIDE,))
                     curved = curvature(model, best, spans)
             say()
         if best.loss > before - BETTER:
@@ -112,4 +112,4 @@ def _moved(place: Array, number: int, x: float) -> Array:
 
 def _lower(model: Model, places: Sequence[Array], free: Sequence[int], spans: Sequence[int]) -> Fit:
     """A short climb from that of some places which begins lower."""
-    return climb(model, min(places, key=lambda u: loss_at(model, u, free, spans)), free, spans, FOLLOW, rough=True)
+    return climb(model, min(places, key=lambda u: loss_at(model, u, free, spans)), free, spans, FOLLOW, slopes=(WIDE,))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import CLIMBS, Fit, climb, settle
+from airflock.infer.fit import CLIMBS, WIDE, Fit, climb, settle
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, scan
 from airflock.infer.told import simplify, telling
@@ -65,7 +65,7 @@ def fit(
 
 def simpler(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit after a search along each number, without numbers that the others make up for."""
-    other = profile(model, climb(model, found.place, found.free, model.few(), rough=True), model.few(), say)
+    other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
     found = min(found, other, key=lambda each: each.loss)
     gone, place = simplify(model, found, say)
@@ -87,12 +87,12 @@ def free(model: Model) -> list[int]:
 def polish(model: Model, place: Array, steps: int = CLIMBS) -> Fit:
     """Climb on a few spans and on the sample, looking along each number's range in between."""
     few = model.few()
-    rough = climb(model, place, free(model), few, rough=True)
+    rough = climb(model, place, free(model), few, slopes=(WIDE,))
     for _ in range(3):
         place, better = scan(model, rough.place, free(model), few)
         if not better:
             break
-        rough = climb(model, place, free(model), few, rough=True)
+        rough = climb(model, place, free(model), few, slopes=(WIDE,))
     return climb(model, rough.place, free(model), sample(model), steps)
 
 
@@ -116,7 +116,7 @@ def hold_out(model: Model, fitted: Fit, say: Callable[[], None]) -> Held:
     surprise, inside, count = np.zeros(len(model.spans)), 0.0, 0
     for part in folds(model):
         rest = [k for k in spans if k not in set(part)] or [k for k in range(len(model.spans)) if k not in set(part)]
-        own = climb(model, fitted.place, fitted.free, rest, AGAIN, rough=True)
+        own = climb(model, fitted.place, fitted.free, rest, AGAIN, slopes=(WIDE,))
         along, across = own.score.variances()
         e, owner = model.differences(own.place, part)
         surprise[part] = model.tally(e, owner).surprise(along, across)[part]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import SIDES, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
+from airflock.infer.fit import BOTH, WIDE, WORSE, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
 from airflock.infer.likelihood import Model
 from airflock.infer.search import scan
 
@@ -14,7 +14,6 @@ DEPENDENT = 0.2  # share of a slope that the others do not explain, below which 
 LOOKS = 6  # best places at which is asked what a number does
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where is asked whether a number does anything
 FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
-WORSE = 1.92  # loss that a number is worth: what 95 % of numbers that are not needed bring at most (Wilks 1938)
 APART = 0.1  # of a range, from the default
 
 
@@ -73,7 +72,7 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
     its unit takes its part. Numbers of the body are tried where their default is none at all.
     """
     few = model.few()
-    best = climb(model, fit.place, fit.free, few, rough=True)
+    best = climb(model, fit.place, fit.free, few, slopes=(WIDE,))
     lowest, gone = best.loss, list[int]()
     for k in reversed(range(model.named)):
         number = model.numbers[k]
@@ -83,13 +82,13 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
         if number.low <= number.default <= number.high and abs(default - best.place[k]) < APART:
             continue
         without, rest = model.fixed([*gone, k]), [f for f in best.free if f != k]
-        moved = followed(best, curvature(model.fixed(gone), best, few, SIDES[-1]), k, default)
+        moved = followed(best, curvature(model.fixed(gone), best, few, BOTH), k, default)
         starts = [moved, by_powers(model, best, moved, k)]
         for other in (f for f in rest if f < model.named and model.numbers[f].unit == number.unit):
             starts.append(best.place.copy())
             starts[-1][other] = model.numbers[other].place(number.value(best.place[k]))
         start = min(starts, key=lambda u: loss_at(without, u, rest, few))
-        found = climb(without, scan(without, start, rest, few)[0], rest, few, rough=True)
+        found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
         say()
         if found.loss < lowest + WORSE:
             gone, best, lowest = [*gone, k], found, min(lowest, found.loss)

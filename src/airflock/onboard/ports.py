@@ -106,7 +106,7 @@ class Udp:
         while len(found) < MOST:
             try:
                 found.append(take(LONGEST))
-            except (BlockingIOError, ConnectionRefusedError):
+            except OSError:  # nothing more has arrived, or the network is down
                 break
         if self._answers and found:
             self._there = found[-1][1]

@@ -97,17 +97,17 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
 
 def _run(given: argparse.Namespace) -> int:
     card, key, ports = checked(given)
+    stem = f"{given.card.stem}-{given.member}"
+    memory_file = given.card.with_name(f"{stem}.memory")
+    log_file = given.log or given.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
     try:
         if given.check:
             sys.stdout.write(f"{given.card}: {card.name}, {len(card.members)} members, hash {card.hash[:8]}: fits\n")
             return 0
-        stem = f"{given.card.stem}-{given.member}"
-        memory_file = given.card.with_name(f"{stem}.memory")
-        log_file = given.log or given.card.with_name(f"{stem}-{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}.log")
         with open(log_file, "x", encoding="utf-8", buffering=1 << 16) as log:
             fly(card, given.member, key, ports, memory_file, log, say=_say)
     except OSError as fault:
-        raise LinkError(f"{fault.filename or 'a port'}: {fault.strerror}") from fault
+        raise LinkError(f"{fault.filename or log_file}: {fault.strerror}") from fault
     finally:
         for port in ports:
             port.close()
@@ -129,14 +129,26 @@ def fly(
     now, utc = time.monotonic(), time.time_ns() // 1000
     node = Node(card, member, key, now=now, utc=utc, memory=memory, radios=radios)
 
+    ended: set[str] = set()  # files that cannot be written any more
+
+    def kept(name: str, action: Callable[[], object]) -> None:
+        """Write to a file; where that fails, say it once and fly on: a full disk must not bring a drone down."""
+        if name in ended:
+            return
+        try:
+            action()
+        except OSError as fault:
+            ended.add(name)
+            tell(f"the {name} cannot be written any more: {fault.strerror}; the flight goes on without it")
+
     def write(line: str) -> None:
-        log.write(line + "\n")
+        kept("log", lambda: log.write(line + "\n"))
 
     logged = Logged(node, write, now=now, memory=memory, radios=radios)
 
     def save() -> None:
-        atomic.write(memory_file, memory_text(node.memory))
-        log.flush()
+        kept("memory", lambda: atomic.write(memory_file, memory_text(node.memory)))
+        kept("log", log.flush)
 
     def tell(note: str) -> None:
         say(f"{time.strftime('%H:%M:%S')} drone {member}: {note}")
@@ -144,7 +156,7 @@ def fly(
     try:
         ticks = alone(live(logged, ports, s.tick, tell, until, save))
     finally:
-        atomic.write(memory_file, memory_text(node.memory))
+        save()
     tell(f"{ticks.total} ticks, {ticks.late} of them late by more than half a period, at most {ticks.worst:.3f} s")
 
 

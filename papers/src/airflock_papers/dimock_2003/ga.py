@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.evolve.cmaes import CMAES
-from airflock.evolve.genetic import Bits, decode, genetic
+from airflock.evolve.genetic import decode, genetic
 from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task
 from airflock_papers.dimock_2003.units import Gains, gains
 
@@ -86,9 +86,10 @@ class Evolution:
         return [run.gains for run in self.runs["mean"]]
 
 
-def evolve(birds: Birds, quick: bool = False, by_chance: bool = False) -> Evolution:
-    """Three readings and CMA-ES, three seeds each; quick: one seed, few generations; by_chance: random parents."""
-    seeds, generations = (SEEDS[:1], 12) if quick else (SEEDS, GENERATIONS)
+def evolve(birds: Birds, quick: bool = False, until: int | None = None) -> Evolution:
+    """Three readings and CMA-ES, three seeds each; quick: one seed, few generations; until: so many instead."""
+    seeds, usual = (SEEDS[:1], 12) if quick else (SEEDS, GENERATIONS)
+    generations = until or usual
     count, title = 0, "evolution"
     total = len(seeds) * (len(READINGS) + 1)
 
@@ -100,27 +101,17 @@ def evolve(birds: Birds, quick: bool = False, by_chance: bool = False) -> Evolut
         return run
 
     runs = {
-        name: [told(with_genetic(birds, reading, seed, generations, by_chance)) for seed in seeds]
+        name: [told(with_genetic(birds, reading, seed, generations)) for seed in seeds]
         for name, reading in READINGS.items()
     }
     return Evolution(runs, [told(with_cmaes(birds, READINGS["mean"], run.seed, run.flown)) for run in runs["mean"]])
 
 
-def with_genetic(
-    birds: Birds, reading: Reading, seed: int, generations: int = GENERATIONS, by_chance: bool = False
-) -> Run:
-    """The paper's algorithm; the gradient holds the others' circulations, winners fly again with the full one.
-
-    by_chance : parents are drawn at random, whatever their fitness
-    """
+def with_genetic(birds: Birds, reading: Reading, seed: int, generations: int = GENERATIONS) -> Run:
+    """The paper's algorithm; the gradient holds the others' circulations, winners fly again with the full one."""
     run = Run(reading, seed)
     losses = losses_of(birds, run)
-
-    def told(bits: Bits) -> Points:
-        found = losses(decode(bits))
-        return np.zeros_like(found) if by_chance else found
-
-    genetic(told, 50, population=POPULATION, generations=generations, seed=seed)
+    genetic(lambda bits: losses(decode(bits)), 50, population=POPULATION, generations=generations, seed=seed)
     return _flown_again(birds, run)
 
 

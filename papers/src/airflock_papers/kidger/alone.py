@@ -33,7 +33,7 @@ SCORED: dict[str, tuple[str, dict[str, Any]]] = {
 RECORDED: dict[str, tuple[str, dict[str, Any]]] = {
     "gravity": ("kidger/inspector", {**OPEN, **SHORT, "model.gravity": 3.0}),
     "no gravity": ("kidger/inspector", {**OPEN, **SHORT, "model.gravity": 0.0}),
-    "low goal": ("kidger/city", {**STILL, **SHORT, "model.s_goal": 0.0625}),
+    "low goal": ("kidger/city", {**STILL, **SHORT, "model.s_goal": 0.0625, "start.side": 300.0}),
 }
 FAST = 0.95  # quantile of the vertical speeds
 FAR = 60.0  # m, a second's flight at the speed limit
@@ -107,6 +107,6 @@ def measured(flown: Flown) -> list[Measured]:
     focus = [row["focus"] for row in low if np.isfinite(row["focus"])]
     note = f"{len(focus)} of {len(low)} flights have both; {np.mean([row['alone'] for row in low]):.0%} of boids alone"
     if len(focus) > 1:
-        at = "open air, s_goal = 0.0625, stragglers less others"
+        at = "open air, start in a box of 300 m, s_goal = 0.0625, stragglers less others"
         found.append(Measured("tuning.stragglers", "focus on the goal", at, statistics.mean(focus), note))
     return found

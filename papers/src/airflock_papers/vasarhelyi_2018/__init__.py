@@ -1,28 +1,42 @@
 """Vásárhelyi et al., Science Robotics 3, eaat3536 (2018): optimised flocking of drones in confined environments.
 
 Parts: s2 (Table S2), fig1 (algorithm A against B), fig2 (range and delay), fig34 (outdoor flights), pressure (30 to
-1000 drones), tuning (what Tables S3 and S4 say of each parameter). Each part flies and measures; statements.toml says
-what the paper prints of it. Flown only when they are asked for by name: s1 (Table S1, the evolution itself), which
-takes hours, and optima, the same sentences of the optima that ship.
+1000 drones), tuning (what Tables S3 and S4 say of each parameter), real (shill agents of Table S4, wind). Each part
+flies and measures; statements.toml says what the paper prints of it. Flown only when they are asked for by name: s1
+(Table S1, the evolution itself), which takes hours; optima, the same sentences of the optima that ship; rounding, the
+search inside the digits of Table S1.
 """
 
 from airflock_papers.paper import Paper, by_modules
-from airflock_papers.vasarhelyi_2018 import fig1, fig2, optima, outdoor, pressure, table_s1, table_s2, tuning
+from airflock_papers.vasarhelyi_2018 import (
+    fig1,
+    fig2,
+    optima,
+    outdoor,
+    pressure,
+    real,
+    rounding_claims,
+    table_s1,
+    table_s2,
+    tuning,
+)
 
 MODULES = {
     "s1": table_s1,
     "optima": optima,
+    "rounding": rounding_claims,
     "s2": table_s2,
     "fig1": fig1,
     "fig2": fig2,
     "fig34": outdoor,
     "pressure": pressure,
     "tuning": tuning,
+    "real": real,
 }
 PAPER = Paper(
     "Vásárhelyi et al. 2018, Optimized flocking of autonomous drones in confined environments",
     __name__,
     ("s2", "fig1", "fig2", "fig34", "pressure", "tuning"),
     by_modules(MODULES),
-    long=("s1", "optima"),
+    long=("s1", "optima", "rounding", "real"),
 )

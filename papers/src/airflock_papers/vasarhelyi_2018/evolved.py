@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from airflock import atomic
@@ -25,6 +26,7 @@ GAIN = (
     "outside the printed ranges, 4 of them at 4 m/s (`s1.range.*`)."
 )
 TITLE = "Table S1 of Vásárhelyi et al. 2018, evolved again"
+SECTIONS = (Section("optima", "Optima and working ranges"),)
 
 
 def reproduce(
@@ -58,7 +60,7 @@ def write(folder: Path, claims: list[Claim], data: Data) -> None:
         ["Printed | ours [range of all evaluations that reach our optimum's mean fitness].", "", *_optima(data)]
     )
     told = f"studies 0, 1, ...; paired flights 0 to {pairs - 1}"
-    parts = (Section("optima", "Optima and working ranges", table),)
+    parts = [replace(each, words=table) for each in SECTIONS]
     page.write(folder, TITLE, COMMAND, claims, parts, about, told, ("evolved.toml", "EVOLVED.md"), more)
 
 

@@ -60,7 +60,8 @@ class Kept:
         self.path = path
         self.points: list[Point] = []
         if path.is_file():
-            self.points = [Point(*json.loads(line)) for line in read_text(path).splitlines()]
+            lines = map(json.loads, read_text(path).splitlines())
+            self.points = [Point(stage, key, tuple(x), rows) for stage, key, x, rows in lines]
 
     def find(self, stage: str, key: str) -> Point | None:
         """A point that was flown."""

@@ -20,10 +20,13 @@ from airflock.engine.replace import must_replace
 from airflock.rules.generate import law_mark
 
 STAGES = (
-    "snapshot", "perceive", "neighbours", "boundaries", "flock", "decide", "move", "aim_", "glide_", "appear_",
-    "measure_",
+    "snapshot", "perceive", "tune", "neighbours", "boundaries", "flock", "decide", "stop", "overrule", "move", "aim_",
+    "glide_", "appear_", "measure_",
 )  # fmt: skip
-WITHIN = ("noise", "gusts")  # stages that a kernel has within `move`, so that registers carry them over
+# Stages that a kernel has within others: in `move`, so that registers carry them over; in `neighbours`, whose rows of
+# one agent they read and write.
+WITHIN = {"noise": "move", "gusts": "move", "meet": "neighbours"}
+ACROSS = ("away0", "away1", "away2", "square", "hidden", "fade", "met", "heap", "weak")  # rows over the others
 REDUCED = 24  # totals that one stage reduces at once, at most
 
 
@@ -59,9 +62,12 @@ class CudaBuilder(Builder):
         self.letters: set[str] = set()
         self.bound: set[str] = set()
         self.names: set[str] = set()  # of every row, also of those that share another's
-        self.within: dict[str, list[str]] = {}
+        self.across: dict[str, int] = {}
+        self.within: dict[str, tuple[list[str], set[str], set[str]]] = {}
         self.forms = Forms(self.source.blocks, JIT)
         self.reciprocals: dict[tuple[str, str], None] = {}  # of numbers, that the kernel takes once
+        self.slots = plan.absence
+        self.order()
         self.head = head(plan.model.name, plan.bits, shape)
         self.plain = {node.name for node in parse(self.head) if isinstance(node, ast.FunctionDef)} | {
             "four_low",
@@ -73,10 +79,17 @@ class CudaBuilder(Builder):
     def bind(self, names: Iterable[str]) -> list[str]:
         """Rows are registers, or bound by the stage."""
         for name in names:
+            if name in ACROSS:
+                self.across.setdefault(name, len(self.across))
+                continue
             self.row(name)
             self.bound.add(name)
             self.names.add(name)
         return []
+
+    def order(self) -> list[str]:
+        """Numbers of agents are one more row, where those who are absent lie behind the others."""
+        return self.bind(["order"]) if self.slots else []
 
     def records(self, letters: str) -> list[str]:
         """Records of numbers are read once, by the kernel."""
@@ -106,15 +119,13 @@ class CudaBuilder(Builder):
         for body in bodies:
             lines += [body] if isinstance(body, str) else list(body)
         if name in WITHIN:
-            self.within[name] = lines
+            self.within[name] = lines, set(self.letters), set(self.bound)
         elif name.startswith(STAGES):
             self._stage(name, lines)
+            self.letters, self.bound = set(), set()
         else:
             self.plain.add(name)
             self.functions.append(f"{JIT}\ndef {head}:\n" + indent("\n".join(lines), "    "))
-            return
-        if name not in WITHIN:
-            self.letters, self.bound = set(), set()
 
     def once(self, lines: Iterable[str]) -> list[str]:
         """Lines that one thread of the block runs."""
@@ -141,11 +152,13 @@ class CudaBuilder(Builder):
         """Shared tables: `truth`, what agents are, and `said`, what the others hear; by row."""
         plan = self.plan
         found = {a: ("truth", c) for c, a in enumerate(plan.axes)}
-        table = "said" if plan.late else "truth"
+        table = "said" if plan.late or plan.suffers("sense", "tell") else "truth"
         found |= {f"h{name}": (table, c) for c, name in enumerate(plan.motion)}
-        if plan.grouped:
-            found["group"] = ("truth", 1 + max(c for table, c in found.values() if table == "truth"))
-        return found
+        more = ["group"] * plan.grouped + ["order"] * plan.absence
+        first = 1 + max(c for table, c in found.values() if table == "truth")
+        found |= {name: ("truth", first + c) for c, name in enumerate(more)}
+        tuned = ["reach_out", "reach_in"] * bool(plan.suffers("radio")) + ["clock"] * bool(plan.suffers("clock"))
+        return found | {name: ("tuned", c) for c, name in enumerate(tuned)}
 
     def kind(self, letter: str, fields: tuple[str, ...]) -> str:
         """Name of the record of numbers behind a letter; a kernel reads those of all laws."""
@@ -177,12 +190,16 @@ class CudaBuilder(Builder):
         return name == "move" and plan.dimensions == 2 and self.wants(plan.body.move, "move", "gx", "gy", "gz")
 
     def _stage(self, name: str, lines: list[str]) -> None:
-        rows = self.names | {"u0", "u1", "u2", "u3"}
-        statements = parse(self.prepared(name, self._with_parts(lines) if name == "move" else lines))
         of_all = name.removesuffix(self.mark)  # each law has such a stage
+        lines = self._with_parts(of_all, lines)
+        rows = self.names | {"u0", "u1", "u2", "u3"}
+        statements = parse(self.prepared(name, lines))
         turn = self.plan.sequential and of_all in ("neighbours", "boundaries", "decide", "move")
         context = Context(self.shape, rows, self.columns(), turn=turn, carried=name == "move")
-        context.cells, context.exact = self.cells(), name.startswith("measure_")
+        context.cells, context.across = self.cells(), self.across
+        context.exact = name.startswith("measure_") or bool(
+            self.across
+        )  # nobody says whom an agent beyond the last met
         context.alone = name == "appear_" or (name == "aim_" and self.plan.herd)
         body = lowered(statements, context)
         body = [_Renamed(self).visit(s) for s in body]
@@ -195,11 +212,12 @@ class CudaBuilder(Builder):
             body = [*parse(reciprocal_lines(numbers)), *body]
         self._add(name, body, context.rows)
 
-    def _with_parts(self, lines: list[str]) -> list[str]:
-        """Lines of `move` with those of the noise and the gusts in place of their calls."""
-        for name, part in self.within.items():
-            lines = in_place(lines, name, part)
-        self.within = {}
+    def _with_parts(self, stage: str, lines: list[str]) -> list[str]:
+        """Lines of a stage with those that it holds in place of their calls, such as the noise in `move`."""
+        for name, (part, letters, bound) in self.within.items():
+            if WITHIN[name] == stage:
+                lines = in_place([line for text in lines for line in text.splitlines()], name, part)
+                self.letters, self.bound = self.letters | letters, self.bound | bound
         return lines
 
     def _add(self, name: str, body: list[ast.stmt], rows: set[str]) -> None:
@@ -232,13 +250,13 @@ class CudaBuilder(Builder):
 
     def bound_rows(self, read: set[str]) -> set[str]:
         """Rows of the table that a stage takes by name."""
-        return {name for name in read if name in self.bound}
+        return {name for name in read if name in self.bound or (name == "order" and self.slots)}
 
 
 def shared_noise(lines: list[str]) -> list[str]:
     """The threads of an agent draw the noise of different steps, and hand it round when its step comes (in a plane)."""
     lines = must_replace(lines, "if step % 2 == 0:", "if step % (2 * PER_AGENT) == 0:")
-    lines = must_replace(lines, "(i, step // 2,", "(i, step // 2 + sub,")
+    lines = must_replace(lines, " step // 2,", " step // 2 + sub,")
     for number in (2, 3):
         (line,) = (line for line in lines if line.endswith(f" if step % 2 == 0 else g{number}"))
         name = line.partition(" = ")[0]

@@ -11,7 +11,7 @@ from airflock.engine.cuda.kernel import ARGUMENTS
 # dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words
 KINDS = dict(zip(ARGUMENTS, (
     "2r", "2i", "3r", "3r", "3i", "3r", "3r", "2r", "2i", "3r", "3r", "3r", "4r", "4r", "3r", "3u", "3r", "3r", "1s",
-    "3r", "3r", "2r", "4r", "3r", "1i",
+    "3r", "3r", "2r", "4r", "3r", "1i", "4r", "3i", "3r",
 ), strict=True))  # fmt: skip
 
 

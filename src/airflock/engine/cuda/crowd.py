@@ -41,6 +41,10 @@ def refused(plan: Plan, agents: int) -> str | None:
         return "cells need at least 1000 agents, a model of finite reach and perception without noise or delay"
     if plan.columns:
         return "one big flock with groups flies on cpu"
+    if plan.faults or plan.absence:
+        return "one big flock with faults, or whose agents leave, flies on cpu"
+    if plan.topology is not None:
+        return f"one big flock with topology.kind = {plan.topology.name} flies on cpu"
     if owners(plan):
         return f"{plan.model.name} or its order parameters solve for the whole flock"
     if plan.start in FORMATIONS and not plan.given_start:

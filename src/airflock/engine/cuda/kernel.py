@@ -2,6 +2,7 @@
 
 from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import CudaBuilder
+from airflock.engine.cuda.individuals import begin_faults
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
 from airflock.engine.cuda.state import memory
@@ -16,7 +17,7 @@ from airflock.engine.stages.words import START, ZERO
 ARGUMENTS = (
     "rows", "wholes", "all_faces", "all_edges", "all_spans", "all_shapes", "all_later", "nodes", "links", "all_goals",
     "starts", "owns", "pasts", "stores", "works", "all_words", "all_mem", "all_memory", "statuses", "states",
-    "all_sums", "all_reached", "all_frames", "scratches", "scratch_rows",
+    "all_sums", "all_reached", "all_frames", "scratches", "scratch_rows", "all_across", "all_due", "all_hits",
 )  # fmt: skip
 
 
@@ -52,7 +53,10 @@ def _time(build: CudaBuilder) -> list[str]:
     if heard:
         lines += ["to_hear = integer((decide_every - delay % decide_every) % decide_every)"]
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
-    step = ["time = real(step) * row_c.dt"]
+    lines += ["begun = integer(0)"] * bool(plan.faults)
+    step = ["time = real(step) * row_c.dt", *begin_faults(build)]
+    if plan.absence:  # an instant of one of several agents, or of none, is not counted
+        step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
     for event in ORDER:
         step += PARTS[event](build)
     # counted by hand in 32 bits: a range counts in 64, twice
@@ -119,7 +123,11 @@ def _look(build: CudaBuilder) -> list[str]:
     """Whether to look for collisions: while nobody can have come near enough, a vote of all threads says no."""
     watched = _within(build) is not None
     vote = "cuda.syncthreads_or(integer(1) if moved >= gap else integer(0)) != 0" if watched else "True"
-    body = [f"look = {vote}", "to_collide = collide_every", "count_collision = integer(count_collision + 1)"]
+    body = [
+        f"look = {vote}",
+        "to_collide = collide_every",
+        f"count_collision = integer(count_collision + {_one(build)})",
+    ]
     if watched:
         body += branch("not look and not calm", [*_forget(build), "calm = True"])
     return ["look = False", *branch("to_collide == 0", body), "to_collide = integer(to_collide - 1)"]
@@ -158,9 +166,10 @@ def _shown(build: CudaBuilder) -> list[str]:
 def _perceived(build: CudaBuilder) -> list[str]:
     """Both errors advance; what the others hear goes into the shared table."""
     lines = ["slot = slot_out", build.stages["perceive"].call()]
-    said = {row: c for row, (table, c) in build.columns().items() if table == "said"}
-    if said and build.shape.registers:
-        lines += branch("i < n and sub == 0", [f"said[i, {c}] = {row}_i" for row, c in said.items()])
+    lines += [build.stages["tune"].call(k_="k")] if "tune" in build.stages else []
+    told = [f"{table}[i, {c}] = {row}_i" for row, (table, c) in build.columns().items() if table in ("said", "tuned")]
+    if told and build.shape.registers:
+        lines += branch("i < n and sub == 0", told)
     return lines
 
 
@@ -169,6 +178,8 @@ def _choose(build: CudaBuilder) -> list[str]:
     barrier = [] if build.shape.registers else ["cuda.syncthreads()"]
     lines = []
     for name in order(build.plan)["decide"][1:]:
+        if name == "tune":
+            continue  # told to the others before they meet
         lines += [build.stages[name].call(k_="k"), *barrier]
     lines += ["k = integer(k + 1); to_decide = decide_every"]
     return [*lines, "slot_out = integer(slot_out + 1) if slot_out + 1 < slots else integer(0)"]
@@ -185,12 +196,13 @@ def _looked(build: CudaBuilder) -> list[str]:
 def _taken(build: CudaBuilder) -> list[str]:
     """One sample: order parameters and, where they are kept, positions, velocities and commands."""
     plan = build.plan
-    lines = ["to_sample = sample_every", "count_sample = integer(count_sample + 1)"]
+    lines = ["to_sample = sample_every", f"count_sample = integer(count_sample + {_one(build)})"]
     if order(plan)["sample"]:
         lines += [build.stages["measure_sample"].call(), *_added(build, "sample")]
     if plan.record:
         names = [*plan.motion, *(f"c{a}" for a in plan.axes)]
-        body = [f"all_frames[block, frame, {c}, i] = {own(build, name)}" for c, name in enumerate(names)]
+        who = _number(build)
+        body = [f"all_frames[block, frame, {c}, {who}] = {own(build, name)}" for c, name in enumerate(names)]
         lines += [*agents(build, body), "frame = integer(frame + 1)"]
     return lines
 
@@ -203,7 +215,18 @@ def _added(build: CudaBuilder, clock: str) -> list[str]:
             add = f"totals[{c}, 0], totals[{c}, 1] = add_exactly(totals[{c}, 0], totals[{c}, 1], value{c})"
             kept = f"totals[{c}, 0] = {'least' if how == 'min' else 'most'}(totals[{c}, 0], value{c})"
             lines += [add if how in ("mean", "sum") else kept]
-    return branch("tid == 0", lines) if lines else []
+    counted = "tid == 0 and counted != 0" if build.plan.absence else "tid == 0"
+    return branch(counted, lines) if lines else []
+
+
+def _one(build: CudaBuilder) -> str:
+    """What an instant counts."""
+    return "counted" if build.plan.absence else "1"
+
+
+def _number(build: CudaBuilder) -> str:
+    """Number of the agent of this thread."""
+    return f"integer({own(build, 'order')})" if build.slots else "i"
 
 
 def _advance(build: CudaBuilder) -> list[str]:
@@ -221,11 +244,14 @@ def _advance(build: CudaBuilder) -> list[str]:
 
 def _end(build: CudaBuilder) -> list[str]:
     """What a flight leaves behind."""
-    lines = agents(build, [f"states[block, {c}, i] = {own(build, name)}" for c, name in enumerate(build.plan.motion)])
+    who = _number(build)
+    left = [f"states[block, {c}, {who}] = {own(build, name)}" for c, name in enumerate(build.plan.motion)]
+    lines = agents(build, left)
     count = len(columns(build.plan.metrics))
     last = [f"all_sums[block, {c}, {h}] = totals[{c}, {h}]" for c in range(count) for h in range(2)]
     last += [
         f"all_sums[block, {count}, 0] = real(count_sample)",
         f"all_sums[block, {count + 1}, 0] = real(count_collision)",
+        *[f"all_sums[block, {count + 2}, 0] = real(least(step, steps))"] * build.plan.absence,
     ]
     return [*lines, *branch("tid == 0", [*last, "statuses[block] = 0"])]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.cpu import Flown
+from airflock.engine.cuda.individuals import due, presence
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
 from airflock.engine.cuda.shape import Shape
@@ -113,7 +114,7 @@ def arrays(
     """All arguments of a kernel, in the GPU's memory, by name."""
     cuda, real = runtime(), jobs[0].row.dtype
     size = sizes(plan, driver.ROWS, shape, _largest(jobs))
-    written = ("pasts", "works", "states", "all_sums", "all_frames", "scratches")
+    written = ("pasts", "works", "states", "all_sums", "all_frames", "scratches", "all_across")
     own: dict[str, Any] = {name: cuda.device_array((len(jobs), *size[name]), real) for name in written}
     own["all_words"] = cuda.device_array((len(jobs), *size["all_words"]), np.uint32)
     own["statuses"] = cuda.to_device(np.full(len(jobs), -1, np.int32))
@@ -127,6 +128,10 @@ def arrays(
     }
     for name, one in beginning.items():
         own[name] = cuda.to_device(np.repeat(one[None, : size[name][0]], len(jobs), axis=0))
+    own |= {name: cuda.to_device(array) for name, array in due(plan, jobs, real).items()}
+    if plan.absence:  # who is absent has no place
+        for name in ("states", "all_frames"):
+            own[name] = cuda.to_device(np.full((len(jobs), *size[name]), np.nan, real))
     own["owns"] = cuda.to_device(np.stack([_wide(t.own, size["owns"], real) for t in jobs]))
     if plan.laws:
         own["all_mem"] = cuda.to_device(np.stack([_remembered(plan, t, size["all_mem"], real) for t in jobs]))
@@ -166,9 +171,14 @@ def results(plan: Plan, jobs: Sequence[Tables], own: dict[str, Any]) -> list[Flo
             plan, left["all_reached"][flock][: len(tables.goals)] if plan.goals else tables.goals
         )
         frames = left["all_frames"][flock][:, :, :n] if plan.record else None
-        if frames is not None and plan.stop:
-            frames = frames[: int(sums[count])]
-        found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock])))
+        absent, samples = None, int(sums[count])
+        if plan.absence:
+            flown = int(sums[count + 2])
+            values["present"], absent = presence(tables, flown)
+            samples = -(-flown // tables.integers["sample_every"])
+        if frames is not None and plan.stop and (not plan.absence or flown < tables.integers["steps"]):
+            frames = frames[:samples]
+        found.append(Flown(values, frames, left["states"][flock][:, :n].copy(), int(left["statuses"][flock]), absent))
     return found
 
 

@@ -12,7 +12,7 @@ The passes of `engine.passes` are the only text of a stage. Here its syntax tree
 import ast
 import re
 
-from airflock.engine.cuda.rows import Bound, Context, Everyone, Halves, Others, Registers, parse
+from airflock.engine.cuda.rows import Across, Bound, Context, Everyone, Halves, Numbers, Others, Registers, parse
 from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.dead import read, written
@@ -25,7 +25,8 @@ TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most
 def lowered(statements: list[ast.stmt], context: Context) -> list[ast.stmt]:
     """Statements of a stage as one thread runs them."""
     kept = [Bound(context).visit(Halves().visit(s)) for s in statements]
-    return _Totals(context).run([s for s in kept if s is not None])
+    done = _Totals(context).run([Numbers().visit(s) for s in kept if s is not None])
+    return [ast.fix_missing_locations(Across(context).visit(s)) for s in done]
 
 
 class _Totals:
@@ -120,6 +121,9 @@ class _Pairs:
         for statement in statements:
             if isinstance(statement, ast.For) and _target(statement) == "j":
                 done += self.pairs(statement)
+            elif isinstance(statement, ast.Expr) and self.context.shape.per_agent > 1:  # one call for all its threads
+                alone = ast.If(ast.parse("sub == 0", mode="eval").body, [statement], [])
+                done += [*parse("cuda.syncthreads()"), alone, *parse("cuda.syncthreads()")]
             elif isinstance(statement, ast.If) and _by_law(statement):
                 statement.body = self.walk(statement.body)
                 done.append(statement)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from airflock.engine.cuda.build import ACROSS
 from airflock.engine.cuda.shape import Shape, shape_of
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners, scratch_sizes
@@ -16,7 +17,7 @@ SHARE = 0.9  # of the free memory that may be used
 
 def layout_of(plan: Plan, agents: int, flocks: int, processors: int = 132) -> Shape:
     """Layout of flocks of one plan and size."""
-    whole, apart = bool(owners(plan)), bool(plan.laws)
+    whole, apart = bool(owners(plan)), bool(plan.laws) or plan.topology is not None
     return shape_of(agents, flocks, processors, sequential=plan.sequential, whole=whole, apart=apart)
 
 
@@ -36,10 +37,11 @@ def sizes(plan: Plan, rows: int, shape: Shape, tables: Tables) -> dict[str, tupl
         "all_mem": (max(model, 1), lanes) if table or plan.laws else (1, 1),
         "all_memory": (max(kept, 1), lanes) if table else (1, 1),
         "states": (2 * dims, n),
-        "all_sums": (len(columns(plan.metrics)) + 2, 2),
+        "all_sums": (len(columns(plan.metrics)) + 2 + plan.absence, 2),
         "all_reached": (max(len(tables.goals), 1),),
         "all_frames": (whole["steps"] // whole["sample_every"] + 1, 3 * dims, n) if plan.record else (1, 1, 1),
         "scratches": scratch_of(plan, tables)[0],
+        "all_across": (len(ACROSS), lanes, lanes) if plan.topology is not None else (1, 1, 1),
     }
 
 

@@ -158,6 +158,7 @@ def with_reciprocals(
     records : names of the records of numbers that the stage reads
     """
     roots = {name for s in body for item in ast.walk(s) if (name := root_name(item)) is not None}
+    roots -= {name for s in body for item in ast.walk(s) for name in stored_otherwise(item)}
 
     def known(expression: ast.expr) -> str | None:
         text = ast.unparse(expression)
@@ -186,6 +187,14 @@ def single_root(rule: ast.FunctionDef) -> ast.expr | None:
     if len(rule.body) != 1 or not isinstance(last, ast.Return) or not isinstance(last.value, ast.Call):
         return None
     return last.value.args[0] if ast.unparse(last.value.func) == "math.sqrt" else None
+
+
+def stored_otherwise(node: ast.AST) -> set[str]:
+    """Names that a statement stores, if it does not assign the root of a square: their reciprocal is not at hand."""
+    if not isinstance(node, (ast.Assign, ast.AugAssign, ast.For)) or root_name(node) is not None:
+        return set()
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+    return {item.id for target in targets for item in ast.walk(target) if isinstance(item, ast.Name)}
 
 
 def root_name(node: ast.AST) -> str | None:

@@ -1,10 +1,11 @@
 """Rows of agents, as the text of a stage names them, in the hands of one thread: registers and shared tables."""
 
 import ast
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 from airflock.engine.cuda.shape import Shape
+from airflock.engine.replace import ReplacementError
 
 PER_AGENT_TABLES = {"mem": "mem", "memory": "kept"}  # second index is the agent
 
@@ -21,6 +22,7 @@ class Context:
     cells    : lines around a pair loop over cells, from outside in, instead of one loop over all pairs
     exact    : an unrolled pair loop meets nobody beyond the last agent (who would be far away)
     alone    : loops that keep one agent of all (the farthest, say) are run in full by every thread
+    across   : rows over the others that each agent has to itself, and their places in the table that holds them
     """
 
     shape: Shape
@@ -31,6 +33,7 @@ class Context:
     alone: bool = False
     exact: bool = False
     cells: tuple[str, ...] = ()
+    across: Mapping[str, int] = field(default_factory=dict)
 
 
 def parse(lines: Iterable[str] | str) -> list[ast.stmt]:
@@ -65,6 +68,41 @@ class Halves(ast.NodeTransformer):
         return node
 
 
+class Numbers(ast.NodeTransformer):
+    """Numbers of agents, which a table of reals holds, as whole numbers."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """An element of a row or table."""
+        self.generic_visit(node)
+        if isinstance(node.value, ast.Name) and node.value.id == "order":
+            return ast.Call(ast.Name("integer", ast.Load()), [node], [])
+        return node
+
+
+class Across(ast.NodeTransformer):
+    """Rows over the others that each agent has to itself: `square[j]` of agent i lies at across[c, i, j]."""
+
+    def __init__(self, context: Context):
+        self.places = context.across
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """An element of a row or table."""
+        if isinstance(node.value, ast.Name) and node.value.id in self.places:
+            self.generic_visit(node.slice)
+            place = [ast.Constant(self.places[node.value.id]), ast.Name("i", ast.Load()), node.slice]
+            return ast.Subscript(ast.Name("across", ast.Load()), ast.Tuple(place, ast.Load()), node.ctx)
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """A name. Raises ReplacementError for a variable that is called as a row is."""
+        if node.id not in self.places:
+            return node
+        if isinstance(node.ctx, ast.Store):
+            raise ReplacementError(f"{node.id}: a variable of a stage has the name of a row over the others")
+        return ast.parse(f"across[{self.places[node.id]}, i]", mode="eval").body
+
+
 class Others(ast.NodeTransformer):
     """Rows of another agent: columns of the shared tables."""
 
@@ -80,7 +118,7 @@ class Others(ast.NodeTransformer):
                 table, column = self.context.columns[name]
                 pair = ast.Tuple([ast.Name("j", ast.Load()), ast.Constant(column)], ast.Load())
                 return ast.Subscript(ast.Name(table, ast.Load()), pair, node.ctx)
-            if name not in self.context.rows:
+            if name not in self.context.rows and name not in self.context.across:
                 return ast.Name(f"{name}_j", node.ctx)  # known of this pair alone
         return node
 

@@ -61,7 +61,8 @@ def shape_of(
 
     sequential : one agent after another
     whole      : some rule solves for the whole flock, which one thread does
-    apart      : agents fly by several laws: threads of one warp part there, so none hands another a sum
+    apart      : agents fly by several laws, where threads of one warp part, so that none hands another a sum; or each
+                 ranks those whom it hears, which one thread does
     """
     lanes = -(-agents // WARP) * WARP
     if sequential:  # one agent after another: a warp shares its pairs

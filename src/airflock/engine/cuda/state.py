@@ -21,6 +21,8 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += ["faces = all_faces[block]; edges = all_edges[block]; spans = all_spans[block]"]
     lines += ["goals = all_goals[block]; reached = all_reached[block]; past = pasts[block]; store = stores[block]"]
     lines += ["differing = owns[block]"]
+    lines += _across(build)
+    lines += ["due = all_due[block]; hits = all_hits[block]"] if plan.faults else []
     lines += ["later = all_later[block]; shapes = all_shapes[block % all_shapes.shape[0]]"]
     lines += [*numbers(build), "late = real(delay) * row_c.dt"]
     kind, align = f"np.float{plan.bits}", "" if shape.simulated else ", alignment=16"
@@ -32,6 +34,8 @@ def memory(build: CudaBuilder) -> list[str]:
     else:
         lines += ["work = works[block]; words = all_words[block]; mem = all_mem[block]; memory = all_memory[block]"]
     lines += [f"reduced = cuda.shared.array((2, WARPS, {REDUCED}), {kind})"]
+    lines += [f"moved_up = cuda.shared.array(THREADS, {kind})"] if plan.absence and shape.registers else []
+    lines += ["found = cuda.shared.array(1, np.int32)"] if plan.absence else []
     count = len(columns(plan.metrics))
     lines += [f"totals = cuda.shared.array(({max(count, 1)}, 2), {kind})"]
     parts = 5 if plan.dryden else 3
@@ -42,6 +46,15 @@ def memory(build: CudaBuilder) -> list[str]:
     lines += [f"aim[{c}] = goals[0, {c}]" for c in range(3)] if plan.goals else []
     lines += [f"scene = ({', '.join(SCENE)})"]
     return [*lines, *_scratch(plan), *_registers(build)]
+
+
+def _across(build: CudaBuilder) -> list[str]:
+    """Rows over the others that each agent has to itself; zeros, as not every flight has what fills each of them."""
+    if not build.across:
+        return []
+    rows = loop("c in range(across.shape[0])", loop("j in range(across.shape[2])", ["across[c, e, j] = ZERO"]))
+    zeros = loop("e in range(tid, across.shape[1], THREADS)", rows)
+    return ["across = all_across[block]", *zeros, "cuda.syncthreads()"]
 
 
 def _scratch(plan: Plan) -> list[str]:
@@ -63,13 +76,21 @@ def numbers(build: CudaBuilder) -> list[str]:
     """Integers and records of numbers of this world, once per kernel."""
     wide = {"seed_low": "u32", "seed_high": "u32"}
     lines = [f"{'slots' if w == 'ring' else w} = {wide.get(w, 'integer')}(whole[{c}])" for c, w in enumerate(WHOLE)]
-    return [*lines, "n = agents", *build.numbers(build.plan.records, "row_"), *reciprocal_lines(build.reciprocals)]
+    return [
+        *lines,
+        "n = agents",
+        *["m = n"] * bool(build.across),
+        *build.numbers(build.plan.records, "row_"),
+        *reciprocal_lines(build.reciprocals),
+    ]
 
 
 def _registers(build: CudaBuilder) -> list[str]:
     """First values of all registers; the memories of model and metrics at their start values."""
     lines = []
-    for name in sorted({r for stage in build.stages.values() for r in (*stage.arguments, *stage.results)}):
+    names = {r for stage in build.stages.values() for r in (*stage.arguments, *stage.results)}
+    names |= {"order_i"} if build.slots and build.shape.registers else set()
+    for name in sorted(names):
         if re.fullmatch(r"u[0-3]_i", name):
             lines += [f"{name} = u32(0)"]
         elif name.endswith("_i"):
@@ -78,6 +99,7 @@ def _registers(build: CudaBuilder) -> list[str]:
     if build.shape.registers:
         return lines
     tables = [f"work[{build.row(name)}, i] = differing[{c}, i]" for name, c in rows.items() if name in build.names]
+    tables += [f"work[{build.row('order')}, i] = real(i)"] * build.slots
     return [*loop("i in range(tid, n, THREADS)", tables), "cuda.syncthreads()"] if tables else []
 
 
@@ -85,6 +107,8 @@ def _first_value(build: CudaBuilder, name: str) -> str:
     """First value of one register."""
     kept = re.fullmatch(r"(mem|kept)(\d+)_i", name)
     differing = [own_row(*key) for key in build.plan.columns]
+    if name == "order_i":
+        return "real(i)"
     if name[:-2] in differing:
         return f"differing[{differing.index(name[:-2])}, i]"
     if not kept:

@@ -179,10 +179,11 @@ def _marked(lines: list[str], names: list[str], mark: str) -> list[str]:
 def in_place(lines: list[str], name: str, part: list[str]) -> list[str]:
     """Lines in which those of a function stand in place of its call. Raises ReplacementError where they do not fit."""
     (call,) = (line for line in lines if f"{name}(" in line)
-    at, answer = lines.index(call), call.rpartition(" = ")[0] or "0"
+    at, answer, margin = lines.index(call), call.strip().rpartition(" = ")[0] or "0", call[: -len(call.lstrip())]
     if part[-1] not in (f"return {answer}", f"return ({answer})"):
         raise ReplacementError(f"{name} ends with {part[-1]!r}, but is called as {call!r}")
-    return [*lines[:at], *part[:-1], *lines[at + 1 :]]
+    inner = [margin + line for text in part[:-1] for line in text.splitlines()]
+    return [*lines[:at], *inner, *lines[at + 1 :]]
 
 
 def loop(over: str, lines: Iterable[str]) -> list[str]:

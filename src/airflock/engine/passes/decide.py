@@ -19,7 +19,7 @@ def neighbours(build: Builder) -> None:
     plan, model = build.plan, build.plan.model
     fields = model.Sums._fields  # type: ignore[union-attr]
     sums = tuple((c, model.reduce.get(fields[c], "sum")) for c in _asked(build, live(model.Sums, plan.dimensions)))
-    draw, drawn = (None, Call(RECEIVE[True])) if build.by_pairs else (Call(RECEIVE[False]), None)
+    draw, drawn = (None, Call(perceive.word(plan))) if build.by_pairs else (Call(RECEIVE[False]), None)
     more = perceive.around(plan)
     meet = Call(f"meet({', '.join([perceive.MEET, *more])})")
     images = build.images and not plan.grid  # candidates that come by cells come at their image

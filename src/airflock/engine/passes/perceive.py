@@ -2,6 +2,7 @@
 
 from airflock.engine.passes.build import Builder
 from airflock.engine.plan import Plan
+from airflock.engine.replace import must_replace
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import argument
 from airflock.engine.stages import meet as meeting
@@ -32,6 +33,12 @@ def meet(build: Builder) -> None:
 def around(plan: Plan) -> tuple[str, ...]:
     """What stands in the world, where it may hide neighbours or shade the radio: more arguments of the two stages."""
     return ("edges", "spans", "scene") if plan.hides or plan.shades else ()
+
+
+def word(plan: Plan) -> str:
+    """What draws the random word of a pair, called for agents i and j, which may lie elsewhere than by their number."""
+    called = RECEIVE[True]
+    return must_replace([called], "(i, j, k_, n,", "(order[i], order[j], k_, born,")[0] if plan.absence else called
 
 
 def receive(build: Builder) -> None:

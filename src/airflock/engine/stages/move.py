@@ -83,8 +83,8 @@ def move(
         respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
     fastest = ZERO
     for i in lanes:  # whole vectors, of which some lanes have no agent
-        square = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
-        fastest = most(fastest, choose(integer(i) < integer(n), square, ZERO))
+        speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
+        fastest = most(fastest, choose(integer(i) < integer(n), speed2, ZERO))
     for a in range(plan.dimensions):
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
