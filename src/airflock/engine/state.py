@@ -55,7 +55,8 @@ class State:
         if len(tables.goals):
             own["aim"][:3] = tables.goals[0]
         self.fill_own()
-        own["mem"][:] = first_memories(plan, self.laws, real)
+        if plan.laws:  # of one law they stand in the layout
+            own["mem"][:] = first_memories(plan, self.laws, real)
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in plan.motion]

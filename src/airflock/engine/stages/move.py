@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from airflock.core.fault import Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
 from airflock.engine.stages.state import Flock, column_of, numbers_of
@@ -17,7 +18,25 @@ def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
 def respond(
     lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
 ) -> None:
-    """Velocities by the rule of the body, and by those of its faults."""
+    """Velocities by the rule of the body and, where anybody suffers from any, by those of its faults."""
+    if plan.suffers("motion"):
+        until = ZERO
+        for i in lanes:
+            for kind in plan.suffers("motion"):
+                until = most(until, flock.fault(kind.name, "onset")[i] + flock.fault(kind.name, "lasts")[i])
+        if until > time - numbers.c.dt:  # a step more than needed, whatever the rounding
+            accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=plan.suffers("motion"))
+        else:
+            accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
+    else:
+        accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
+
+
+def accelerate(
+    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
+    *, plan: Plan, faults: tuple[Fault, ...],
+) -> None:  # fmt: skip
+    """Velocities by the rule of the body, and by those of these faults."""
     v, command = flock.velocity, flock.command
     for i in lanes:
         t = ask(
@@ -27,7 +46,7 @@ def respond(
             memory=column_of(i, plan.body.Memory, flock.body), dt=numbers.c.dt, wing=numbers.wing,
             b=numbers_of(i, "b", flock, numbers, plan=plan),
         )  # fmt: skip
-        for kind in plan.suffers("motion"):
+        for kind in faults:
             on = lasts(i, kind, time, flock, numbers)
             s = hinder(i, t, kind, time, flock, numbers, plan=plan)
             t = (
