@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import BOTH, WIDE, WORSE, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
+from airflock.infer.fit import EVEN, WIDE, WORSE, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
 from airflock.infer.likelihood import Model
 from airflock.infer.search import scan
 
@@ -82,7 +82,7 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
         if number.low <= number.default <= number.high and abs(default - best.place[k]) < APART:
             continue
         without, rest = model.fixed([*gone, k]), [f for f in best.free if f != k]
-        moved = followed(best, curvature(model.fixed(gone), best, few, BOTH), k, default)
+        moved = followed(best, curvature(model.fixed(gone), best, few, EVEN), k, default)
         starts = [moved, by_powers(model, best, moved, k)]
         for other in (f for f in rest if f < model.named and model.numbers[f].unit == number.unit):
             starts.append(best.place.copy())
