@@ -71,7 +71,9 @@ def neighbours(
 
     met : where an agent meets but some of whom it hears, lines before `inner` that find out: of each candidate, at last
     """
-    build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
+    build.function(
+        "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
+    )
     for c, name in enumerate(build.plan.motion):
         before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
@@ -97,7 +99,8 @@ def neighbours(
     found = re.findall(r"\w+", "\n".join(line for part in met or () for line in part))
     rows = [f"{name} = np.zeros(room + {2 * BLOCK}, work.dtype)" for name in FOUND if name in found]
     body = [*_slabs(build, who), *rows, *loop("ox in range(count[0])", cell)]
-    lines = [*lines, *opened(build), f"totals = totals_[: n * {wide}].reshape(n, {wide})", *_sorted(build, who)]
+    lines = [*lines, *opened(build), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
+    lines += [f"most_cells = {CELLS} * n", *_sorted(build, who)]
     lines += loop("line in prange(count[1] * count[2])", body)
     back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
         f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)
@@ -109,13 +112,13 @@ def neighbours(
 
 
 def sort(build: Builder) -> list[str]:
-    """Lines that sort agents into cells as wide as the law's reach, at any time; makes the function `sort` of them."""
-    reach = build.plan.model.reach
-    assert reach is not None
+    """Lines that sort agents into cells of about one each, at any time; makes the function `sort` of them."""
     if not any("def sort(" in text for text in build.functions):
         if not any("def cells_of(" in text for text in build.functions):
-            build.function("cells_of(n, near, row, work)", build.records("w"), _box(build), "return low, size, count")
-        lines = [*build.records("p"), f"near = least({build.call(reach, 'reach', {})}, LIMIT)", *opened(build)]
+            build.function(
+                "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
+            )
+        lines = ["near = real(0.001); most_cells = n", *opened(build)]
         lines += must_replace(_sorted(build, False), "CHUNKS", str(CHUNKS))
         build.function("sort(n, row, work, cells)", lines, "return size, count", parallel=True)
     return [*opened(build), "sides, count = sort(n, row, work, cells)"]
@@ -131,7 +134,10 @@ def _found(each: list[str], last: list[str]) -> list[str]:
 
 
 def _box(build: Builder) -> list[str]:
-    """Lower corner, cell size (m) and number of cells per axis: of the periodic box, or around the flock."""
+    """Lower corner, cell size (m) and number of cells per axis: of the periodic box, or around the flock.
+
+    Cells are no smaller than `near`, and about `most_cells` at most; never more than there is memory for.
+    """
     axes, periodic = build.plan.axes, build.plan.periodic
     lines = ["low = np.zeros(3, work.dtype); size = np.ones(3, work.dtype); count = np.ones(3, np.int64)"]
     lines += ["width = np.ones(3, work.dtype); volume = ONE"]
@@ -144,7 +150,7 @@ def _box(build: Builder) -> list[str]:
             lines += loop("i in range(n)", [f"least_ = least(least_, {a}[i]); most_ = most(most_, {a}[i])"])
             lines += [f"low[{c}] = least_; width[{c}] = most(most_ - least_, near)"]
         lines += [f"volume *= most(width[{c}] / near, ONE)"]
-    coarse = f"(volume / real({CELLS} * n)) ** real({1.0 / len(axes)})"
+    coarse = f"(volume / real(most_cells)) ** real({1.0 / len(axes)})"
     lines += [f"side = near * most(ONE, {coarse})"]
     fewest = 2 if periodic else 1  # an agent is met at two images of which at most one is in reach
     fit = [f"count[{c}] = max({fewest}, int(width[{c}] / side))" for c in range(len(axes))]
@@ -157,11 +163,13 @@ def _box(build: Builder) -> list[str]:
 def _sorted(build: Builder, who: bool) -> list[str]:
     """Agents sorted by cell: starts (first of each cell), place (of each agent), packed (agent, position and velocity).
 
+    The lines before say how small cells may be (`near`, m) and how many there may be (`most_cells`).
+
     Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
     """
     axes = build.plan.axes
     names = build.plan.motion
-    lines = [*build.bind(names), *build.order(), "low, size, count = cells_of(n, near, row, work)"]
+    lines = [*build.bind(names), *build.order(), "low, size, count = cells_of(n, near, most_cells, row, work)"]
     lines += ["total = count[0] * count[1] * count[2]"]
     inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
     part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
