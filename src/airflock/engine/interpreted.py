@@ -10,6 +10,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from itertools import takewhile
 from types import ModuleType
 from typing import Any
 
@@ -148,7 +149,8 @@ def _driver(build: Builder, label: str, exact: bool) -> ModuleType:
 def _skipping(text: str) -> str:
     """The same text, in which a loop over pairs goes on to the next one where what it would find is not chosen.
 
-    Whatever follows `ok` in a loop goes through `choose(ok, ..., START)`, and START changes no total.
+    Whatever follows `ok` in a loop goes through `choose(ok, ..., START)`, and START changes no total. Where another
+    agent of the same loop is still to come, nothing is skipped.
     """
     lines = text.splitlines()
     found = []
@@ -157,7 +159,9 @@ def _skipping(text: str) -> str:
         body = line.lstrip()
         margin = line[: len(line) - len(body)]
         if body.startswith("ok = ") and not lines[number + 1].startswith(f"{margin}ok = "):
-            found += [f"{margin}if not ok:", f"{margin}    continue"]
+            rest = takewhile(lambda later: later.startswith(margin), lines[number + 1 :])  # noqa: B023 - used at once
+            if not any(later.startswith(f"{margin}ok = ") and "= ok &" not in later for later in rest):
+                found += [f"{margin}if not ok:", f"{margin}    continue"]
     return "\n".join(found) + "\n"
 
 

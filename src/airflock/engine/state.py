@@ -193,7 +193,8 @@ class State:
     @property
     def finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
-        return math.isfinite(sum(map(np.dot, self._moving, self._nothing)))  # 0 times what is not finite is nan
+        with np.errstate(invalid="ignore"):  # 0 times what is not finite is nan
+            return math.isfinite(sum(map(np.dot, self._moving, self._nothing)))
 
     def compile(self) -> "State":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
