@@ -134,12 +134,18 @@ class Course:
         plan = to_fly(
             new, self.precision, self.record, given_start=old.given_start, absence=old.absence, device=self.device
         )
-        if wait or plan == old or self.device == "python":  # interpreted, nothing is waited for
+        if wait or plan == old:
             state = self._opened(new, old.absence)
             self._coming = None
             self._take(new, said, state)
         else:
-            self._coming = (new, said, in_background(lambda: self._opened(new, old.absence).compile()))
+            self._coming = (new, said, self._made(new, old.absence))
+
+    def _made(self, scenario: Scenario, absence: bool) -> "Future[State]":
+        """The state that is to take over, written and compiled aside; interpreted, it is written at once."""
+        if self.device == "python":
+            return in_background(self._opened(scenario, absence).compile)
+        return in_background(lambda: self._opened(scenario, absence).compile())
 
     def take_over(self) -> None:
         """Take the change over that has been compiled meanwhile."""
