@@ -49,7 +49,7 @@ def gaps(choice):
     begun, times = time.perf_counter(), []
     flight.change(choice, wait=False)
     changed = time.perf_counter() - begun
-    while flight._course.waiting:
+    while flight.waiting:
         now = time.perf_counter()
         times.append(now)
         flight.advance(1 / RATE)

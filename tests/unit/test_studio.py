@@ -4,6 +4,7 @@ import math
 import re
 import socket
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -463,7 +464,11 @@ def test_back_flies_again_what_was_done_meanwhile(player):
 def test_a_gust_blows_for_its_time_and_is_an_event(interpreted, player):
     player.fly(20)
     player.gust(6.0, 0.0, 0.5)
-    player.fly(1)
+    for _ in range(1000):  # until the thread that makes the windy flight is done
+        player.fly(1)
+        if player.scenario.wind.east:
+            break
+        time.sleep(0.005)
     began = player.flight.step - 1
     assert player.scenario.wind.east == 6.0
     player.fly(100)

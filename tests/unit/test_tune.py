@@ -40,6 +40,16 @@ def test_it_starts_from_the_law_s_numbers_at_this_speed_and_leaves_alone_what_th
     assert start_of(load("vicsek_1995/ordered"))[0].parameters == load("vicsek_1995/ordered").parameters
 
 
+@pytest.mark.parametrize(("side", "room"), [(120.0, 6.0), (59.0, 3.0), (53.0, 0.0)])
+def test_room_at_walls_is_given_where_there_is_place_for_it_and_the_file_says_nothing(side, room):
+    crowded = {**MINE, "agents": 12, "world": {"side": side}}  # fits with 12 m between agents
+    found, notes = start_of(make(crowded, "mine"))
+    assert found.start.wall_clearance == room
+    assert any(f"nearer than {room:g} m" in note for note in notes) == bool(room)
+    said = make({**crowded, "start": {"wall_clearance": 0.1}}, "mine")
+    assert start_of(said)[0].start.wall_clearance == 0.1
+
+
 @given(st.floats(1.0, 1e5), st.floats(0.05, 500.0))
 def test_a_plan_fits_into_its_budget_or_says_what_would(budget, rate):
     try:

@@ -134,7 +134,9 @@ def _numbers(found: Any) -> None:
     from airflock.infer.found import interval
 
     console = Console()
-    console.print(f"numbers of {found.best.name}; the intervals hold all of them together in 95 %", highlight=False)
+    console.print(
+        f"numbers of {found.best.name}; the intervals are meant to hold all of them together in 95 %", highlight=False
+    )
     for key, number in found.best.numbers.items():
         unit = "" if number.unit == "1" else f" {number.unit}"
         console.print(f"  {key} {number.value:.4g}{unit}, {interval(number)}", highlight=False, markup=False)

@@ -52,14 +52,15 @@ class Ether:
 
     def send(self, now: float, who: int, datagram: bytes, at: Sequence[Vector] = ()) -> None:
         """A drone, by its place in the list of members, sends a datagram to all; at: true positions, m."""
-        reached: dict[float, list[int]] = {}
-        for to in () if self._alike else self._others[who]:
-            late = self._late(to, now) + self._slow(now, who, to, at)
-            reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
-        for due, whom in reached.items():
-            self._push(due, who, whom, datagram)
         if self._alike:
             self._push(now + self._k.delay, who, self._others[who], datagram)
+        else:
+            reached: dict[float, list[int]] = {}
+            for to in self._others[who]:
+                late = self._late(to, now) + self._slow(now, who, to, at)
+                reached.setdefault(round(now + self._k.delay + late, 6), []).append(to)
+            for due, whom in reached.items():
+                self._push(due, who, whom, datagram)
         for f in self._forgers:
             if f.holds(self._members[who], now) and self._site is not None:
                 false = forged(datagram, self._site, east=f.amount, with_key=f.kind == "impostor")

@@ -5,7 +5,7 @@ import math
 from airflock.core.agent import State
 from airflock.core.maths import shorten
 
-STOOD = 0.5  # m/s; slower than this it has come to stand, and holds that place
+STOOD = 0.5  # m/s; our choice: slower than this it has come to stand, and holds that place
 GAIN = 0.5  # 1/s; our choice, about half of PX4's MPC_XY_P: a metre off is half a metre a second back
 MOST = 1.0  # m/s; our choice
 

@@ -190,11 +190,12 @@ def _moved(place: Array, number: int, x: float) -> Array:
 def curvature(model: Model, fit: Fit, spans: Sequence[int] | None, way: int = WIDE) -> Array:
     """Second derivatives of the loss by the free numbers, with the prior."""
     e, _ = model.differences(fit.place, spans)
-    found = _normal(model, fit, spans, e, PROBE, True)[0]
     if way == EVEN:
         found = _normal(model, fit, spans, e, PROBE / 8.0, False)[0]
-    elif way != WIDE:
-        found = _normal(model, fit, spans, e, _probes(found), way != BOTH)[0]
+    else:
+        found = _normal(model, fit, spans, e, PROBE, True)[0]
+        if way != WIDE:
+            found = _normal(model, fit, spans, e, _probes(found), way != BOTH)[0]
     return found + 4.0 * np.eye(len(fit.free))
 
 

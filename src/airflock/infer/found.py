@@ -31,7 +31,8 @@ EDGE = 0.01  # of a range: nearer to its end nothing is told
 class Number:
     """A number of a law: value and interval; an end of it is None where the tracks set no limit.
 
-    The intervals of a law hold all its numbers together in 95 % of cases.
+    The intervals of a law are meant to hold all its numbers together in 95 % of cases; docs/infer.md tells how often
+    they did.
     """
 
     key: str

@@ -140,9 +140,11 @@ def facts(
     deaf_for = timers("deaf", bool(flying) and not fresh, now)
     clock_for = timers("clock", clock_bad, now)
     out = own is not None and phase in FLY and card.outside(*own[:3]) > 0.0
-    near = [p.state for p in fresh.values() if p.state is not None and own is not None]
-    near = [other for other in near if own is not None and abs(other.x - own.x) < s.near]  # spares most roots
-    neighbour_near = own is not None and any(apart(own, other) < s.near for other in near)
+    others = [p.state for p in fresh.values() if p.state is not None]
+    neighbour_near = own is not None and any(
+        abs(other.x - own.x) < s.near and apart(own, other) < s.near  # the first spares most roots
+        for other in others
+    )
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
     calm = not (position_bad or gnss_for or few_for or clock_for or neighbour_near or more["overload"])
     calm = calm and not (operator_lost and s.operator_lost == "hold")

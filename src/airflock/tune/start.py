@@ -2,8 +2,10 @@
 
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
+from airflock.errors import ScenarioError
 from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import remade
 from airflock.scenarios.scaling import starting_set
@@ -18,8 +20,13 @@ def start_of(scenario: Scenario) -> tuple[Scenario, list[str]]:
     Only numbers that the scenario's document does not give are set; every other value stays.
     """
     values, told = _scaled(scenario)
-    away, why = _off_the_walls(scenario)
-    return remade(scenario, values | away) if values or away else scenario, [*told, *why]
+    start = remade(scenario, values) if values else scenario
+    for room in _off_the_walls(scenario):
+        with suppress(ScenarioError):  # they have no place so far from the walls
+            why = f"nobody starts nearer than {room:g} m to walls and obstacles"
+            away = remade(start, {"start.wall_clearance": room})
+            return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
+    return start, told
 
 
 def has_walls(scenario: Scenario) -> bool:
@@ -45,15 +52,14 @@ def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
     return values, [f"{len(values)} numbers of the law scaled to {speed:g} m/s, as Tables S1 and S3 of {SCALES} say"]
 
 
-def _off_the_walls(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
-    """Room at walls and obstacles when a flight begins: half of what agents have between them, at least r_coll.
+def _off_the_walls(scenario: Scenario) -> list[float]:
+    """Room at walls and obstacles when a flight begins, m, where the document gives none; less where that is too much.
 
-    Else the nearest that most flights come to a wall is where somebody was put at the start, whatever the law does.
+    Half of what agents have between them, or r_coll. Without it the nearest that most flights come to a wall is where
+    somebody was put at the start, whatever the law does.
     """
     drawn = scenario.start.kind in ("arena", "ball", "box")
-    room = max(float(scenario.metrics.r_coll), 0.5 * scenario.separation())
     if not (has_walls(scenario) and drawn) or "wall_clearance" in scenario.document.get("start", {}):
-        return {}, []
-    return {"start.wall_clearance": room}, [
-        f"nobody starts nearer than {room:g} m to walls and obstacles (start.wall_clearance, which is not given)"
-    ]
+        return []
+    least = float(scenario.metrics.r_coll)
+    return sorted({max(least, 0.5 * scenario.separation()), least}, reverse=True)
