@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -60,9 +61,6 @@ class State:
         if len(tables.later):
             own["later"][:], own["shapes"][:] = tables.later, tables.shapes
         self._motion = [driver.ROWS[name] for name in plan.motion]
-        together = np.split(self._motion, np.flatnonzero(np.diff(self._motion) != 1) + 1)  # mostly one run of rows
-        self._moving = [own["work"][rows[0] : rows[-1] + 1].reshape(-1) for rows in together]
-        self._nothing = [np.zeros_like(run) for run in self._moving]
         components = plan.dimensions
         self.start = np.zeros((2 * components, 0), real) if start is None else np.ascontiguousarray(start, real)
         self.no_frames = np.zeros((0, 3 * components, agents), real)
@@ -194,7 +192,14 @@ class State:
     def finite(self) -> bool:
         """Whether the positions and velocities of all agents are finite."""
         with np.errstate(invalid="ignore"):  # 0 times what is not finite is nan
-            return math.isfinite(sum(map(np.dot, self._moving, self._nothing)))
+            return math.isfinite(sum(run.dot(nothing) for run, nothing in self._moving))
+
+    @cached_property
+    def _moving(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
+        """Rows of motion as runs of memory, mostly one, each with zeros of its size."""
+        together = np.split(self._motion, np.flatnonzero(np.diff(self._motion) != 1) + 1)
+        runs = [self.arrays["work"][rows[0] : rows[-1] + 1].reshape(-1) for rows in together]
+        return [(run, np.zeros_like(run)) for run in runs]
 
     def compile(self) -> "State":
         """Have the driver compiled; nothing is flown, and agents get no places. Returns the state."""
