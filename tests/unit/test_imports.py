@@ -53,6 +53,12 @@ def test_a_long_table_is_read_to_the_last_bit():
     assert (found["confidence"] == 1.0).all() and found.attrs["fps"] == RATE
 
 
+def test_a_column_named_for_the_animal_holds_the_individuals():
+    for name in ("fish", "animal_id", "Bird"):
+        found = airflock.load_tracks(flock().rename(columns={"id": name}))
+        assert list(found["individual"].values) == ["bird_0", "bird_1", "bird_2"], name
+
+
 def test_units_of_headers_and_expressions_say_the_same(tmp_path):
     own = circle()
     plain = airflock.load_tracks(own)

@@ -186,6 +186,17 @@ def test_bad_tracks_and_laws_are_one_line_each():
         airflock.infer(tracks, ["dimock_2003/published"])
 
 
+def test_what_is_wrong_for_all_laws_is_said_once_and_files_name_their_import(tmp_path):
+    with pytest.raises(AirflockError) as fault:
+        airflock.infer(vicsek(frames=130), ["vicsek_1995", "couzin_2002"], settings={"world.arena": "circel"})
+    assert len(str(fault.value).splitlines()) == 1 and "did you mean circle?" in str(fault.value)
+    path = tmp_path / "fish.csv"
+    path.write_text("frame,fish,x_px,y_px\n0,a,1,2\n0,b,5,6\n1,a,2,3\n1,b,6,7\n")
+    with pytest.raises(AirflockError, match="airflock import fish.csv ... --save tracks.nc") as fault:
+        airflock.infer(path)
+    assert "--scale" in str(fault.value)
+
+
 def test_the_best_is_named_with_its_doubts():
     def law(name, gain, missed, surprise):
         return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))
