@@ -12,7 +12,7 @@ from airflock.engine import compile_for, fly
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
-from airflock_papers.dimock_2003.units import FOOT, Gains
+from airflock_papers.dimock_2003.units import FOOT, SPAN, Gains
 from airflock_papers.flights import Progress, with_changes
 
 V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
@@ -65,11 +65,12 @@ class Birds:
     def fly(
         self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str | float
     ) -> list[Flight]:
-        """Fly tasks in the paper's air; `readings` are keys of the model, for instance gradient="cells".
+        """Fly tasks in the paper's air; `readings` are keys of the scenario; those without a dot are the model's.
 
         noise : diffusion constant of the birds' positions in flight, m²/s
         """
-        chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
+        named = {key if "." in key else f"model.{key}": value for key, value in readings.items()}
+        chosen = tuple(sorted(({"model.gradient": "cells_frozen"} | named).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
             compile_for(with_changes(base, self.changes))  # once, before threads ask for it
@@ -91,9 +92,8 @@ class Birds:
 def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, flat: bool) -> Scenario:
     jostled = {"body.kind": "jostled", "body.noise": noise} if noise > 0.0 else {}
     settled = {"metrics.t_settle": 0.5 * duration, "metrics.v_settle": V_SETTLE}
-    model = {f"model.{key}": value for key, value in readings}
     plane = {"world.dimensions": "2"} if flat else {}
-    return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **model})
+    return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **dict(readings)})
 
 
 def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
@@ -126,6 +126,12 @@ def holds_vee(flight: Flight) -> bool:
     gaps = np.diff(np.sort(y))
     behind = x[1:3].max() <= x[0] + 1.0 and x[3:5].max() <= x[1:3].min() + 1.0
     return bool(behind and gaps.min() > 2.5 and gaps.max() < 10.0)
+
+
+def in_row(flight: Flight) -> bool:
+    """Whether at the end the birds fly in a row: nobody more than a span aside of another, and longer than wide."""
+    x, y = flight.frames[-1, 0] / FOOT, flight.frames[-1, 1] / FOOT
+    return bool(np.ptp(y) <= SPAN and np.ptp(x) > np.ptp(y))
 
 
 def median(values: Iterable[float]) -> float:
