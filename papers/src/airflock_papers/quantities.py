@@ -18,6 +18,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "joint p": (),
     "four partial fitnesses": ("partial fitnesses",),
     "share of the loss by f_coll": ("collisions",),
+    "fitness at a velocity": ("velocity regimes",),
     "instants in range": ("distance",),
     "collided": ("collisions",),
     "share of flights": ("flight", "motion", "pattern", "circular"),

@@ -63,7 +63,7 @@ class Birds:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(
-        self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str | float
+        self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str
     ) -> list[Flight]:
         """Fly tasks in the paper's air; `readings` are keys of the scenario; those without a dot are the model's.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,7 +173,7 @@ def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]
     return losses
 
 
-def settings_of(reading: Reading) -> dict[str, str]:
+def settings_of(reading: Reading) -> dict[str, Any]:
     """Keys of the scenario that a reading sets."""
     return {"model.centroid": reading.centroid, **dict(reading.wing)}
 
