@@ -1,5 +1,6 @@
 """Flights of five birds: many controllers and starts, side by side on all cores."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import compile_for, fly
+from airflock.errors import FlightError
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
@@ -63,11 +65,19 @@ class Birds:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(
-        self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str
+        self,
+        title: str,
+        tasks: Sequence[Task],
+        duration: float = 20.0,
+        noise: float = 0.0,
+        *,
+        scatter: bool = False,
+        **readings: str | float,
     ) -> list[Flight]:
         """Fly tasks in the paper's air; `readings` are keys of the scenario; those without a dot are the model's.
 
-        noise : diffusion constant of the birds' positions in flight, m²/s
+        noise   : diffusion constant of the birds' positions in flight, m²/s
+        scatter : birds that leave the finite numbers are a flight that is not finite, instead of an error
         """
         named = {key if "." in key else f"model.{key}": value for key, value in readings.items()}
         chosen = tuple(sorted(({"model.gradient": "cells_frozen"} | named).items()))
@@ -83,7 +93,7 @@ class Birds:
                 self.progress(title, count, len(tasks))
 
         def job(task: Task) -> Callable[[], Flight]:
-            return lambda: _flown(bases[task.start.flat], task, self.changes)
+            return lambda: _flown(bases[task.start.flat], task, self.changes, scatter)
 
         return list(in_threads([job(task) for task in tasks], self.threads, done))
 
@@ -96,7 +106,7 @@ def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, 
     return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **dict(readings)})
 
 
-def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
+def _flown(base: Scenario, task: Task, changes: Mapping[str, Any], scatter: bool) -> Flight:
     s = task.start
     box = s.kind == "box"
     begin = replace(
@@ -105,7 +115,12 @@ def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
         separation=s.sy * FOOT if box else None,
     )  # fmt: skip
     scenario = replace(base, parameters=replace(base.parameters, **task.gains.si()), start=begin)
-    found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
+    try:
+        found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
+    except FlightError:
+        if not scatter:
+            raise
+        return Flight({"power": math.nan, "n_coll": 0.0}, np.full((1, 3, base.agents), math.nan))
     assert found.frames is not None
     return Flight(found.values, found.frames)
 

@@ -29,7 +29,7 @@ class Reading(NamedTuple):
 
     centroid: str
     start: Start
-    wing: tuple[tuple[str, str], ...] = ()
+    wing: tuple[tuple[str, str | float], ...] = ()
 
     @property
     def words(self) -> str:
@@ -43,9 +43,15 @@ READINGS = {
     "near": Reading("others", Start(sx=5.0, sy=5.0)),  # the prototype's, tip to tip from the start
     "n": Reading("n", Start()),  # those under which the published gains hold a V
 }
-# The paper's first simulation: one horseshoe a wing, before it had a grid. Its gradient is not described: ours is that
-# of the same filaments, without a grid.
-FIRST = Reading("others", Start(), (("wing.segments", "1"), ("wing.positions", "free"), ("model.gradient", "frozen")))
+# The paper's first simulation: one horseshoe a wing, before it had a grid. Its gradient is not described: ours is the
+# derivative of the same filaments. Their core keeps it finite for two birds abreast, and is far narrower than a row.
+HORSESHOE: dict[str, str | float] = {
+    "wing.segments": "1",
+    "wing.positions": "free",
+    "wing.core": 0.01,
+    "model.gradient": "frozen",
+}
+FIRST = Reading("others", Start(), tuple(HORSESHOE.items()))
 
 
 @dataclass
@@ -56,6 +62,7 @@ class Run:
     lost      : by generation the share of controllers that collide
     careless  : by generation how many have a K_a below 2 ft/s, and how many of them collide
     rows      : of every flight the K_d, ft²/(lbf s), and whether it ended in a row
+    scattered : flights whose birds left the finite numbers
     flown     : flights; a controller that comes again is not flown again
     flights   : of the best-ever after the paper's generations 5 and 13 and the last; full gradient of the last
     """
@@ -69,6 +76,7 @@ class Run:
     lost: list[float] = field(default_factory=list)
     careless: list[tuple[int, int]] = field(default_factory=list)
     rows: list[tuple[float, bool]] = field(default_factory=list)
+    scattered: int = 0
     flown: int = 0
     flights: dict[str, Flight] = field(default_factory=dict)
 
@@ -159,12 +167,14 @@ def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]
         fresh = {point.tobytes(): gains(point) for point in points if point.tobytes() not in known}
         inside = {key: found for key, found in fresh.items() if found.r_c >= found.r_a}
         tasks = [Task(found, run.reading.start) for found in inside.values()]
-        flown = birds.fly("", tasks, **settings_of(run.reading))
+        flown = birds.fly("", tasks, scatter=bool(run.reading.wing), **settings_of(run.reading))
         run.flown += len(flown)
         run.rows += [(task.gains.k_d, in_row(flight)) for task, flight in zip(tasks, flown, strict=True)]
         known.update(dict.fromkeys(fresh, LOST))
         for key, flight in zip(inside, flown, strict=True):
-            good = np.isfinite(flight.power) and not flight.collided
+            finite = bool(np.isfinite(flight.power))
+            run.scattered += not finite
+            good = finite and not flight.collided
             known[key] = flight.power if good else LOST
         every = np.array([known[point.tobytes()] for point in points])
         run.note(points, every)
@@ -183,8 +193,10 @@ def _flown_again(birds: Birds, run: Run) -> Run:
     moments = {"early": EARLY, "midway": MIDWAY, "final": last}
     tasks = [Task(run.champions[min(at, last)], run.reading.start) for at in moments.values()]
     settings = settings_of(run.reading)
-    flown = birds.fly("", tasks, **settings)
+    flown = birds.fly("", tasks, scatter=bool(run.reading.wing), **settings)
     run.flights = dict(zip(moments, flown, strict=True))
     whole = {"frozen": "analytic"}.get(settings.get("model.gradient", ""), "cells")
-    run.flights["full gradient"] = birds.fly("", tasks[-1:], **settings | {"model.gradient": whole})[0]
+    run.flights["full gradient"] = birds.fly(
+        "", tasks[-1:], scatter=bool(run.reading.wing), **settings | {"model.gradient": whole}
+    )[0]
     return run

@@ -92,9 +92,10 @@ def _rows(runs: Sequence[Run]) -> Measured:
     }
     share = {greedy: float(np.mean(rows)) if rows else 0.0 for greedy, rows in ends.items()}
     best = _each([run.best[-1] / FT_LBF for run in runs])
+    lost = sum(run.scattered for run in runs)
     note = (
-        f"{share[False]:.1%} of {len(ends[False])} flights with a lower K_d; best-ever {best} ft lbf/s by seed: "
-        f"{'; '.join(run.gains.text() for run in runs)}"
+        f"{share[False]:.1%} of {len(ends[False])} flights with a lower K_d; {lost} scatter beyond the finite numbers; "
+        f"best-ever {best} ft lbf/s by seed: {'; '.join(run.gains.text() for run in runs)}"
     )
     at = f"flights with K_d of {GREEDY:g} ft²/(lbf s) or more, one horseshoe a wing, {FIRST.words}"
     return Measured("ga.row", "rows", at, Estimate(share[True], None, None, None, len(ends[True])), note)
