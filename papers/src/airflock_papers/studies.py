@@ -29,13 +29,17 @@ def evolve(
     *,
     space: Mapping[str, Any] | None = None,
     folder: str = "",
+    search: Mapping[str, Any] | None = None,
 ) -> Result:
     """Result of a run of a shipped study, begun or continued.
 
     settings : keys of the scenario to change; space : table that replaces the study's; folder : its name, if another
+    search   : keys of the search to change, in place of those of a quick one
     """
-    search: dict[str, Any] = {"seed": number, **(QUICK if flights.quick else {})}
-    study = load_study(name, settings=settings, search=search, tables={"space": space} if space else None)
+    keys = search if search is not None else QUICK if flights.quick else {}
+    study = load_study(
+        name, settings=settings, search={"seed": number, **keys}, tables={"space": space} if space else None
+    )
     place = folder_of(folder or name, number, flights.quick)
     open_folder(place, study, resume=(place / STUDY).exists())
 
