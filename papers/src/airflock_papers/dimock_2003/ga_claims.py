@@ -59,9 +59,12 @@ def _course_of_the_search(runs: Sequence[Run]) -> list[Measured]:
     if last != GENERATIONS - 1:
         return []
     swings = [spacing(run.flights["early"])[1] - spacing(run.flights["final"])[1] for run in runs]
+    note = f"{_each(swings, 3)} ft by seed"
     courses = [_course(run.flights["final"]) for run in runs]
     return [
-        Measured("ga.early", "disorder", f"generation {EARLY} less generation {last}, swing in ft", _spread(swings)),
+        Measured(
+            "ga.early", "disorder", f"generation {EARLY} less generation {last}, swing in ft", _spread(swings), note
+        ),
         Measured("ga.drag", "power over time", f"generation {last}, last second over first", _spread(courses)),
     ]
 
@@ -71,7 +74,8 @@ def _collisions(runs: Sequence[Run]) -> list[Measured]:
     words = READINGS["mean"].words
     found = []
     if len(runs[0].lost) >= 2 * TENTH:
-        parts = [[float(np.mean(run.lost[k : k + TENTH])) for run in runs] for k in (0, TENTH, -TENTH)]
+        stretches = (slice(0, TENTH), slice(TENTH, 2 * TENTH), slice(-TENTH, None))
+        parts = [[float(np.mean(run.lost[stretch])) for run in runs] for stretch in stretches]
         note = f"{', '.join(_percent(part) for part in parts)} in the first ten generations, the next and the last"
         at = f"share of controllers, generations {TENTH} to {2 * TENTH - 1} less 0 to {TENTH - 1}, {words}"
         rise = [b - a for a, b in zip(*parts[:2], strict=True)]
