@@ -95,7 +95,7 @@ def committed() -> list[Row]:
     try:
         text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
     except OSError as fault:
-        raise AirflockError(f"{COMMITTED}: {fault}; `python -m airflock_papers.campaign` writes it") from fault
+        raise AirflockError(f"{COMMITTED}: {fault.strerror}; `python -m airflock_papers.campaign` writes it") from fault
     return [Row(**row) for row in csv.DictReader(io.StringIO(text))]
 
 

@@ -115,7 +115,7 @@ def committed() -> list[Verdict]:
     try:
         text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
     except OSError as fault:
-        raise AirflockError(f"{COMMITTED}: {fault}; `python -m airflock_papers.quick` writes it") from fault
+        raise AirflockError(f"{COMMITTED}: {fault.strerror}; `python -m airflock_papers.quick` writes it") from fault
     return [Verdict(**row | {"ours": float(row["ours"])}) for row in csv.DictReader(io.StringIO(text))]  # type: ignore[arg-type]
 
 

@@ -64,8 +64,9 @@ def _all(
 
     wrong = [option for option, given in others.items() if given]
     if wrong or quick == breaks:
-        told = f"{', '.join(wrong)} is of one paper; name it" if wrong else "takes days; add --quick, or name one paper"
-        raise AirflockError("all: give --quick or --breaks, not both" if quick and not wrong else f"all: {told}")
+        told = "takes days; add --quick or --breaks, or name one paper"
+        told = "give --quick or --breaks, not both" if quick else told
+        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
     if breaks:
         _campaign(keep or cache_folder() / "papers" / "breaks", threads, as_json)
         return
