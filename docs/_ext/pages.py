@@ -244,11 +244,12 @@ def _abilities(bodies: Mapping[str, Any]) -> str:
     """Table of what each body has, from what its rule asks for."""
     from inspect import signature
 
-    lines = ["", "| body | takes | has inertia | sees its measured velocity | noise | wind | remembers | has limits |"]
-    lines += ["|---|---|---|---|---|---|---|---|"]
+    words = "body | takes | has inertia | sees its measured velocity | noise | wind | battery | remembers | has limits"
+    lines = ["", f"| {words} |", "|---|---|---|---|---|---|---|---|---|"]
     for name, body in bodies.items():
         asked = set(signature(body.move).parameters)
         has = ["yes" if word in asked else "no" for word in ("vx", "mx", "gx", "wx")]
+        has.append("yes" if hasattr(body.Parameters, "battery") else "no")
         kept = ", ".join(getattr(body.Memory, "_fields", ())) or "nothing"
         lines.append(f"| `{name}` | {body.accepts} | {' | '.join(has)} | {kept} | {'yes' if body.limits else 'no'} |")
     return "\n".join(lines) + "\n"

@@ -131,7 +131,7 @@ def load(
         own["kinds"] = _kinds(faults)
         own["laws"] = {law.name: law for law in map(given_law, _several(laws))}
         own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told = with_ground(document, settings or {}, folder)
+        document, settings, told, own["known_faults"] = with_ground(document, settings or {}, folder)
         own["notes"] += told
         if law is None:
             return make(document, where, settings, folder=folder, trust=trust, **own)

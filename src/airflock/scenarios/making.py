@@ -67,11 +67,12 @@ def make(
     kinds: Mapping[str, Fault] | None = None,
     laws: Mapping[str, Model] | None = None,
     notes: tuple[str, ...] = (),
+    known_faults: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
     """Scenario from a nested dict.
 
-    where : names it in faults; notes : what is known of it already
+    where : names it in faults; notes : what is known of it already; known_faults : what is wrong already
     law, measures, vehicle, sensor, transceiver : a model, a metric set, a body, a sensor, a radio given directly
     own_topology : a topology given directly
     kinds : kinds of fault given directly, by name; laws : laws that groups may name
@@ -83,7 +84,7 @@ def make(
     document, left_out = _with_kinds(document, settings or {})
     merged, faults = _merged(document, {key: value for key, value in (settings or {}).items() if key not in short})
     table, more = _model_table(merged)
-    faults += in_groups + more
+    faults = [*known_faults, *faults, *in_groups, *more]
     found = law
     if found is None and not more:
         try:
