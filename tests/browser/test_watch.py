@@ -197,3 +197,26 @@ def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, t
         teal = (inside[..., 1] - inside[..., 0] > 60) & (inside[..., 2] > 60)  # darts, not orange obstacles
         assert places(teal) <= 4, "agents that were removed are still seen"
         assert not tab.faults
+
+
+def test_sliders_of_a_group_change_that_group_alone(browser, tab):
+    """One number that the file gives it, and one of a law that only it has; the flock's own stay."""
+    groups = [
+        {"name": "heavy", "agents": 5, "body": {"tau": 2.0}},
+        {"name": "repelled", "agents": [0, 1], "model": {"kind": "viragh_2014"}},
+    ]
+    with flying(settings={"agents": 12, "groups": groups}) as (player, view, _):
+        opened(tab, view)
+        tab.get_by_text("Tune", exact=True).click()
+        for folder, number in (("group heavy: body", "tau"), ("group repelled: model", "p_rep")):
+            tab.get_by_text(folder, exact=True).click()
+            slider = tab.locator(f'[role=slider][aria-label*="{number}"]').last
+            slider.focus(timeout=PATIENCE * 1000)
+            slider.press("ArrowRight")
+        keys = {"groups.heavy.body.tau", "groups.repelled.model.p_rep"}
+        changed = lambda: {key for event in player.flight.events for key in event.data}  # noqa: E731
+        until(lambda: changed() == keys, "the sliders changed something else, or nothing")
+        scenario = player.scenario
+        assert scenario.groups[0].numbers["b", "tau"] > 2.0 and scenario.body.tau == 1.0
+        until(lambda: "--set groups.heavy.body.tau=" in tab.inner_text("body"), "the command does not tell it")
+        assert not tab.faults
