@@ -46,6 +46,7 @@ NAMES = {
     "CALLED": ("compiler", "CALLED"),
     "INNER": ("compiler", "INNER"),
     "Flown": ("cpu", "Flown"),
+    "alone": ("locked", "alone"),
     "driver_of": ("drivers", "driver_of"),
     "flight_driver": ("drivers", "flight_driver"),
     "CudaBuilder": ("cuda.build", "CudaBuilder"),
