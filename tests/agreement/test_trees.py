@@ -98,6 +98,9 @@ def found_of(name):
     alone = not (plan.noisy or plan.delayed or plan.lossy or plan.radio.keeps or plan.sequential or plan.varies("p"))
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
         found["grid"] = trees_of(driver.flight, plan.built(grid=True))
+        found["near"] = trees_of(driver.flight, plan.built(grid=True, near=True))
+        if found["near"] == found["grid"]:
+            del found["near"]
         if plan.start in ("arena", "ball") and not plan.model.flock:
             found["cells"] = trees_of(cells.crowd, plan.built(grid=True), builder=CudaBuilder)
     return found
