@@ -32,6 +32,7 @@ MODULES = {
     "stages_meet": "stages.meet",
     "stages_move": "stages.move",
     "stages_neighbours": "stages.neighbours",
+    "stages_pair": "stages.pair",
     "stages_noise": "stages.noise",
     "stages_perceive": "stages.perceive",
     "stages_receive": "stages.receive",
