@@ -10,8 +10,8 @@ from airflock.core import radio, random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.contract import Model
+from airflock.core.hearing import carried, lasts
 from airflock.core.maths import norm
-from airflock.core.pilot import carried, lasts
 from airflock.core.topology import met_of
 from airflock.core.view import View
 from airflock.engine.beginnings import NEVER

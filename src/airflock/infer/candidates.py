@@ -13,6 +13,7 @@ from airflock.core.parameters import Quantity, declarations
 from airflock.engine import Plan, State, plan_of
 from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
+from airflock.scenarios.families import Given
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
@@ -164,7 +165,7 @@ def quiet(scenario: Scenario, scale: Scale, axes: int) -> Scenario:
         "update": "synchronous", "start.kind": "ball", "start.radius": scale.near, "start.separation": 0.0,
         "goals.kind": "none",
     }  # fmt: skip
-    made = make(document, scenario.name, settings, law=scenario.model, vehicle=scenario.vehicle)
+    made = make(document, scenario.name, settings, given=Given(law=scenario.model, vehicle=scenario.vehicle))
     names = {name for name, declared, _ in declarations(made.body) if isinstance(declared, Quantity)}
     return replace(made, body=replace(made.body, noise=0.0)) if "noise" in names else made
 

@@ -17,6 +17,7 @@ from airflock.infer.likelihood import Model
 from airflock.infer.maps import Maps
 from airflock.infer.predictive import Check
 from airflock.infer.tracks import Scale
+from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
@@ -118,7 +119,8 @@ class Inferred:
         document = self.document()
         assert self.best is not None
         own = self.best.candidate.scenario
-        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        given = Given(law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        return make(document, f"{self.best.name}, inferred", given=given)
 
 
 def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:

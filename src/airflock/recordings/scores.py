@@ -25,6 +25,7 @@ from airflock.metrics.registry import POWER, SETS, reports
 from airflock.radios.registry import RADIOS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
+from airflock.scenarios.families import Given
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -239,7 +240,7 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
         "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return make(document, "recording", settings, law=UNKNOWN)
+    return make(document, "recording", settings, given=Given(law=UNKNOWN))
 
 
 def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, Any]) -> Scenario:
@@ -267,7 +268,8 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
             {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
             for group in document["groups"]
         ]
-    return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
+    others = {key: value for key, value in settings.items() if not key.startswith("model.")}
+    return make(stand_in, name, others, given=Given(law=UNKNOWN))
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
