@@ -38,6 +38,7 @@ def memory(
 
     starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of each agent
     packed : (place, component) states and, as an integer, the slot; flat : (component, place) states; ident : agents
+    Between two sorts, `tally` and `ident` are scratch of whoever looks for links by cells.
     """
     if not plan.grid:
         return ()
