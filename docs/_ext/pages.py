@@ -290,6 +290,7 @@ def vocabulary() -> None:
         "sample": "of an order parameter: the values of one instant",
         "survey": "of an order parameter: asked once for the whole flock",
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
+        "linked_within": "of an order parameter: distance beyond which no two agents are linked, m",
         "settled": "of an order parameter: whether nobody farther than `beyond` (m) can change its Pair",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
         "limits": "of a body: what of a scenario it cannot fly, as lines",

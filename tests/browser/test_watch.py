@@ -51,6 +51,25 @@ def opened(tab, view):
     tab.get_by_text("Pause").first.wait_for(timeout=PATIENCE * 1000)
 
 
+SHOWN = """Object.values(window.__viserTestpoints?.uplots ?? {})
+    .map(({chart}) => [chart.scales.x.min, chart.scales.x.max, chart.data[0][0], chart.data[0].at(-1)])"""
+
+
+def test_charts_show_all_of_a_flight_also_after_they_were_hidden(live, tab):
+    player, view, _ = live
+    opened(tab, view)
+    until(lambda: player.time > 8.0, "it does not fly")
+    tab.get_by_role("tab", name="Measure").click()
+    end = player.time + 3.0
+    until(lambda: player.time > end, "it does not fly on")
+    shown = tab.evaluate(SHOWN)
+    assert len(shown) >= 5
+    assert all(
+        low <= first and last <= high <= first + 2.5 * max(last - first, 1.0) for low, high, first, last in shown
+    )
+    assert max(last for _, _, _, last in shown) > 8.0
+
+
 def test_the_flock_is_seen_moves_pauses_and_takes_changes(live, tab):
     player, view, _ = live
     opened(tab, view)

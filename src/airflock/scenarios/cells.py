@@ -1,4 +1,7 @@
-"""Cells: whether neighbours are found by cells, as wide as the law's reach, instead of among all pairs."""
+"""Cells: whether neighbours are found by cells, as wide as the law's reach, instead of among all pairs.
+
+And whether order parameters look at pairs by cells.
+"""
 
 from dataclasses import replace
 
@@ -7,6 +10,10 @@ from airflock.scenarios.timing import clock
 from airflock.world.place import half_sizes
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
+
+# Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as fast. A pair costs four
+# times as much where its offset goes to the nearest image (benchmarks/RESULTS-boids.md).
+NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 
 
 def takes_all_cores(scenario: Scenario) -> bool:
@@ -58,3 +65,9 @@ def has_room(scenario: Scenario) -> bool:
         return True
     halves = half_sizes(scenario.world)[: scenario.dimensions]
     return min(halves) >= float(scenario.model.reach(scenario.parameters))
+
+
+def measured_by_cells(scenario: Scenario) -> bool:
+    """Whether order parameters look at pairs by cells, too, where neighbours are found so."""
+    periodic = scenario.world.edges == "periodic"
+    return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))

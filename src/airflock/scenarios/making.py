@@ -23,7 +23,7 @@ from airflock.scenarios import (
     wings,
 )
 from airflock.scenarios.advice import advice
-from airflock.scenarios.cells import group_notes, takes_all_cores
+from airflock.scenarios.cells import group_notes, measured_by_cells, takes_all_cores
 from airflock.scenarios.document import TOP, components, merged, with_kinds
 from airflock.scenarios.families import FAMILIES, METRICS, NOTHING, TOPOLOGY, Given
 from airflock.scenarios.gathering import Gathered, gathered
@@ -198,7 +198,8 @@ def _published(table: Any) -> dict[str, tuple[float, float | None]]:
 
 def _notes(scenario: Scenario) -> list[str]:
     """What cannot be meant, for a person to read; nothing here stops a flight."""
-    notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, takes_all_cores(scenario))
+    cells = takes_all_cores(scenario) and measured_by_cells(scenario)
+    notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
     notes += timing.notes(scenario) + wings.notes(scenario) + group_notes(scenario)
     p = scenario.parameters
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):

@@ -22,6 +22,8 @@ class Metric:
 
     within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
               while no two agents are nearer than that. A driver may then skip the pair loop.
+    linked_within : `linked_within(q)`, m; the metric promises that no two agents farther apart than that are linked.
+              Large flocks then look for links among those who are near
     settled : whether nobody farther than `beyond` (m) can change what `pair` adds up to for an agent. Large flocks then
               look no farther than they must
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
@@ -47,6 +49,7 @@ class Metric:
     Memory: type | None = None
     within: Callable[..., float] | None = None
     settled: Callable[..., bool] | None = None
+    linked_within: Callable[..., float] | None = None
     survey: Callable[..., None] | None = None
     Shared: type | None = None
     workspace: Callable[..., Any] | None = None
@@ -69,6 +72,9 @@ class Metric:
         return ABSENCE[how.pop() if len(how) == 1 else "mean"]
 
 
+MEASURING = (
+    "pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "linked_within", "survey",
+)  # fmt: skip
 RULES_AND_RECORDS = (
     ("sample", "Sample"), ("pair", "Pair"), ("agent", "Agent"), ("member", "Member"), ("cluster", "Cluster"),
     ("cluster", "linked"), ("survey", "Shared"), ("survey", "workspace"),
@@ -117,7 +123,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     for rule, record in RULES_AND_RECORDS:
         if rule in found and record not in found:
             raise RuleError(f"metric {name} has a rule {rule} but no {record}")
-    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey"):
+    for kind in MEASURING:
         if kind in found:
             asks(found[kind], kind, name)
     fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
@@ -132,7 +138,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "settled", "total", "survey", "Shared", "workspace",
+        "Memory", "within", "settled", "linked_within", "total", "survey", "Shared", "workspace",
     )  # fmt: skip
     return Metric(
         name=name,
