@@ -3,6 +3,8 @@
 And whether order parameters look at pairs by cells.
 """
 
+from dataclasses import replace
+
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.world.place import half_sizes
@@ -33,6 +35,19 @@ def takes_all_cores(scenario: Scenario) -> bool:
         and not any(letter == "p" for letter, _ in scenario.varied)
         and has_room(scenario)
     )
+
+
+def group_notes(scenario: Scenario) -> list[str]:
+    """A note where only the groups keep a large flock from being flown by cells."""
+    if not scenario.groups or scenario.agents < GRID_FROM or takes_all_cores(scenario):
+        return []
+    if not takes_all_cores(replace(scenario, groups=())):
+        return []
+    what = "laws" if len(scenario.laws) > 1 else "numbers of the law"
+    return [
+        f"groups: where {what} differ, each of {scenario.agents} agents looks at all others, on one core, and not at "
+        "those in the cells around it, on all cores"
+    ]
 
 
 def by_cells(scenario: Scenario) -> bool:

@@ -8,6 +8,13 @@ from airflock.core.contract.namespaces import names_of
 from airflock.core.vocabulary import CLOCKS, OVER_TIME, REDUCTIONS, asks
 from airflock.errors import RuleError
 
+ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
+    "mean": "mean over instants, each as that of a flock of those who are there",
+    "sum": "counted over all instants, of those who are there",
+    "min": "the smallest over all instants, of those who are there",
+    "max": "the largest over all instants, of those who are there",
+}
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -55,6 +62,14 @@ class Metric:
 
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
+
+    def absence(self, name: str) -> str:
+        """How one of its order parameters is taken while some agents are absent, for people to read."""
+        how = {self.over_time.get(field, "mean") for field in self.Sample._fields}  # type: ignore[attr-defined]
+        how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how  # type: ignore[attr-defined]
+        if name not in self.Sample._fields and "sum" in how:  # type: ignore[attr-defined]
+            return "mean over agents and instants, of those who are there"
+        return ABSENCE[how.pop() if len(how) == 1 else "mean"]
 
 
 MEASURING = (
