@@ -105,6 +105,8 @@ class State:
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
+        if not self.tables.due:
+            return self._fly(first, last, half, frames)
         due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
         step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
         for stop in [*(step for step in due if step > first or not half & 1), last]:
