@@ -46,6 +46,8 @@ NAMES = {
     "CALLED": ("compiler", "CALLED"),
     "INNER": ("compiler", "INNER"),
     "Flown": ("cpu", "Flown"),
+    "SCRIPT": ("aside", "SCRIPT"),
+    "compile_aside": ("aside", "compile_aside"),
     "driver_of": ("drivers", "driver_of"),
     "flight_driver": ("drivers", "flight_driver"),
     "CudaBuilder": ("cuda.build", "CudaBuilder"),
