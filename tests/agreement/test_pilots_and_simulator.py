@@ -16,8 +16,9 @@ import airflock
 from airflock.body.registry import BODIES
 from airflock.core.agent import State, answer
 from airflock.core.contract import model
+from airflock.core.hearing import Hearing
 from airflock.core.parameters import choices
-from airflock.core.pilot import Hearing, Pilot
+from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import complete, could_be_near, counts, of_standing
 from airflock.errors import RuleError

@@ -15,6 +15,7 @@ from airflock.engine import plan_of
 from airflock.errors import CardError, ScenarioError
 from airflock.evolve.space_table import read_space
 from airflock.onboard.card import card_of, hash_of
+from airflock.scenarios.families import Given
 from airflock.scenarios.files import make
 from fleets import document, scenario
 from flocks import ISLANDS, interpreted
@@ -54,7 +55,7 @@ def counted(places, velocities=None, **keys):
     places = np.array(places, float)
     start = np.concatenate([places.T, np.zeros_like(places.T) if velocities is None else np.array(velocities).T])
     keys = IDEAL | {"agents": len(places)} | {name.replace("__", "."): value for name, value in keys.items()}
-    found = make({"model": {"kind": "counting"}}, "test", keys, law=COUNTING)
+    found = make({"model": {"kind": "counting"}}, "test", keys, given=Given(law=COUNTING))
     text, known = (flight(found, 1, start).frames[-1, 4:6] for flight in (interpreted, fly_plainly))
     np.testing.assert_allclose(text, known, atol=1e-12)
     return text[0].tolist(), text[1].tolist()
@@ -147,7 +148,7 @@ def test_whatever_the_radio_the_same_are_met_as_in_the_reference(kind, seed):
         for trait, half in zip(RADIOS, halves, strict=True):
             keys |= trait if number in half else {}
         found, plain = (
-            make({"model": {"kind": "counting"}}, "test", keys | more, law=COUNTING)
+            make({"model": {"kind": "counting"}}, "test", keys | more, given=Given(law=COUNTING))
             for more in ({}, {"topology.kind": "range"})
         )
         world = rng.randrange(2**32)

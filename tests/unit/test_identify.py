@@ -348,6 +348,28 @@ def test_all_faults_of_the_command_are_told_at_once(tmp_path):
     assert done.returncode == 2 and "has no velocity" in done.stderr and len(done.stderr.splitlines()) == 1
 
 
+def test_logs_without_commands_say_so_and_write_nothing(tmp_path):
+    t = np.arange(0.0, 30.0, 0.05)
+    columns = {"t": t, "x": np.sin(t), "y": np.cos(t), "vx": np.cos(t), "vy": -np.sin(t)}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    out = tmp_path / "mine.toml"
+    done = called("identify", tmp_path / "log.csv", "--like", "vasarhelyi_2018/real_6ms", "--out", out)
+    lines = done.stderr.splitlines()
+    assert done.returncode == 2 and not out.exists() and "tell no number" in done.stderr
+    assert len({line.partition(": ")[2].partition(": ")[2] for line in lines}) == len(lines)  # each reason once
+    body = [line for line in lines if "body.tau, body.a_max, body.noise: " in line]
+    assert len(body) == 1 and "--map cx:=COLUMN" in body[0]
+
+
+def test_the_table_says_where_each_number_is_from(capsys):
+    from airflock.cli.identify import _table
+
+    logs, _ = fly(0.5, 4.0, 0.05, 0.05, drones=2)
+    _table(identify(logs, "vasarhelyi_2018/real_6ms"))
+    told = capsys.readouterr().out
+    assert "from" in told and " rows, " in told and "radio.delay, radio.near" in told
+
+
 def test_the_command_prints_one_json_object(tmp_path):
     logs, _ = fly(0.5, 4.0, 0.05, 0.05, drones=2)
     columns = {"t": logs.time, "x": np.cumsum(logs.velocity[:, 0]) * STEP, "y": np.cumsum(logs.velocity[:, 1]) * STEP}

@@ -53,6 +53,12 @@ def test_a_long_table_is_read_to_the_last_bit():
     assert (found["confidence"] == 1.0).all() and found.attrs["fps"] == RATE
 
 
+def test_a_column_named_for_the_animal_holds_the_individuals():
+    for name in ("fish", "animal_id", "Bird"):
+        found = airflock.load_tracks(flock().rename(columns={"id": name}))
+        assert list(found["individual"].values) == ["bird_0", "bird_1", "bird_2"], name
+
+
 def test_units_of_headers_and_expressions_say_the_same(tmp_path):
     own = circle()
     plain = airflock.load_tracks(own)
@@ -231,7 +237,12 @@ def test_each_fault_is_one_line_that_says_what_to_write(tmp_path):
     own = circle()
     swapped = own.rename(columns={"x": "y", "y": "x"})
     line = refused(written(tmp_path, swapped))
-    assert line.count("\n") == 0 and "column x (x), row 2 on: moves like vy" in line and "write x:=y and y:=x" in line
+    assert line.count("\n") == 0 and "column x (x), row 2 on: moves like vy" in line
+    assert 'write --map "x:=y" --map "y:=x"' in line
+    # positions north-east, velocities east-north: what --axes exchanges both ways is told for the positions alone
+    line = refused(written(tmp_path, swapped), axes="ned")
+    assert 'write, without --axes, --map "x:=y" --map "y:=x"' in line
+    airflock.load_tracks(written(tmp_path, swapped), map={"x": "y", "y": "x"})
     ned = own.rename(columns={"x": "y", "y": "x"}).assign(vx=own["vx"], vy=own["vy"], z=-20.0)
     assert "--axes ned" in refused(written(tmp_path, ned))
     assert "vx:=-vx" in refused(written(tmp_path, own.assign(vx=-own["vx"])))
@@ -247,7 +258,7 @@ def test_each_fault_is_one_line_that_says_what_to_write(tmp_path):
     turns = pd.concat([own.iloc[::2], circle(5).iloc[1::2]]).sort_values("t").assign(id="one")
     assert "two individuals under one id" in refused(written(tmp_path, turns))
     below = own.assign(z=-20.0)
-    assert "write z:=-z" in refused(written(tmp_path, below))
+    assert 'write --map "z:=-z"' in refused(written(tmp_path, below))
 
 
 def test_a_reset_of_the_estimator_splits_and_an_outlier_is_left_out(tmp_path):
@@ -335,6 +346,6 @@ def test_what_a_wrong_unit_of_time_says_to_write_is_right(tmp_path, header, time
     table.to_csv(tmp_path / "a.csv", index=False)
     with pytest.raises(RecordingError, match="the time counts") as fault:
         airflock.load_tracks(tmp_path / "a.csv")
-    advice = re.search(r"write t:=(.+?); or keep", str(fault.value))[1]
+    advice = re.search(r"write --map \"t:=(.+?)\"; or keep", str(fault.value))[1]
     found = airflock.load_tracks(tmp_path / "a.csv", map={"t": advice})
     assert float(found["time"][-1] - found["time"][0]) == pytest.approx(29.9, rel=1e-3)

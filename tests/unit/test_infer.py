@@ -8,7 +8,7 @@ import xarray as xr
 
 import airflock
 from airflock.errors import AirflockError, RecordingError
-from airflock.infer import bootstrap, candidates, search, select
+from airflock.infer import bootstrap, candidates, flights, noise, ridges, search, select
 from airflock.infer.found import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
@@ -60,7 +60,8 @@ def brief(monkeypatch):
     """Little searching: enough for two laws of a few numbers."""
     for module, name, value in (
         (search, "DRAWN", 5), (search, "RACE", ((4, 3), (2, 5))), (search, "SWEEPS", 0), (bootstrap, "ROUNDS", (2, 5)),
-        (bootstrap, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6),
+        (flights, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6), (ridges, "RIDGES", 1),
+        (noise, "FLOWN", 24),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 
@@ -71,6 +72,8 @@ def test_the_law_that_made_the_tracks_is_found_with_its_numbers():
     assert found.best is not None and found.best.name == "vicsek_1995", found.verdict
     radius, speed, eta = (found.best.numbers[key] for key in ("model.r", "body.speed", "model.eta"))
     assert radius.low < RADIUS < radius.high and radius.high / radius.low < 1.5
+    assert radius.least < radius.low and radius.high < radius.most  # all numbers together: wider
+    assert eta.low < 0.8 < eta.high
     assert speed.value == pytest.approx(SPEED, rel=0.02)
     assert eta.value == pytest.approx(0.8, rel=0.25)
     assert found.noise.seen == pytest.approx(0.01, rel=0.4)
@@ -112,14 +115,12 @@ def test_errors_of_perception_alone_move_nobody():
     def apart(radius, blur):
         numbers = {n.column: (NUMBERS | {"model.r": radius})[n.key] for n in law.numbers if n.key in NUMBERS}
         walk.errors(numbers, gains, SPEED, None, kept)
-        flights = [
-            bootstrap.flown(
-                walk, (numbers, gains, SPEED), kept, bootstrap.Noise(bootstrap.BLURRED, sd, 0.0, 0.0), [0], 1
-            )
+        flown = [
+            flights.flown(walk, (numbers, gains, SPEED), kept, flights.Noise(flights.BLURRED, sd, 0.0, 0.0), [0], 1)
             for sd in (blur, 0.0)
         ]
         end = tracks.spans[0][1]
-        return np.abs(tracks.nearest(flights[0].seen[end - 1] - flights[1].seen[end - 1])).max()
+        return np.abs(tracks.nearest(flown[0].seen[end - 1] - flown[1].seen[end - 1])).max()
 
     assert apart(2.0 * SIDE, 0.1) < 1e-9
     assert apart(RADIUS, 0.1) > 1e-3 and apart(RADIUS, 0.0) == 0.0
@@ -130,9 +131,9 @@ NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}
 
 def test_a_law_has_its_noise_at_zero_and_its_ranges_cut_to_what_was_seen():
     scale = scale_of([tracks_of(vicsek())])
-    for name, noise in (("couzin_2002", "model.sigma"), ("vicsek_1995", "model.eta")):
+    for name, key in (("couzin_2002", "model.sigma"), ("vicsek_1995", "model.eta")):
         law = candidates.candidate(candidates.scenarios_of([name], {})[0][0], scale, 2)
-        assert [n.key for n in law.noises] == [noise] and noise not in [n.key for n in law.numbers]
+        assert [n.key for n in law.noises] == [key] and key not in [n.key for n in law.numbers]
         lengths = [n for n in law.numbers if n.unit == "m"]
         assert lengths and all(n.high <= 1.2 * scale.far for n in lengths)
 
@@ -183,6 +184,17 @@ def test_bad_tracks_and_laws_are_one_line_each():
         airflock.infer(tracks, ["couzin_2002", "vicsek_1995/ordered"])
     with pytest.raises(AirflockError, match="whole flock"):
         airflock.infer(tracks, ["dimock_2003/published"])
+
+
+def test_what_is_wrong_for_all_laws_is_said_once_and_files_name_their_import(tmp_path):
+    with pytest.raises(AirflockError) as fault:
+        airflock.infer(vicsek(frames=130), ["vicsek_1995", "couzin_2002"], settings={"world.arena": "circel"})
+    assert len(str(fault.value).splitlines()) == 1 and "did you mean circle?" in str(fault.value)
+    path = tmp_path / "fish.csv"
+    path.write_text("frame,fish,x_px,y_px\n0,a,1,2\n0,b,5,6\n1,a,2,3\n1,b,6,7\n")
+    with pytest.raises(AirflockError, match="airflock import fish.csv ... --save tracks.nc") as fault:
+        airflock.infer(path)
+    assert "--scale" in str(fault.value)
 
 
 def test_the_best_is_named_with_its_doubts():

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airflock.infer import noise as noises
 from airflock.infer.candidates import Number
 from airflock.infer.fit import (
     FINE,
@@ -20,7 +21,9 @@ from airflock.infer.fit import (
     settle,
     spread,
 )
+from airflock.infer.flights import Noise
 from airflock.infer.likelihood import Model
+from airflock.infer.ridges import ridges
 from airflock.infer.search import drawn, profile, race, usual
 from airflock.infer.told import simplify, telling
 
@@ -185,3 +188,79 @@ def test_a_limit_that_nobody_reaches_has_no_upper_end():
     assert below.tolist() == [False, False] and above.tolist() == [True, False]
     edge = fit.place[0] - closed_end(model, fit, [0], 0, 0.0)
     assert 0.4 < edge < 0.5  # the largest that the tracks ask for is 0.5
+
+
+def test_numbers_that_make_up_for_each_other_go_as_far_as_their_ridge_bends():
+    """Across is known for each along; along alone is told as by a straight line of x²."""
+
+    def law(x, along, across):
+        return 30.0 * (across - 0.5 - 1.5 * (along - 0.5) ** 2) * x + 0.3 * along * x**2
+
+    model = Line(law, ("along", "across"), (0.5, 0.5))
+    fit = climb(model, np.array([0.5, 0.5]), [0, 1])
+    drop = 1.92
+    fit, ways = ridges(model, fit, [0], drop)
+    low, high = ways.ends(fit.place, drop)
+    x, variance = model.input, fit.score.variances()[0]
+    own = x**2 - x * (x @ x**2) / (x @ x)  # what x does not make up for
+    half = np.sqrt(2.0 * drop * variance / (0.09 * own @ own))
+    assert 0.1 < half < 0.4
+    assert high[0] - low[0] == pytest.approx(2.0 * half, rel=0.2)
+    farthest = max(abs(low[0] - 0.5), abs(high[0] - 0.5))
+    # on both ways across rises; the curvature says that it stands still
+    assert high[1] == pytest.approx(0.5 + 1.5 * farthest**2, abs=0.25 * 1.5 * farthest**2)
+    assert spread(model, fit, [0])[1] < 0.3 * (high[1] - 0.5)
+
+
+def test_a_way_along_a_ridge_that_leads_higher_is_gone():
+    def law(x, along, across):  # a second, higher hill on the same ridge
+        return 30.0 * (across - along) * x + 0.1 * np.sin(3.0 * np.pi * along) * x**2 + 0.1 * along * x**2
+
+    model = Line(law, ("along", "across"), (0.83, 0.83))
+    beside = climb(model, np.array([0.2, 0.2]), [0, 1], slopes=(FINE,))
+    best = climb(model, np.array([0.83, 0.83]), [0, 1])
+    assert beside.loss > best.loss + 2.0
+    assert ridges(model, beside, [0], 60.0)[0].loss < best.loss + 0.5
+
+
+class Drawn:
+    """Flights whose statistics are known: one grows with the noise of the law above that of the tracks."""
+
+    def __init__(self, noise, generator):
+        self.model = SimpleNamespace(named=1, own_speed=False)
+        self.spans, self.generator, self.wanted = [0], generator, np.zeros(2)
+        self.wanted = self.statistics(noise)
+
+    def statistics(self, noise):
+        means = np.log(noise.law**2 + 0.01), np.log(noise.seen)
+        return np.array(means) + self.generator.normal(0.0, 0.03, 2)
+
+    def tracks(self, place, noise, seed):
+        return noise
+
+    def model_of(self, tracks):
+        return tracks
+
+
+def test_the_interval_of_a_laws_noise_holds_it_in_95_percent(monkeypatch):
+    held, wide = 0, []
+    flights = None
+    monkeypatch.setattr(noises, "statistics", lambda twin, place, spans: flights.statistics(twin))
+    for seed in range(100):
+        flights = Drawn(Noise(0, 0.3, 0.0, 0.02), np.random.default_rng(seed))
+        guess = Noise(0, 0.3 * np.exp(0.5 * np.sin(seed)), 0.0, 0.02)
+        found = noises.own_noise(flights, np.array([0.5]), np.zeros(1), guess, np.array([0.5]), (0.975,), seed)
+        low, high = found[1][0]
+        held += low < 0.3 < high
+        wide.append(high / low)
+    assert 89 <= held <= 100  # of 100; 95 are meant, and fewer than 89 come by chance in one of 100 cases
+    assert np.median(wide) < 1.25
+
+
+def test_noise_that_does_not_show_beside_that_of_the_tracks_has_no_lower_end(monkeypatch):
+    flights = Drawn(Noise(0, 1e-3, 0.0, 0.02), np.random.default_rng(5))
+    monkeypatch.setattr(noises, "statistics", lambda twin, place, spans: flights.statistics(twin))
+    guess = Noise(0, 2e-3, 0.0, 0.02)
+    found = noises.own_noise(flights, np.array([0.5]), np.zeros(1), guess, np.array([0.5]), (0.975,), 1)
+    low, high = found[1][0]
+    assert low is None and high is not None and 0.01 < high < 0.1

@@ -34,6 +34,7 @@ from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import courses, scenario_of
+from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.stage.arrows import vectors
 
@@ -266,7 +267,7 @@ def test_rules_of_any_model_are_drawn_vector_by_vector():
     r = np.array([1.0, 2.0, 4.0])
     apart, velocity = repulsion(found, parameters, r)
     assert np.allclose(apart.values, 1.0 / r) and not velocity.values.any()
-    figure = rules(make({"agents": 3}, "own", law=found), difference=2.0)
+    figure = rules(make({"agents": 3}, "own", given=Given(law=found)), difference=2.0)
     assert [axes.get_ylabel() for axes in figure.axes] == ["apart", "v"]  # a panel for each vector
 
 

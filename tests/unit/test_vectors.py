@@ -14,6 +14,7 @@ from airflock.engine import driver_text, fly
 from airflock.errors import ParameterError, RuleError, ScenarioError
 from airflock.evolve.space import full_space
 from airflock.rules.generate import Source
+from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.studio.controls import controls_of
 from flocks import interpreted
@@ -25,7 +26,7 @@ LAW = airflock.model(vars(several_terms))
 
 def terms(**settings):
     """A scenario of the law with several terms."""
-    return make({}, "terms", CLOSE | {"world.arena": "none"} | settings, law=LAW)
+    return make({}, "terms", CLOSE | {"world.arena": "none"} | settings, given=Given(law=LAW))
 
 
 def weights(found):
@@ -66,9 +67,11 @@ def test_faults_of_a_declaration_and_of_values_are_one_line_each():
 def test_a_scenario_gives_a_vector_whole_or_by_component_and_tells_all_that_is_wrong():
     assert weights(terms()) == (0.5, 0.3, 0.1)
     assert weights(terms(**{"model.w": [0.4, "0.2 m/s", 0.0]})) == (0.4, 0.2, 0.0) == weights(terms(w=[0.4, 0.2, 0.0]))
-    base = make({"model": {"w": {"value": [0.4, 0.2, 0.0], "unit": "m/s"}}}, "t", {"model.w_2": 1.0}, law=LAW)
+    base = make(
+        {"model": {"w": {"value": [0.4, 0.2, 0.0], "unit": "m/s"}}}, "t", {"model.w_2": 1.0}, given=Given(law=LAW)
+    )
     assert weights(base) == (0.4, 0.2, 1.0)
-    assert weights(make(base.document, "t", {"model.w": [1, 2, 3]}, law=LAW)) == (1.0, 2.0, 3.0)
+    assert weights(make(base.document, "t", {"model.w": [1, 2, 3]}, given=Given(law=LAW))) == (1.0, 2.0, 3.0)
     with pytest.raises(ScenarioError) as told:
         terms(**{"model.w": [9.0, "x", 0.1], "model.reach": -1.0})
     assert str(told.value).splitlines() == [

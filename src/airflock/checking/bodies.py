@@ -12,11 +12,11 @@ from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.single import run
 from airflock.checking.units import COMMAND_UNITS, OTHERS, factor, rescaled
 from airflock.core.agent import answer
-from airflock.core.contract import Body, body
+from airflock.core.contract import Body
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.rules import law
-from airflock.scenarios import checks
+from airflock.scenarios.families import BODY
 
 MOTIONS = 40  # random motions that each truth is tried on
 REMEMBERED = 5  # steps after which a body that remembers is looked at
@@ -58,10 +58,7 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     >>> airflock.check_body("multirotor").broken
     ()
     """
-    if isinstance(what, str):
-        found = accepted(checks.body_of({"kind": what}, None, trust=True))
-    else:
-        found = what if isinstance(what, Body) else body(what)
+    found = accepted(BODY.given(what))
     b = found.Parameters(**dict(parameters or {}))
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
     rng = np.random.default_rng(seed)

@@ -13,9 +13,8 @@ from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.units import OTHERS, Units, factor, rescaled, rescaled_scenario
 from airflock.core.contract import Metric, MetricSet
 from airflock.engine import measure_frames
-from airflock.metrics.registry import as_set
 from airflock.rules import law
-from airflock.scenarios import checks
+from airflock.scenarios.families import METRICS, Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
@@ -58,7 +57,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     >>> airflock.check_metric("order").broken
     ()
     """
-    found = accepted(checks.metrics_set({"kind": what}, trust=True)) if isinstance(what, str) else as_set(what)
+    found = accepted(METRICS.given(what))
     scenario = _scenario(found, dimensions)
     rng = np.random.default_rng(seed)
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
@@ -92,7 +91,7 @@ def _scenario(found: MetricSet, dimensions: int) -> Scenario:
         "metrics.r_comm": 15.0, "metrics.r_b": 6.0, "metrics.t_settle": 0.0, "wing.segments": "5",
         "wing.tolerance": 1e-14,
     }  # fmt: skip
-    return make({"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, measures=found)
+    return make({"model": {"kind": "vasarhelyi_2018"}}, f"check of {found.name}", keys, given=Given(measures=found))
 
 
 def _flock(rng: np.random.Generator, dims: int) -> Flock:

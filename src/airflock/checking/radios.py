@@ -11,10 +11,10 @@ from airflock.checking.single import run
 from airflock.checking.units import OTHERS, Units, rescaled
 from airflock.core.agent import answer
 from airflock.core.parameters import choices
-from airflock.core.radio import RULES, Radio, radio
+from airflock.core.radio import RULES, Radio
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.rules import law
-from airflock.scenarios import checks
+from airflock.scenarios.families import RADIO
 
 TRIES = 60  # random pairs that each truth is tried on
 CLOSE = 1e-9
@@ -55,10 +55,7 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
     >>> airflock.check_radio("bursts").broken
     ()
     """
-    if isinstance(what, str):
-        found = accepted(checks.radio_of({"kind": what}, None, trust=True))
-    else:
-        found = what if isinstance(what, Radio) else radio(what)
+    found = accepted(RADIO.given(what))
     k = found.Parameters(**dict(parameters or {}))
     pairs = list(_pairs(found, seed))
     rules = [rule for kind in RULES if (rule := getattr(found, kind)) is not None]

@@ -55,10 +55,10 @@ class Report:
         return tuple(truth.name for truth in self.truths if truth.fault)
 
 
-def accepted(found: tuple[Found, list[str]]) -> Found:
+def accepted(found: tuple[Found | None, list[str]]) -> Found:
     """What was found, of it and its faults; raises a ScenarioError if there are any."""
     what, faults = found
-    if faults:
+    if faults or what is None:
         raise ScenarioError(faults)
     return what
 

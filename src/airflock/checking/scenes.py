@@ -13,6 +13,7 @@ from airflock.checking.units import Units
 from airflock.core.agent import Heard, State, decide
 from airflock.core.contract import Model
 from airflock.core.vocabulary import Percept
+from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
@@ -104,7 +105,7 @@ def law_of(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
     keys = {f"model.{name}": value for name, value in parameters.items()}
     keys |= {"agents": AGENTS, "world.dimensions": str(dimensions), "wing.segments": "5", "start.separation": 0.0}
     keys |= {"world.arena": "none", "start.kind": "ball", "start.radius": length, "radio.range": 10.0 * length}
-    scenario = make({"model": {}}, f"check of {found.name}", keys, law=found)
+    scenario = make({"model": {}}, f"check of {found.name}", keys, given=Given(law=found))
     speed = float(found.preferred_speed(p)) if found.preferred_speed else 0.0
     speed = speed or min(float(getattr(scenario.body, "speed", getattr(scenario.body, "speed_max", 1.0))), 10.0)
     period = min(0.2, 0.05 * length / speed)
@@ -112,7 +113,7 @@ def law_of(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
     times = {"dt": dt, "duration": 8.0 * period, "sensors.period": period, "metrics.period": period}
     side = {"world.arena": "square", "world.side": 4.0 * length, "world.height": 4.0 * length}
     keys |= times | side | {"radio.delay": period, "metrics.collision_period": dt}
-    return Law(found, make({"model": {}}, f"check of {found.name}", keys, law=found), length, speed)
+    return Law(found, make({"model": {}}, f"check of {found.name}", keys, given=Given(law=found)), length, speed)
 
 
 def directions(rng: np.random.Generator, count: int, dims: int) -> NDArray[np.float64]:

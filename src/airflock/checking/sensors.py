@@ -12,10 +12,10 @@ from airflock.checking.units import OTHERS, Units, rescaled
 from airflock.core.agent import State
 from airflock.core.parameters import Quantity, choices, declarations
 from airflock.core.sensing import added, measured
-from airflock.core.sensor import COMPONENTS, Sensor, sensor
+from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.vocabulary import asks
 from airflock.rules import law
-from airflock.scenarios import checks
+from airflock.scenarios.families import SENSOR
 
 TRACKS, MEASUREMENTS = 8, 60  # random tracks that each truth is tried on, and how often each is measured
 LONG = 3000  # measurements after which an error is still bounded
@@ -55,10 +55,7 @@ def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed
     >>> airflock.check_sensor("gnss").broken
     ()
     """
-    if isinstance(what, str):
-        found = accepted(checks.sensor_of({"kind": what}, None, trust=True))
-    else:
-        found = what if isinstance(what, Sensor) else sensor(what)
+    found = accepted(SENSOR.given(what))
     s = found.Parameters(**dict(parameters or {}))
     period = s.period or 0.2
     rng = np.random.default_rng(seed)

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.units import OTHERS, rescaled
 from airflock.core.maths import FAR, TINY
-from airflock.core.topology import Topology, topology
+from airflock.core.topology import Topology
 from airflock.core.vocabulary import asks
 from airflock.rules import law
-from airflock.scenarios import checks
+from airflock.scenarios.families import TOPOLOGY
 from airflock.topology.parameters import Parameters as Usual
-from airflock.topology.registry import TOPOLOGIES
 
 TRIES = 40  # random flocks that each truth is tried on
 UNHEARD = 0.2  # share of the others that an agent does not hear
@@ -81,15 +80,10 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
 
 
 def _gathered(what: Any) -> Topology:
-    ours = TOPOLOGIES.get(what) if isinstance(what, str) else None
-    if ours is not None:
-        return ours
-    if isinstance(what, str):
-        kinds = ", ".join(name for name, kind in TOPOLOGIES.items() if kind is not None)
-        made, faults = checks.topology_of({"kind": what}, trust=True)
-        more = [] if made or faults else [f"{what!r} is no topology; known: {kinds}, or a file that ends in .py"]
-        what = accepted((made, [*faults, *more]))
-    return what if isinstance(what, Topology) else topology(what)
+    found, faults = TOPOLOGY.given(what)
+    if found is None and not faults:
+        faults = [f"topology {what!r}: agents meet all whom they hear; there is no rule to check"]
+    return accepted((found, faults))
 
 
 def _flocks(found: Topology, seed: int) -> Iterator[Others]:

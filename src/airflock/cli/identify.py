@@ -76,6 +76,8 @@ def identify(
         found = find(
             files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading, accept=accept or ()
         )
+    if out is not None and not found.settings():
+        raise AirflockError("\n".join([f"{out}: not written: these logs tell no number", *_reasons(found)]))
     check = _checked(found, flights, as_json)
     if out is not None:
         from airflock.evolve.folder import write
@@ -124,40 +126,52 @@ def _checked(found: Any, flights: int, quiet: bool) -> Any:
 
 
 def _table(found: Any) -> None:
-    from rich import box
     from rich.console import Console
+
+    from airflock.identify.run import NEVER
+
+    console = Console()
+    if found.settings():
+        console.print(_told(found))
+        console.print("not identified, kept from --like:")
+    else:
+        console.print(f"{found.logs.drones} drones: these logs tell no number; all are kept from --like:")
+    for line in _reasons(found):
+        console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
+    for key, reason in NEVER.items():
+        console.print(f"  {key}: {reason}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _reasons(found: Any) -> list[str]:
+    """Why numbers are not told, a line each reason."""
+    keys: dict[str, list[str]] = {}
+    for key, number in found.numbers.items():
+        if not number.told:
+            keys.setdefault(number.reason, []).append(key)
+    return [f"{', '.join(own)}: {reason}" for reason, own in keys.items()]
+
+
+def _told(found: Any) -> Any:
+    """Numbers that the logs tell, as a table."""
+    from rich import box
     from rich.table import Table
 
-    from airflock.identify.run import NEVER, UNITS
+    from airflock.identify.run import UNITS
 
     table = Table(
         title=f"{found.logs.drones} drones, like {found.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
     )
-    for name, justify in (
-        ("number", "left"),
-        ("value", "right"),
-        ("95 %", "right"),
-        ("unit", "left"),
-        ("like", "right"),
-    ):
+    columns = (("number", "left"), ("value", "right"), ("95 %", "right"), ("unit", "left"), ("like", "right"))
+    for name, justify in columns:
         table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
-    origins: dict[str, None] = {}
+    table.add_column("from")
     for key, number in found.numbers.items():
         if number.told:
             like = "" if number.like is None else tables.number(number.like)
             span = f"{number.low:.3g} to {number.high:.3g}"
-            table.add_row(
-                key, tables.number(number.value), span, UNITS[key] if UNITS[key] != "1" else "", like, number.origin
-            )
-    console = Console()
-    console.print(table)
-    console.print(f"from {'; '.join(origins)}", highlight=False, markup=False)
-    console.print("not identified, kept from --like:")
-    for key, number in found.numbers.items():
-        if not number.told:
-            console.print(f"  {key}: {number.reason}", highlight=False, markup=False)
-    for key, reason in NEVER.items():
-        console.print(f"  {key}: {reason}", highlight=False, markup=False)
+            unit = UNITS[key] if UNITS[key] != "1" else ""
+            table.add_row(key, tables.number(number.value), span, unit, like, number.origin)
+    return table
 
 
 def _verdicts(check: Any, found: Any, flights: int) -> None:

@@ -129,18 +129,23 @@ def _table(found: Any) -> None:
 
 
 def _numbers(found: Any) -> None:
+    from rich import box
     from rich.console import Console
+    from rich.table import Table
 
-    from airflock.infer.found import interval
+    from airflock.infer.found import between
 
-    console = Console()
-    console.print(
-        f"numbers of {found.best.name}; the intervals are meant to hold all of them together in 95 %", highlight=False
-    )
+    table = Table(title=f"numbers of {found.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
+    for name in ("number", "value", "unit", "95 % for it alone", "95 % for all together"):
+        table.add_column(name, justify="right" if name == "value" else "left", no_wrap=True)
     for key, number in found.best.numbers.items():
-        unit = "" if number.unit == "1" else f" {number.unit}"
-        console.print(f"  {key} {number.value:.4g}{unit}, {interval(number)}", highlight=False, markup=False)
-    console.print(f"  noise of the tracks {found.noise.seen:.3g} m", highlight=False)
+        table.add_row(
+            key, f"{number.value:.4g}", "" if number.unit == "1" else number.unit, between(number.low, number.high),
+            between(number.least, number.most),
+        )  # fmt: skip
+    console = Console()
+    console.print(table)
+    console.print(f"noise of the tracks {found.noise.seen:.3g} m", highlight=False)
 
 
 def _check(found: Any) -> None:
@@ -165,7 +170,7 @@ def _plain(found: Any) -> dict[str, Any]:
     best = None
     if found.best is not None:
         numbers = {
-            key: {"value": number.value, "low": number.low, "high": number.high, "unit": number.unit}
+            key: {name: getattr(number, name) for name in ("value", "low", "high", "least", "most", "unit")}
             for key, number in found.best.numbers.items()
         }
         best = {"name": found.best.name, "numbers": numbers, "noise_of_tracks": found.noise.seen}

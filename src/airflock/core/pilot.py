@@ -4,148 +4,25 @@ Checked once, when it is made: a law that asks for what a drone does not have is
 """
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Protocol, Self
+from typing import Any
 
-from airflock.core import random
 from airflock.core.agent import Decision, Heard, State, answer, decide, first_memory
 from airflock.core.contract import Body, Model
-from airflock.core.maths import FAR, norm
-from airflock.core.radio import Radio
+from airflock.core.hearing import Hearing, Packet, carried, lasts
+from airflock.core.maths import norm
+from airflock.core.senses import Senses, Vector, World
 from airflock.core.silence import Parameters as Silence
 from airflock.core.silence import back, complete, could_be_near, counts, of_standing, stands_until
 from airflock.core.topology import Topology, met_of
 from airflock.core.vocabulary import Percept, asks
 from airflock.errors import RuleError
 
-EARLY = 0.05  # s; how far in the future a neighbour's data may seem to be, by two clocks that differ
-
-
-Vector = tuple[float, float, float]
-STILL: Vector = (0.0, 0.0, 0.0)
-
-
-class World(Protocol):
-    """What a pilot asks of the world: `world.place.Place` answers from a map."""
-
-    def beside(self, own: State, other: State, /) -> State:
-        """State of another agent at its image nearest to own: itself wherever space is not periodic."""
-
-    def surfaces(self, x: float, y: float, z: float, /) -> Iterable[tuple[float, float, float, float]]:
-        """Distance (m) and unit normal of every wall and obstacle."""
-
-    def ray(self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, /) -> float:
-        """Free distance of a thin ray, m."""
-
-    def cast(
-        self, x: float, y: float, z: float, ux: float, uy: float, uz: float, length: float, radius: float, /
-    ) -> float:  # fmt: skip
-        """Free distance of a sphere, m."""
-
-    def blocked(self, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float, /) -> bool:
-        """Whether an obstacle or the scene stands between two places, m."""
-
-
-@dataclass(frozen=True)
-class Hearing:
-    """What is done with neighbours' data.
-
-    extrapolate : carry them forward with their own velocity to the moment of the decision
-    forget      : age (s) beyond which they say nothing; by the rule of silence they count up to its patience
-    once        : they say something at the one decision after they came, as over a radio of one constant delay
-    early       : how far (s) in the future they may seem to be, by two clocks that differ
-    in_order    : believe stamps: what is older than what is known says nothing
-    radio, k    : kind of radio whose rule carries them forward instead, and its numbers
-    """
-
-    extrapolate: bool = True
-    forget: float = 5.0
-    once: bool = False
-    early: float = EARLY
-    in_order: bool = True
-    radio: Radio | None = None
-    k: Any = None
-
-    @classmethod
-    def simulated(cls, radio: Radio, k: Any) -> "Hearing":
-        """As a simulated agent hears: packets of a plain radio count once, of one that keeps them until the next."""
-        return cls(False, forget=FAR, once=not radio.keeps, early=FAR, in_order=False, radio=radio, k=k)
-
-
-class Packet:
-    """The newest state of one neighbour, when it held (s), and how many decisions there were before it came.
-
-    stands : its sender said that it holds or returns
-    """
-
-    __slots__ = ("came", "sent_at", "stands", "state")
-
-    def __init__(self, state: State, sent_at: float, came: int, stands: bool = False):
-        self.state, self.sent_at, self.came, self.stands = state, sent_at, came, stands
-
-    def carried(self, now: float) -> State:
-        """The state carried forward with its own velocity."""
-        age = now - self.sent_at
-        x, y, z, vx, vy, vz = self.state
-        return State(x + vx * age, y + vy * age, z + vz * age, vx, vy, vz)
-
 
 def level(state: State) -> State:
     """A state in the plane."""
     x, y, _, vx, vy, _ = state
     return State(x, y, 0.0, vx, vy, 0.0)
-
-
-def carried(radio: Radio, k: Any, state: State, age: float) -> State:
-    """State of the newest packet, of this age (s), as a radio's rule carries it on to now."""
-    if radio.carry is None:
-        return state
-    x, y, z = answer(radio.carry, "carry", {**state._asdict(), "age": age, "k": k}, radio.name)
-    return state._replace(x=x, y=y, z=z)
-
-
-def lasts(radio: Radio, k: Any, age: float) -> bool:
-    """Whether the newest packet, of this age (s), counts by a radio's rule."""
-    return radio.lasts is None or bool(answer(radio.lasts, "lasts", {"age": age, "k": k}, radio.name) > 0.5)
-
-
-class Senses(Percept):
-    """What one agent perceives at one decision, bound to a map of the world and to its own random numbers."""
-
-    place: World
-    at: State
-    asker: tuple[int, int, int]
-    rays: int
-
-    @classmethod
-    def of(
-        cls, place: World, own: State, time: float, goal: Vector | None = None, asker: tuple[int, int, int] = (0, 0, 0)
-    ) -> Self:
-        """Percept at a position; goal: where it is (m), if there is one; asker: seed, number of decision and agent."""
-        offset = STILL if goal is None else (goal[0] - own.x, goal[1] - own.y, goal[2] - own.z)
-        found = cls(time, -own.x, -own.y, -own.z, *offset)
-        found.place, found.at, found.asker, found.rays = place, own, asker, 0
-        return found
-
-    def ray(self, ux: float, uy: float, uz: float, length: float) -> float:
-        """Free distance along the unit vector u, at most length, m."""
-        return self.place.ray(*self.at[:3], ux, uy, uz, length)
-
-    def cast(self, ux: float, uy: float, uz: float, length: float, radius: float) -> float:
-        """Free distance of a sphere of this radius along the unit vector u, at most length, m; counted in `rays`."""
-        self.rays += 1
-        return self.place.cast(*self.at[:3], ux, uy, uz, length, radius)
-
-    def normal(self, draw: int) -> float:
-        """Normal random number of this agent and decision."""
-        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
-        return float(random.normal_pair(words[0], words[1])[0])
-
-    def uniform(self, draw: int) -> float:
-        """Uniform random number of this agent and decision."""
-        words = random.words(self.asker[0], random.MODEL, 0, *self.asker[1:], draw)
-        return float(random.uniform(words[0]))
 
 
 class Pilot:

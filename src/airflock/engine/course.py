@@ -213,6 +213,8 @@ class Course:
 
     def restore(self, moment: Snapshot) -> None:
         """Go back (or on) to a moment of this course or of a twin of it. Raises FlightError for any other."""
+        if not isinstance(moment, Snapshot):
+            raise FlightError(f"snapshot = {moment!r} is not what snapshot() of a flight returns")
         if moment.version != __version__:
             raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
         if moment.origin is not self.origin:

@@ -112,7 +112,7 @@ class Flight(Acting):
             event = self._planned.pop(0)
             self._advance(event.step)
             self.event(event.kind, **event.data)
-        self._advance(last)
+        self._advance(min(last, self._course.steps))  # a change on the way may have made the flight shorter
 
     def _advance(self, last: int) -> None:
         first = self.step
@@ -136,7 +136,7 @@ class Flight(Acting):
 
         Of a flight that was never changed these are the scores of the closed flight.
         """
-        if not self.over:
+        while not self.over:  # a change on the way may make it longer
             self._fly_to(self._course.steps)
         if self.step == self._course.steps and not self._state.ended:
             self._advance(self._course.steps + 1)

@@ -10,8 +10,8 @@ from airflock.core import radio, random, silence
 from airflock.core.agent import Heard
 from airflock.core.agent import State as Motion
 from airflock.core.contract import Model
+from airflock.core.hearing import carried, lasts
 from airflock.core.maths import norm
-from airflock.core.pilot import carried, lasts
 from airflock.core.topology import met_of
 from airflock.core.view import View
 from airflock.engine.beginnings import NEVER
@@ -52,6 +52,7 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     return View(
         agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms), tuple(alike),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
+        _record(state, plan.body.Memory, "body", agent),
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from airflock.evolve.search import Watch
 from airflock.evolve.space import Space, declared
 from airflock.evolve.steps import Measured, Step, measured
 from airflock.evolve.study import Study, make_study
+from airflock.scenarios.families import FAMILIES, Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
@@ -22,10 +23,8 @@ def cautious(scenario: Scenario, r_coll: float = 1.5, delay: float = 1.0) -> dic
 
 def stricter(scenario: Scenario, space: Space, settings: Mapping[str, float], search: Mapping[str, Any]) -> Study:
     """Study of workaround (i): the scenario's space, searched under the stricter settings."""
-    own: dict[str, Any] = {"law": scenario.model, "measures": scenario.measures, "vehicle": scenario.vehicle}
-    own["sensor"], own["transceiver"] = scenario.sensor, scenario.transceiver
-    own["own_topology"] = scenario.own_topology
-    found = make(scenario.document, f"{scenario.name}, stricter", settings, **own)
+    own = {family.field: getattr(scenario, family.field) for family in FAMILIES}
+    found = make(scenario.document, f"{scenario.name}, stricter", settings, given=Given(law=scenario.model, **own))
     return replace(make_study({}, found.name, search=search, scenario=found), space=space)
 
 

@@ -110,7 +110,10 @@ def fit_body(logs: Logs, dt: float = 0.0, walk: float = 0.0) -> BodyFit:
     """
     flying = logs.flying()
     if len(flying.time) < FEW:
-        reason = f"{len(flying.time)} rows with a velocity and a command are fewer than {FEW}"
+        reason = (
+            f"{len(flying.time)} rows with a velocity and a command are fewer than {FEW}; "
+            "map what the log calls the commanded velocity: --map cx:=COLUMN --map cy:=COLUMN"
+        )
         return _nothing(reason)
     span = _blocks(flying)
     out = np.zeros(int(span.max()) + 1)

@@ -1,6 +1,7 @@
 """Candidates: laws as quiet scenarios, and the numbers of each that tracks may tell."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from airflock.core.parameters import Quantity, declarations
 from airflock.engine import Plan, State, plan_of
 from airflock.errors import AirflockError, ScenarioError
 from airflock.infer.tracks import Scale, Tracks
+from airflock.scenarios.families import Given
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
@@ -120,15 +122,17 @@ def scenarios_of(
     models : names of laws, presets, scenario files, files with a law, or Scenarios
     Raises ScenarioError with every fault.
     """
-    faults: list[str] = []
+    faults: list[tuple[str, str]] = []
     found = []
     for what in models:
         try:
             found.append(_base(what, settings, trust))
         except AirflockError as fault:
-            faults += str(fault).splitlines()
-    if faults:
-        raise ScenarioError(list(dict.fromkeys(faults)))
+            faults += [(f"{what}: ", line) for line in str(fault).splitlines()]
+    if faults:  # what is wrong with a setting is so for all laws: it is said once
+        bare = Counter(line.removeprefix(name) for name, line in set(faults))
+        lines = [line.removeprefix(name) if bare[line.removeprefix(name)] > 1 else line for name, line in faults]
+        raise ScenarioError(list(dict.fromkeys(lines)))
     boxes = [half_sizes(each.world) if each.world.edges == "periodic" else (0.0, 0.0, 0.0) for each in found]
     for each, box in zip(found, boxes, strict=True):
         if box != boxes[0]:
@@ -164,7 +168,7 @@ def quiet(scenario: Scenario, scale: Scale, axes: int) -> Scenario:
         "update": "synchronous", "start.kind": "ball", "start.radius": scale.near, "start.separation": 0.0,
         "goals.kind": "none",
     }  # fmt: skip
-    made = make(document, scenario.name, settings, law=scenario.model, vehicle=scenario.vehicle)
+    made = make(document, scenario.name, settings, given=Given(law=scenario.model, vehicle=scenario.vehicle))
     names = {name for name, declared, _ in declarations(made.body) if isinstance(declared, Quantity)}
     return replace(made, body=replace(made.body, noise=0.0)) if "noise" in names else made
 

@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import AirflockError
-from airflock.infer.bootstrap import Again, Noise
+from airflock.infer.bootstrap import Again
 from airflock.infer.candidates import Candidate
+from airflock.infer.candidates import Number as Sought
 from airflock.infer.fit import Fit
+from airflock.infer.flights import Noise
 from airflock.infer.likelihood import Model
 from airflock.infer.maps import Maps
 from airflock.infer.predictive import Check
 from airflock.infer.tracks import Scale
+from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 
@@ -29,10 +32,10 @@ EDGE = 0.01  # of a range: nearer to its end nothing is told
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a law: value and interval; an end of it is None where the tracks set no limit.
+    """A number of a law with its intervals; an end of one is None where the tracks set no limit.
 
-    The intervals of a law are meant to hold all its numbers together in 95 % of cases; docs/infer.md tells how often
-    they did.
+    low, high   : 95 % interval of this number alone
+    least, most : wider interval; those of all numbers of the law hold together in 95 %
     """
 
     key: str
@@ -40,6 +43,8 @@ class Number:
     low: float | None
     high: float | None
     unit: str
+    least: float | None = None
+    most: float | None = None
 
 
 @dataclass
@@ -118,7 +123,8 @@ class Inferred:
         document = self.document()
         assert self.best is not None
         own = self.best.candidate.scenario
-        return make(document, f"{self.best.name}, inferred", law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        given = Given(law=own.model, vehicle=own.vehicle, sensor=own.sensor)
+        return make(document, f"{self.best.name}, inferred", given=given)
 
 
 def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
@@ -142,33 +148,48 @@ def tell(found: Inferred, model: Model, sure: Again) -> None:
     assert found.best is not None
     numbers: dict[str, Number] = {}
     for k, n in enumerate(model.numbers[: model.named]):
-        low, high = sure.low[k], sure.high[k]
-        numbers[n.key] = Number(
-            n.key, n.value(sure.place[k]), n.value(low) if low > EDGE else None,
-            n.value(high) if high < 1.0 - EDGE else None, n.unit,
-        )  # fmt: skip
+        ends = [end for low, high in (sure.alone, sure.joint) for end in (_low(n, low[k]), _high(n, high[k]))]
+        numbers[n.key] = Number(n.key, n.value(sure.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3])
     noise = sure.noise
     known = {n.column: (n.key, n.unit) for n in found.best.candidate.noises}
     if found.best.candidate.body_noise >= 0:
         known[found.best.candidate.body_noise] = ("body.noise", "m^2/s^3")
     if noise.column in known:
         key, unit = known[noise.column]
-        numbers[key] = Number(key, noise.law, sure.noise_low, sure.noise_high, unit)
+        (low, high), (least, most) = sure.noises
+        numbers[key] = Number(key, noise.law, low, high, unit, least, most)
     found.best.numbers, found.noise = numbers, noise
     today = datetime.date.today().isoformat()
     found.settings = {key: number.value for key, number in numbers.items()}
     found.sources = {key: f"infer, {today}: {interval(number)}" for key, number in numbers.items()}
 
 
+def _low(number: Sought, place: float) -> float | None:
+    return number.value(place) if place > EDGE else None
+
+
+def _high(number: Sought, place: float) -> float | None:
+    return number.value(place) if place < 1.0 - EDGE else None
+
+
 def interval(number: Number) -> str:
-    """A 95 % interval in words."""
-    if number.low is None and number.high is None:
+    """The 95 % interval of a number by itself, in words."""
+    return (
+        f"95 % in {between(number.low, number.high)}"
+        if number.low is not None and number.high is not None
+        else (between(number.low, number.high))
+    )
+
+
+def between(low: float | None, high: float | None) -> str:
+    """Two ends in words; None: the tracks set no limit."""
+    if low is None and high is None:
         return "not told by the tracks"
-    if number.low is None:
-        return f"at most {number.high:.4g}"
-    if number.high is None:
-        return f"at least {number.low:.4g}"
-    return f"95 % in {number.low:.4g} to {number.high:.4g}"
+    if low is None:
+        return f"at most {high:.4g}"
+    if high is None:
+        return f"at least {low:.4g}"
+    return f"{low:.4g} to {high:.4g}"
 
 
 def _short(value: float) -> float:

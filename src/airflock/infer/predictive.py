@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.bootstrap import Noise
+from airflock.infer.flights import Noise
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT
 

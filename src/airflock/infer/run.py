@@ -170,10 +170,23 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
         elif str(each).endswith(".nc"):
             found.append((str(each), load_recording(each)))
         else:
-            found.append((str(each), load_tracks(each)))
+            found.append((str(each), _read(Path(each))))
     if not found:
         raise RecordingError("no tracks to infer a law from")
     return found
+
+
+def _read(path: Path) -> xr.Dataset:
+    """A file of tracks as it is; what import would have to be told is said as its command."""
+    try:
+        return load_tracks(path)
+    except RecordingError as fault:
+        if not path.is_file():
+            raise
+        raise RecordingError(
+            f"{fault}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "
+            "then give tracks.nc"
+        ) from fault
 
 
 def _alike(followed: Sequence[Tracks]) -> None:

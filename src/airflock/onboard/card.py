@@ -15,7 +15,8 @@ from typing import Any
 from airflock import atomic
 from airflock.core.agent import State
 from airflock.core.contract import Model
-from airflock.core.pilot import Hearing, Pilot
+from airflock.core.hearing import Hearing
+from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
 from airflock.doors import from_outside, json_value, read_text
 from airflock.errors import AirflockError, CardError

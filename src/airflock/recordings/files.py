@@ -21,6 +21,7 @@ from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.layout import check
 from airflock.recordings.opened import Opening
+from airflock.scenarios.families import Given
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
@@ -147,7 +148,7 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
         kind = document.get(section, {}).get("kind")
         if kind is not None and kind not in known:
             raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")
-    scenario = make(document, str(found.get("airflock_name", "recording")), law=own)
+    scenario = make(document, str(found.get("airflock_name", "recording")), given=Given(law=own))
     seed = attributes.whole_number(recording, "airflock_seed")
     precision = attributes.whole_number(recording, "airflock_precision", 32)
     again = simulate(

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from airflock.aero import descent
 from airflock.body.registry import BODIES
@@ -25,6 +24,7 @@ from airflock.metrics.registry import POWER, SETS, reports
 from airflock.radios.registry import RADIOS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
+from airflock.scenarios.families import Given
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -170,7 +170,6 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.measured_by()
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
-    _refuse_gaps(scenario.alike(), present)
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
@@ -178,17 +177,6 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     return scores | ({} if present.all() else {"present": float(present.mean())}), course
-
-
-def _refuse_gaps(scenario: Scenario, present: NDArray[np.bool_]) -> None:
-    """Contacts with the scene are found on the way from frame to frame, which a gap cuts."""
-    metrics = scenario.order_parameters
-    sweeps = any(metric.agent is not None and "touches" in asks(metric.agent, "agent") for metric in metrics)
-    if scenario.scenic and sweeps and not present.all():
-        raise RecordingError(
-            f"recording: {1.0 - present.mean():.1%} of the positions are missing, and contacts with the scene are found"
-            " on the way from frame to frame; score it with --set metrics.kind=vasarhelyi, or fill the gaps"
-        )
 
 
 class _Nothing(Parameters):
@@ -239,7 +227,7 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
         "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return make(document, "recording", settings, law=UNKNOWN)
+    return make(document, "recording", settings, given=Given(law=UNKNOWN))
 
 
 def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, Any]) -> Scenario:
@@ -267,7 +255,8 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
             {key: group[key] for key in ("name", "agents") if key in group} if isinstance(group, Mapping) else group
             for group in document["groups"]
         ]
-    return make(stand_in, name, {k: v for k, v in settings.items() if not k.startswith("model.")}, law=UNKNOWN)
+    others = {key: value for key, value in settings.items() if not key.startswith("model.")}
+    return make(stand_in, name, others, given=Given(law=UNKNOWN))
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:

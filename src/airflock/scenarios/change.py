@@ -4,26 +4,14 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from airflock.body.registry import BODIES
 from airflock.core.contract import Model
 from airflock.errors import ScenarioError
-from airflock.metrics.registry import SETS
-from airflock.radios.registry import RADIOS
+from airflock.scenarios.families import FAMILIES, Given
 from airflock.scenarios.files import load
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.sensors.registry import SENSORS
-from airflock.topology.registry import TOPOLOGIES
 
-# what a scenario holds beside a section, that section, and the kinds that are ours
-KINDS = (
-    ("measures", "metrics", SETS),
-    ("vehicle", "body", BODIES),
-    ("sensor", "sensors", SENSORS),
-    ("transceiver", "radio", RADIOS),
-    ("own_topology", "topology", TOPOLOGIES),
-)
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
 
@@ -40,15 +28,17 @@ def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     if not shipped and scenario.descends:
         raise ScenarioError(["aero: a law of one's own with drag descent cannot be changed in flight"])
     own = {
-        name: getattr(scenario, name)
-        for name, section, known in KINDS
-        if f"{section}.kind" not in settings and document.get(section, {}).get("kind", "") not in ("", *known)
+        each.field: getattr(scenario, each.field)
+        for each in FAMILIES
+        if f"{each.section}.kind" not in settings
+        and document.get(each.section, {}).get("kind", "") not in ("", *each.known)
     }
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
     if "faults" not in settings and "faults" in document:
         document["faults"] = named(scenario)
     law = None if shipped else scenario.model
-    return make(document, scenario.name, settings, law=law, kinds=kinds, laws=own_laws(scenario), **own)
+    given = Given(law=law, kinds=kinds, laws=own_laws(scenario), **own)
+    return make(document, scenario.name, settings, given=given)
 
 
 def own_laws(scenario: Scenario) -> dict[str, Model]:

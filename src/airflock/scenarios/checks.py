@@ -1,54 +1,14 @@
 """Checks of a scenario that take more than one key: the body's kind, the order of updates, the metrics."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from airflock.body.registry import BODIES, body_for
-from airflock.core.contract import Body, Metric, MetricSet, Model, body
-from airflock.core.radio import Packets, Radio, radio
-from airflock.core.sensor import Sensor, sensor
-from airflock.core.topology import Topology, topology
-from airflock.core.vocabulary import asks
-from airflock.errors import AirflockError
-from airflock.metrics.registry import SETS, USUAL, metric_set
-from airflock.radios.registry import RADIOS
-from airflock.radios.registry import USUAL as USUAL_RADIO
+from airflock.core.contract import Body, Metric, MetricSet, Model
+from airflock.core.radio import Radio
+from airflock.core.sensor import Sensor
+from airflock.core.topology import Topology
+from airflock.core.vocabulary import CLOCKS, asks
 from airflock.scenarios.geometry import largest_extension
-from airflock.scenarios.own_code import own_code
-from airflock.sensors.registry import SENSORS
-from airflock.sensors.registry import USUAL as USUAL_SENSOR
-from airflock.spelling import meant
-
-
-def body_of(
-    table: Any, found: Model | None, folder: Path | None = None, *, trust: bool = False
-) -> tuple[Body, list[str]]:
-    """Body of the section body, by its key kind or else by what the model commands; and what is wrong with it."""
-    usual = body_for(found.command if found else "velocity")
-    kind = table.get("kind", usual) if isinstance(table, Mapping) else usual
-    if isinstance(kind, str) and kind.endswith(".py"):
-        try:
-            carried = body(own_code("body.kind", kind, folder, trust=trust), Path(kind).stem)
-        except AirflockError as fault:
-            return BODIES[usual], str(fault).splitlines()
-    elif isinstance(kind, str) and kind in BODIES:
-        carried = BODIES[kind]
-    else:
-        hint = meant(kind, BODIES, f"known: {', '.join(BODIES)}, or a file that ends in .py", cutoff=0.4)
-        return BODIES[usual], [f"body.kind = {kind!r}: unknown body; {hint}"]
-    faults = carries(carried, found, kind)
-    return BODIES[usual] if faults else carried, faults
-
-
-def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
-    """Why a body cannot fly what a model commands, one line."""
-    if found is None or carried.accepts == found.command:
-        return []
-    return [
-        f"body.kind = {kind!r} takes a {carried.accepts}, but model {found.name} commands {found.command}; "
-        f"body.kind = {body_for(found.command)!r} takes it"
-    ]
 
 
 def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) -> list[str]:
@@ -63,22 +23,6 @@ def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) ->
     return carried.lacks(b=b, dt=flight.dt, speed=speed, start=begin.speed, wing=wing)
 
 
-def sensor_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Sensor, list[str]]:
-    """Sensor of the section sensors, by its key kind; and what is wrong with it."""
-    usual = SENSORS[USUAL_SENSOR]
-    kind = table.get("kind", usual.name) if isinstance(table, Mapping) else usual.name
-    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
-    if isinstance(kind, str) and kind in SENSORS:
-        return SENSORS[kind], []
-    if isinstance(kind, str) and kind.endswith(".py"):
-        try:
-            return sensor(own_code("sensors.kind", kind, folder, trust=trust), Path(kind).stem), []
-        except AirflockError as fault:
-            return usual, str(fault).splitlines()
-    hint = meant(kind, SENSORS, f"known: {', '.join(SENSORS)}, or a file that ends in .py", cutoff=0.4)
-    return usual, [f"sensors.kind = {kind!r}: unknown sensor; {hint}"]
-
-
 def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:
     """What of a scenario its sensor cannot measure."""
     s, flight = parts["sensors"], parts["flight"]
@@ -86,42 +30,6 @@ def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:
         return []
     period = max(1, round(s.period / flight.dt)) * flight.dt
     return found.lacks(s=s, period=period, dt=flight.dt)
-
-
-def radio_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Radio, list[str]]:
-    """Radio of the section radio, by its key kind; and what is wrong with it."""
-    usual = RADIOS[USUAL_RADIO]
-    kind = table.get("kind", usual.name) if isinstance(table, Mapping) else usual.name
-    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
-    if isinstance(kind, str) and kind in RADIOS:
-        return RADIOS[kind], []
-    if isinstance(kind, str) and kind.endswith(".py"):
-        try:
-            return radio(own_code("radio.kind", kind, folder, trust=trust), Path(kind).stem), []
-        except AirflockError as fault:
-            return _stand_in(kind), str(fault).splitlines()
-    hint = meant(kind, RADIOS, f"known: {', '.join(RADIOS)}, or a file that ends in .py", cutoff=0.4)
-    return _stand_in(kind), [f"radio.kind = {kind!r}: unknown radio; {hint}"]
-
-
-def _stand_in(kind: Any) -> Radio:
-    """A radio in place of one that cannot be had, by whose common numbers the rest is judged."""
-    return Radio(str(kind), Packets)
-
-
-def metrics_set(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[MetricSet, list[str]]:
-    """Metric set of the section metrics, by its key kind; and what is wrong with it."""
-    kind = table.get("kind", USUAL) if isinstance(table, Mapping) else USUAL
-    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
-    if isinstance(kind, str) and kind in SETS:
-        return SETS[kind], []
-    if isinstance(kind, str) and kind.endswith(".py"):
-        try:
-            return metric_set(own_code("metrics.kind", kind, folder, trust=trust), Path(kind).stem), []
-        except AirflockError as fault:
-            return SETS[USUAL], str(fault).splitlines()
-    hint = meant(kind, SETS, lead="; ", cutoff=0.6)
-    return SETS[USUAL], [f"metrics.kind = {kind!r} is none of {', '.join(SETS)}, or a file that ends in .py{hint}"]
 
 
 IDEAL = {"radio.kind": "'constant'", "sensors.kind": "'perfect'"}  # what is not ideal at 0
@@ -145,21 +53,6 @@ def order_faults(flight: Any, found: Sensor, sensors: Any, link: Radio, k: Any) 
         for key, value in ideal.items()
         if value != 0.0
     ]
-
-
-def topology_of(table: Any, folder: Path | None = None, *, trust: bool = False) -> tuple[Topology | None, list[str]]:
-    """Topology of a user's own that the section topology names by its key kind, if it does; and what is wrong with it.
-
-    Raises nothing: a kind that is none of ours and no file is told by the section's own check.
-    """
-    kind = table.get("kind") if isinstance(table, Mapping) else None
-    kind = kind["value"] if isinstance(kind, Mapping) and "value" in kind else kind
-    if not isinstance(kind, str) or not kind.endswith(".py"):
-        return None, []
-    try:
-        return topology(own_code("topology.kind", kind, folder, trust=trust), Path(kind).stem), []
-    except AirflockError as fault:
-        return None, str(fault).splitlines()
 
 
 def topology_faults(kind: Topology | None, world: Any, found: Model | None) -> list[str]:
@@ -202,10 +95,17 @@ MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) -> list[str]:
     """What order parameters over all pairs cost in a large flock.
 
-    cells : neighbours are found by cells, and so are pairs of order parameters that say when they are `settled`
+    cells : order parameters look at pairs by cells if all of a clock say when they are `settled`, at links if they say
+            how far they reach
     """
-    near = cells and all(item.settled for item in metrics if item.pair)
-    paired = [item.name for item in metrics if (item.pair and not near) or item.cluster or item.survey]
+    near = {
+        clock: cells and all(item.settled for item in metrics if item.pair and item.clock == clock) for clock in CLOCKS
+    }
+    paired = [
+        item.name
+        for item in metrics
+        if (item.pair and not near[item.clock]) or (item.cluster and not (cells and item.linked_within)) or item.survey
+    ]
     if flight.agents < MANY or not paired:
         return []
     seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md

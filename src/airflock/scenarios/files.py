@@ -1,33 +1,24 @@
 """Scenario files: TOML with units and sources, presets by name, and keys changed from outside."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from airflock.core.contract import Body
-from airflock.core.contract import body as gathered_body
 from airflock.core.fault import Fault, fault
-from airflock.core.parameters import number_names
-from airflock.core.radio import Packets, Radio
-from airflock.core.radio import radio as gathered_radio
-from airflock.core.sensor import Sensor
-from airflock.core.sensor import sensor as gathered_sensor
-from airflock.core.topology import Topology
-from airflock.core.topology import topology as gathered_topology
 from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import ScenarioError
-from airflock.metrics.registry import as_set
-from airflock.scenarios import checks, formats
+from airflock.scenarios import formats
 from airflock.scenarios.extends import extended
+from airflock.scenarios.families import FAMILIES, Family, Given
 from airflock.scenarios.ground import with_ground
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
-from airflock.topology.registry import TOPOLOGIES
 
 
 def presets() -> dict[str, Path]:
@@ -127,18 +118,18 @@ def load(
     with from_outside(where):
         document, folder = _read(where, None)
         document, base = extended(document, where, folder, _read)
-        document, own = _given(document, metrics, body, sensor, radio, topology)
-        own["kinds"] = _kinds(faults)
-        own["laws"] = {law.name: law for law in map(given_law, _several(laws))}
-        own["notes"] = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told = with_ground(document, settings or {}, folder)
-        own["notes"] += told
-        if law is None:
-            return make(document, where, settings, folder=folder, trust=trust, **own)
-        flown = given_law(law)
-        kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
-        document = {**document, "model": {"kind": kind}, "published": {}}
-        return make(document, where, settings, folder=folder, law=flown, trust=trust, **own)
+        document, given = _with_given(document, zip(FAMILIES, (metrics, body, sensor, radio, topology), strict=True))
+        flown = None if law is None else given_law(law)
+        of_groups = {own.name: own for own in map(given_law, _several(laws))}
+        given = replace(given, law=flown, kinds=_kinds(faults), laws=of_groups)
+        notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
+        document, settings, told, wrong = with_ground(document, settings or {}, folder)
+        if flown is not None:
+            kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
+            document = {**document, "model": {"kind": kind}, "published": {}}
+        return make(
+            document, where, settings, folder=folder, given=given, notes=notes + told, known_faults=wrong, trust=trust
+        )
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
@@ -155,73 +146,28 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent
 
 
-def _given(
-    document: Mapping[str, Any], metrics: Any, body: Any, sensor: Any, radio: Any, topology: Any
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A document that names the metrics, body, sensor, radio and topology that the caller gives, and these.
+def _with_given(document: Mapping[str, Any], given: Iterable[tuple[Family[Any], Any]]) -> tuple[dict[str, Any], Given]:
+    """A document that names what the caller gives, and the rules of it that are not found by their names alone.
 
     Giving them is consent to run them. Raises ScenarioError.
     """
     document = dict(document)
-    own: dict[str, Any] = {}
+    rules: dict[str, Any] = {}
     faults: list[str] = []
-    if isinstance(metrics, (str, os.PathLike)):
-        own["measures"], faults = checks.metrics_set({"kind": str(metrics)}, trust=True)
-    elif metrics is not None:
-        own["measures"] = as_set(metrics)
-    if metrics is not None:
-        document["metrics"] = {**document.get("metrics", {}), "kind": own["measures"].name}
-    if isinstance(body, (str, os.PathLike)):
-        own["vehicle"], more = checks.body_of({"kind": str(body)}, None, trust=True)
-        faults = [*faults, *more]
-    elif body is not None:
-        own["vehicle"] = body if isinstance(body, Body) else gathered_body(body)
-    if body is not None:
-        document["body"] = {"kind": own["vehicle"].name}
-    if isinstance(sensor, (str, os.PathLike)):
-        own["sensor"], more = checks.sensor_of({"kind": str(sensor)}, trust=True)
-        faults = [*faults, *more]
-    elif sensor is not None:
-        own["sensor"] = sensor if isinstance(sensor, Sensor) else gathered_sensor(sensor)
-    if sensor is not None:
-        period = {key: value for key, value in document.get("sensors", {}).items() if key == "period"}
-        document["sensors"] = {**period, "kind": own["sensor"].name}
-    if isinstance(radio, (str, os.PathLike)):
-        own["transceiver"], more = checks.radio_of({"kind": str(radio)}, trust=True)
-        faults = [*faults, *more]
-    elif radio is not None:
-        own["transceiver"] = radio if isinstance(radio, Radio) else gathered_radio(radio)
-    if radio is not None:
-        kept = {key: value for key, value in document.get("radio", {}).items() if key in number_names(Packets)}
-        document["radio"] = {**kept, "kind": own["transceiver"].name}
-    meets, more = _topology(topology)
-    own |= {"own_topology": meets} if isinstance(meets, Topology) else {}
-    document |= _meeting(document, meets)
-    faults = [*faults, *more]
+    for family, what in given:
+        if what is None:
+            continue
+        table, kind = document.get(family.section, {}), str(what)
+        if not (isinstance(what, str) and what in family.known):
+            found, more = family.given(what)
+            faults += more
+            if found is None:
+                continue
+            rules[family.field], kind = found, found.name
+        document[family.section] = {**family.kept(table, kind), "kind": kind}
     if faults:
         raise ScenarioError(faults)
-    return document, own
-
-
-def _meeting(document: Mapping[str, Any], meets: Topology | str | None) -> dict[str, Any]:
-    """The section of a topology that the caller gives: ours share their numbers, another one has its own."""
-    if meets is None:
-        return {}
-    kept = document.get("topology", {}) if isinstance(meets, str) else {}
-    return {"topology": {**kept, "kind": meets if isinstance(meets, str) else meets.name}}
-
-
-def _topology(given: Any) -> tuple[Topology | str | None, list[str]]:
-    """A topology that the caller gives, or the name of one of ours; and what is wrong with it."""
-    if given is None or isinstance(given, Topology):
-        return given, []
-    if not isinstance(given, (str, os.PathLike)):
-        return gathered_topology(given), []
-    name = str(given)
-    if name in TOPOLOGIES or name.endswith(".py"):
-        return (name, []) if name in TOPOLOGIES else checks.topology_of({"kind": name}, trust=True)
-    hint = meant(name, TOPOLOGIES, f"known: {', '.join(TOPOLOGIES)}, or a file that ends in .py", cutoff=0.4)
-    return None, [f"topology = {name!r}: unknown topology; {hint}"]
+    return document, Given(**rules)
 
 
 def _kinds(given: Any) -> dict[str, Fault]:

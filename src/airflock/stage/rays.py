@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from airflock.core.agent import Heard, State, decide
-from airflock.core.pilot import Senses
+from airflock.core.senses import Senses
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Course, Place
 from airflock.scenarios.timing import clock

@@ -10,3 +10,4 @@ TOPOLOGIES: dict[str, Topology | None] = {
     "visible": Topology("visible", visible.meet, near=True),
     "strongest": Topology("strongest", strongest.meet),
 }
+USUAL = "range"  # the topology of a scenario without topology.kind

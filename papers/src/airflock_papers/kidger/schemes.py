@@ -8,7 +8,7 @@ import pandas as pd
 
 from airflock.core.agent import Heard, State, decide, meet_neighbours
 from airflock.core.maths import norm
-from airflock.core.pilot import Senses
+from airflock.core.senses import Senses
 from airflock.core.vocabulary import Own
 from airflock.models import kidger
 from airflock.recordings.flights import simulate

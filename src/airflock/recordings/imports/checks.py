@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.recordings.imports.expressions import quoted
 from airflock.recordings.imports.track import POSITION, Findings, Track
 
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
@@ -32,13 +33,9 @@ def check_time(track: Track, findings: Findings) -> None:
         name = track.label("t")
         findings.fault(
             f"{track.source}: column {name}: rows of {track.name} are {step:g} s apart, first row {track.rows[0]}; "
-            f"the unit is another one: write t:={_quoted(name)}*1e-6 (for us) or *1e-3 (for ms)",
+            f'the unit is another one: write --map "t:={quoted(name)}*1e-6" (for us) or *1e-3 (for ms)',
             "time",
         )
-
-
-def _quoted(name: str) -> str:
-    return name if name.isidentifier() else repr(name)
 
 
 def _repeated(track: Track, same: NDArray[Any], findings: Findings) -> None:
@@ -88,7 +85,7 @@ def check_heights(tracks: list[Track], findings: Findings) -> None:
             name = track.label("z")
             findings.fault(
                 f"{track.source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: "
-                f"it points down; write z:=-{_quoted(name)}, or --axes ned if x is north",
+                f'it points down; write --map "z:=-{quoted(name)}", or --axes ned if x is north',
                 "down",
             )
             return

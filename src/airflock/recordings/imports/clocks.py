@@ -21,7 +21,7 @@ def align(tracks: list[Track], same: bool, findings: Findings) -> bool:
         names = ", ".join(sorted({track.source for track in lacking})[:3])
         findings.fault(
             f"{names}{' ...' if len(lacking) > 3 else ''}: nothing says that the clocks of {len(files)} files "
-            "agree, and distances between individuals need that; write --same-clock if they do, or map utc:=COLUMN"
+            "agree, and distances between individuals need that; write --same-clock if they do, or --map utc:=COLUMN"
         )
         return False
     worst = max((to_utc(track) for track in own if track.utc is not None), default=0.0)

@@ -69,3 +69,8 @@ def value(tree: ast.expr, columns: Mapping[str, NDArray[np.float64]]) -> Any:
         return columns[tree.id]
     assert isinstance(tree, ast.Constant)
     return columns[tree.value] if isinstance(tree.value, str) else float(tree.value)  # type: ignore[arg-type]
+
+
+def quoted(column: str) -> str:
+    """A column as it stands in an expression of --map."""
+    return column if column.isidentifier() else f"'{column}'"

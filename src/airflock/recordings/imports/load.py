@@ -268,7 +268,7 @@ def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, f
             name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
             findings.fault(
                 f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
-                f"latitude and longitude; if it is in 1e-7 degrees, write lat:={track.label('lat')}*1e-7"
+                f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
             )
             continue
         if not len(lat):

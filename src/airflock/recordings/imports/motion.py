@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.recordings.imports.checks import period_of
+from airflock.recordings.imports.expressions import quoted
 from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, split
 from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
 
@@ -80,9 +81,7 @@ def _compare(
         if lively[i] and i != j and abs(alike[i, i]) < 0.5 and abs(alike[i, j]) > 0.8:
             findings.fault(
                 f"{source}: column {track.label(POSITION[i])} ({POSITION[i]}), row {track.rows[0]} on: moves like "
-                f"{names[j]} ({VELOCITY[j]}; r = {alike[i, j]:.2f}): swapped, or north-east-down; write "
-                f"{POSITION[i]}:={track.label(POSITION[j])} and {POSITION[j]}:={track.label(POSITION[i])}, "
-                "or --axes ned",
+                f"{names[j]} ({VELOCITY[j]}; r = {alike[i, j]:.2f}): {_unswapped(track, i, j)}",
                 "axes",
             )
             return
@@ -91,7 +90,7 @@ def _compare(
         findings.fault(
             f"{source}: column {track.label(POSITION[i])}, row {track.rows[0]} on: {POSITION[i]} grows where "
             f"{names[i]} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
-            f"write {VELOCITY[i]}:=-{names[i]}",
+            f'write --map "{VELOCITY[i]}:=-{quoted(names[i])}"',
             "axes",
         )
     wrong = [i for i in range(axes) if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
@@ -111,13 +110,26 @@ def _compare(
         )
 
 
+def _unswapped(track: Track, i: int, j: int) -> str:
+    """What to write where axis i of the positions is axis j of the velocities."""
+    own = [quoted(track.label(POSITION[k])) for k in (i, j)]
+    if own == [POSITION[j], POSITION[i]]:  # they have been exchanged already, by --axes or --map
+        return (
+            "positions and velocities have different axes; write, without --axes, "
+            f'--map "{POSITION[i]}:={own[0]}" --map "{POSITION[j]}:={own[1]}"'
+        )
+    return (
+        f'swapped, or north-east-down; write --map "{POSITION[i]}:={own[1]}" --map "{POSITION[j]}:={own[0]}", '
+        "or --axes ned"
+    )
+
+
 def _mapped(track: Track, target: str, wrong: float) -> str:
     """What to write so that a target is `wrong` times what it is now; an expression loses the unit of its header."""
     label = track.label(target)
     name, unit = split(label)
     own = {**TIMES, **LENGTHS, **SPEEDS}.get(unit, 1.0) if name else 1.0
-    column = label if label.isidentifier() else f"'{label}'"
-    return f"{target}:={column}*{own * wrong:.6g}"
+    return f'--map "{target}:={quoted(label)}*{own * wrong:.6g}"'
 
 
 def check_jumps(track: Track, findings: Findings) -> None:
@@ -153,7 +165,8 @@ def check_jumps(track: Track, findings: Findings) -> None:
         k = resets[0]
         findings.fault(
             f"{track.source}: column {track.label('x')}, row {track.rows[k + 1]}: {track.name} jumps {size[k]:.3g} m "
-            f"more than its velocity explains ({len(resets)} times): a reset of the estimator",
+            f"more than its velocity explains ({len(resets)} times): a reset of the estimator; cut before or "
+            "after it with --end or --begin; if accepted, the track is split there",
             "jumps",
         )
         track.breaks = np.unique(np.concatenate([track.breaks, np.array(resets) + 1])).astype(np.int64)

@@ -1,0 +1,121 @@
+"""Ridges: how far numbers that make up for each other can go together before the tracks are explained worse.
+
+The numbers of a braking curve lie on a ridge of the likelihood that bends. The curvature at the fit knows its first
+steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: the number that is told
+worst is moved step by step, all others follow, and the places on the way tell how far each of them goes.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.infer.fit import BOTH, FINE, WIDE, Fit, climb, curvature
+from airflock.infer.likelihood import Model
+
+Array = NDArray[np.float64]
+Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
+RIDGES = 3  # that are walked, at most
+SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
+FIRST = 0.4  # of the way to the end that the curvature tells: first step
+STRIDE = (0.01, 0.15)  # of a range: least and longest step
+FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
+PLACES = 12  # that are looked at, on each side of a ridge
+FOLLOWS = 4  # steps of the climb by which the others follow
+SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
+HIGHER = 1.0  # log-likelihood by which a place on the way must be better than the fit, to begin again from there
+AGAIN = 2  # times
+
+
+@dataclass(frozen=True)
+class Ridges:
+    """Places along ridges, each way from the fit, and by how much the log-likelihood has fallen there."""
+
+    ways: tuple[Way, ...]
+
+    def ends(self, place: Array, drop: float) -> tuple[Array, Array]:
+        """Least and largest places of all numbers where the log-likelihood has fallen by at most `drop`."""
+        low, high = place.copy(), place.copy()
+        for way in self.ways:
+            for (inner, less), (outer, more) in zip(way[:-1], way[1:], strict=True):
+                if less > drop:
+                    break
+                share = 1.0
+                if more > drop:  # a parabola between the two
+                    share = (drop**0.5 - less**0.5) / (more**0.5 - less**0.5)
+                reached = inner + share * (outer - inner)
+                low, high = np.minimum(low, reached), np.maximum(high, reached)
+        return low, high
+
+
+def ridges(
+    model: Model, fit: Fit, spans: Sequence[int], drop: float, say: Callable[[], None] = lambda: None
+) -> tuple[Fit, Ridges]:
+    """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood."""
+    ways: list[Way] = []
+    for turn in range(AGAIN + 1):
+        ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
+        say()
+        if better is None:
+            break
+        fit = climb(model, better, fit.free, spans, slopes=(FINE, BOTH))
+    return fit, Ridges(tuple(ways))
+
+
+def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool) -> tuple[list[Way], Array | None]:
+    """Ways along all ridges; and, where it may be left for it, a better place."""
+    curved = [curvature(model, fit, spans, way) for way in (WIDE, BOTH)]
+    ways: list[Way] = []
+    rest = list(range(len(fit.free)))
+    for _ in range(RIDGES):
+        covariances = [np.linalg.inv(each[np.ix_(rest, rest)]) for each in curved]
+        errors = np.sqrt(np.maximum(*(np.diag(each) for each in covariances)))
+        errors[[k for k, f in enumerate(rest) if fit.free[f] >= model.named]] = 0.0
+        worst = int(np.argmax(errors))
+        reach = float(errors[worst]) * (2.0 * drop) ** 0.5
+        if reach < SHORTEST:
+            break
+        slope = np.zeros(len(fit.place))
+        slope[[fit.free[f] for f in rest]] = covariances[1][worst] / covariances[1][worst, worst]
+        number = fit.free[rest[worst]]
+        for side in (-1.0, 1.0):
+            way, better = _walk(model, fit, spans, number, side * slope, FIRST * reach, drop)
+            if leave and better is not None:
+                return ways, better
+            ways.append(way)
+        rest.pop(worst)
+    return ways, None
+
+
+def _walk(
+    model: Model, fit: Fit, spans: Sequence[int], number: int, slope: Array, step: float, drop: float
+) -> tuple[Way, Array | None]:
+    """One way along a ridge; a better place than the fit, if one was met.
+
+    slope : moves of all numbers at first, that of the moved one is 1 or -1; step : first move
+    """
+    rest = [f for f in fit.free if f != number]
+    way = [(fit.place, 0.0)]
+    step = float(np.clip(step, *STRIDE))
+    for _ in range(PLACES):
+        last = way[-1][0]
+        start = np.clip(last + step * slope, 0.0, 1.0)
+        found = climb(model, start, rest, spans, FOLLOWS, slopes=(FINE,))
+        down = found.score.loss() - fit.score.loss()
+        if down < -HIGHER:
+            return tuple(way), found.place
+        fell = max(down, way[-1][1])
+        moved = abs(found.place[number] - last[number])
+        if moved == 0.0:
+            break
+        if fell - way[-1][1] > 0.5 * drop and step > STRIDE[0]:
+            step = max(step / SHORTER, STRIDE[0])
+            continue
+        way.append((found.place, fell))
+        if fell >= drop or not 0.0 < found.place[number] < 1.0:
+            break
+        slope = (found.place - last) / moved
+        if fell < 0.25 * drop:
+            step = min(FASTER * step, STRIDE[1])
+    return tuple(way), None

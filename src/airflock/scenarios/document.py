@@ -1,0 +1,73 @@
+"""The document of a scenario before it is judged: another kind, keys set from outside, vectors as their components."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from airflock.core.parameters import declarations
+from airflock.core.vectors import expanded, overruled
+from airflock.scenarios.families import FAMILIES
+from airflock.scenarios.sections import SECTIONS
+from airflock.spelling import meant
+
+TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "update", "published", "title")
+
+
+def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """A document without the numbers of its body, sensor, radio or topology where settings name another; notes."""
+    notes: list[str] = []
+    for family in FAMILIES:
+        section = family.section
+        given, key = document.get(section, {}), f"{section}.kind"
+        if key not in settings or not isinstance(given, Mapping):
+            continue
+        kept = family.kept(given, str(settings[key]))
+        if set(given) - {"kind", *kept}:
+            kind = given.get("kind", family.usual)
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
+        document = {**document, section: kept}
+    return document, tuple(notes)
+
+
+def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """A copy of a document with keys like "model.p_rep" set, and the keys that nobody knows."""
+    made: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in document.items()}
+    faults: list[str] = []
+    for key, value in settings.items():
+        section, _, name = key.partition(".")
+        if name and not isinstance(made.setdefault(section, {}), dict):
+            faults.append(f"{key}: unknown key")
+        elif name:
+            made[section] = {**overruled(made[section], {name: value}), name: value}
+        else:
+            made[section] = value
+    for key in made:
+        if key not in TOP:
+            faults.append(f"{key}: unknown key; {meant(key, TOP, 'known: ' + ', '.join(TOP))}")
+    return made, faults
+
+
+def understood(document: dict[str, Any], section: str, record: type) -> dict[str, Any]:
+    """A document without the numbers of a section whose kind cannot be had; its stand-in judges those that it knows."""
+    known = {name for name, _, _ in declarations(record)} | {"kind"}
+    given = document.get(section, {})
+    if not isinstance(given, Mapping):
+        return document
+    return {**document, section: {key: value for key, value in given.items() if key in known}}
+
+
+def components(document: dict[str, Any], records: Mapping[str, type]) -> tuple[dict[str, Any], list[str]]:
+    """A document in which each vector is its components, and what is wrong with those that are given whole."""
+    faults: list[str] = []
+    for section, record in records.items():
+        if isinstance(given := document.get(section), Mapping) and getattr(record, "VECTORS", None):
+            document[section], more = expanded(section, given, record)
+            faults += more
+    return document, faults
+
+
+def model_table(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[str]]:
+    """The section of the law; empty, and why, where it is none."""
+    table = document.get("model", {})
+    if isinstance(table, Mapping):
+        return table, []
+    return {}, [f"model = {table!r} is not a table; write model.kind = {table!r}"]
