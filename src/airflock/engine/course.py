@@ -77,7 +77,10 @@ class Course:
 
     def compile(self, aside: bool = False) -> None:
         """Have it compiled, here or by another process."""
-        compile_aside(self.state) if aside else self.state.compile()
+        if aside:
+            compile_aside(self.state)
+        else:
+            self.state.compile()
 
     def advance(self, last: int) -> None:
         """Fly all steps before `last`, and keep their samples."""

@@ -17,6 +17,7 @@ from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
+from airflock.engine.stages.flight import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
 from airflock.engine.striking import strike
 from airflock.engine.tables import Tables, tables
@@ -25,9 +26,6 @@ from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
 
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
-ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
-GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
-BEGUN = 4  # place in `held` of the mark that agents have their places
 
 
 class State:
