@@ -65,13 +65,15 @@ PLANS = {
     "circle": ("vasarhelyi_2018", {
         "agents": 10, "world.arena": "circle", "sensors.noise": 0.0, "radio.delay": 0.0, "body.kind": "fixed_wing",
         "model.v_flock": 15.0, "start.speed": 15.0, "wind.east": 2.0, "radio.kind": "congestion",
-        "radio.airtime": 0.02, "topology.kind": "nearest", "topology.k": 3,
+        "body.battery": "lithium", "body.capacity": 900.0, "radio.airtime": 0.02,
+        "topology.kind": "nearest", "topology.k": 3,
         "groups": [{"name": "a", "agents": [1, 4], "model": {"kind": "viragh_2014", "v_flock": 14.0}}],
     }),
     "silo": ("viragh_2014", GNSS | {
         "agents": 6, "world.dimensions": "3", "world.arena": "circle", "world.obstacles": ISLANDS, "radio.loss": 0.5,
         "world.floor": -12.0, "world.ceiling": 40.0, "world.heights": [[-9.0, 5.0], [-20.0, 60.0]],
         "wind.kind": "dryden", "wind.up": 0.5, "radio.delay": 0.0, "start.speed": 2.0, "body.kind": "quadrotor",
+        "body.battery": "lithium", "body.capacity": 1300.0,
         "radio.kind": "bursts", "radio.outage_rate": 2.0, "radio.outage_time": 0.4, "faults": [
             fault("gnss_offset", 0.1, [0], east=8.0), fault("gnss_drift", 0.2, [1], north=6.0),
             fault("gnss_frozen", 0.2, [2], lasts=0.9), fault("gnss_spoofed", 0.4, [3], up=0.5),

@@ -13,7 +13,8 @@ import hashlib
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (
     *TURNS, *(f"{name}_of" for name in TURNS), "begin", "excursion", "tune", "meet", "aim_", "glide_", "appear_",
-    "measure_sample", "measure_collision", "advance", "measure_frames", "turns",
+    "measure_sample", "measure_collision", "near_sample", "near_collision", "clusters_correlation", "clusters_groups",
+    "clusters_swarms", "advance", "measure_frames", "turns",
 )  # fmt: skip
 
 

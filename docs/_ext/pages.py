@@ -134,11 +134,13 @@ def order_parameters() -> None:
 
     known = tomllib.loads((DOCS / "order_parameters.toml").read_text(encoding="utf-8"))
     homes: dict[str, Any] = {}
+    absent: dict[str, str] = {}
     units: dict[str, tuple[str, str]] = {}
     sets: dict[str, list[str]] = {}
     for kind, found in registry.SETS.items():
         for metric in found.metrics:
             homes |= {name: metric.sample for name in metric.reports if name not in homes}
+            absent |= {name: metric.absence(name) for name in metric.reports}
         for name, about in registry.reports(found).items():
             units.setdefault(name, about)
             sets.setdefault(name, []).append(kind)
@@ -158,7 +160,10 @@ def order_parameters() -> None:
         ),
         "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
         "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
-        "$\\Theta$ is 1 above zero, else 0.\n",
+        "$\\Theta$ is 1 above zero, else 0.\n\n"
+        "An agent that is absent is measured by nothing: an instant is that of the smaller flock, and "
+        "one with fewer than two of several agents does not count. `present` tells the share that was there. "
+        "What is made of other order parameters, such as a fitness, is made of what they then are.\n",
     ]
     for name, (unit, meaning) in units.items():
         about = known[name]
@@ -170,6 +175,7 @@ def order_parameters() -> None:
             module = sys.modules[home.__module__]
             reference = plain((module.__doc__ or "").strip().split("\n\n")[0].replace("\n", " "))
         rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
+        rows += [("where some are absent", absent[name])] if name in absent else []
         rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
         pieces.append(table(("what", "of it"), rows))
         pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
@@ -244,11 +250,12 @@ def _abilities(bodies: Mapping[str, Any]) -> str:
     """Table of what each body has, from what its rule asks for."""
     from inspect import signature
 
-    lines = ["", "| body | takes | has inertia | sees its measured velocity | noise | wind | remembers | has limits |"]
-    lines += ["|---|---|---|---|---|---|---|---|"]
+    words = "body | takes | has inertia | sees its measured velocity | noise | wind | battery | remembers | has limits"
+    lines = ["", f"| {words} |", "|---|---|---|---|---|---|---|---|---|"]
     for name, body in bodies.items():
         asked = set(signature(body.move).parameters)
         has = ["yes" if word in asked else "no" for word in ("vx", "mx", "gx", "wx")]
+        has.append("yes" if hasattr(body.Parameters, "battery") else "no")
         kept = ", ".join(getattr(body.Memory, "_fields", ())) or "nothing"
         lines.append(f"| `{name}` | {body.accepts} | {' | '.join(has)} | {kept} | {'yes' if body.limits else 'no'} |")
     return "\n".join(lines) + "\n"
@@ -283,6 +290,7 @@ def vocabulary() -> None:
         "sample": "of an order parameter: the values of one instant",
         "survey": "of an order parameter: asked once for the whole flock",
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
+        "linked_within": "of an order parameter: distance beyond which no two agents are linked, m",
         "settled": "of an order parameter: whether nobody farther than `beyond` (m) can change its Pair",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
         "limits": "of a body: what of a scenario it cannot fly, as lines",

@@ -26,8 +26,8 @@ from inside import stages_clusters as clusters
 from inside import stages_decide as decide
 from inside import stages_measure as measure
 from inside import stages_move as move
-from inside import stages_neighbours as neighbours
 from inside import stages_noise as noise
+from inside import stages_pair as pair
 from inside import stages_perceive as perceive
 from inside import stages_receive as receive
 from inside import stages_scene as scene
@@ -98,6 +98,9 @@ def found_of(name):
     alone = not (plan.noisy or plan.delayed or plan.lossy or plan.radio.keeps or plan.sequential or plan.varies("p"))
     if alone and plan.model.neighbour is not None and plan.model.reach is not None:
         found["grid"] = trees_of(driver.flight, plan.built(grid=True))
+        found["near"] = trees_of(driver.flight, plan.built(grid=True, near=True))
+        if found["near"] == found["grid"]:
+            del found["near"]
         if plan.start in ("arena", "ball") and not plan.model.flock:
             found["cells"] = trees_of(cells.crowd, plan.built(grid=True), builder=CudaBuilder)
     return found
@@ -110,8 +113,8 @@ def test_stages_are_the_trees_on_record(name):
 
 CHANGES = (
     (receive, "real(decision), rate", "real(decision + 1), rate", "links"),
-    (neighbours, "integer(j) != ii", "integer(j) == ii", "quiet"),
-    (neighbours, "if plan.periodic:", "if plan.delayed:", "quiet"),
+    (pair, "integer(j) != ii", "integer(j) == ii", "quiet"),
+    (pair, "if plan.periodic:", "if plan.delayed:", "quiet"),
     (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),
     (perceive, "flock.position[a][i] + flock.own_error", "flock.position[a][i] + flock.sent_error", "3-D"),

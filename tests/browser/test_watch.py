@@ -51,6 +51,25 @@ def opened(tab, view):
     tab.get_by_text("Pause").first.wait_for(timeout=PATIENCE * 1000)
 
 
+SHOWN = """Object.values(window.__viserTestpoints?.uplots ?? {})
+    .map(({chart}) => [chart.scales.x.min, chart.scales.x.max, chart.data[0][0], chart.data[0].at(-1)])"""
+
+
+def test_charts_show_all_of_a_flight_also_after_they_were_hidden(live, tab):
+    player, view, _ = live
+    opened(tab, view)
+    until(lambda: player.time > 8.0, "it does not fly")
+    tab.get_by_role("tab", name="Measure").click()
+    end = player.time + 3.0
+    until(lambda: player.time > end, "it does not fly on")
+    shown = tab.evaluate(SHOWN)
+    assert len(shown) >= 5
+    assert all(
+        low <= first and last <= high <= first + 2.5 * max(last - first, 1.0) for low, high, first, last in shown
+    )
+    assert max(last for _, _, _, last in shown) > 8.0
+
+
 def test_the_flock_is_seen_moves_pauses_and_takes_changes(live, tab):
     player, view, _ = live
     opened(tab, view)
@@ -177,4 +196,27 @@ def test_an_obstacle_is_thrown_in_a_gust_blows_and_agents_are_removed(browser, t
         inside = shot(tab)[160:615, 140:640]  # of the arena's blue walls
         teal = (inside[..., 1] - inside[..., 0] > 60) & (inside[..., 2] > 60)  # darts, not orange obstacles
         assert places(teal) <= 4, "agents that were removed are still seen"
+        assert not tab.faults
+
+
+def test_sliders_of_a_group_change_that_group_alone(browser, tab):
+    """One number that the file gives it, and one of a law that only it has; the flock's own stay."""
+    groups = [
+        {"name": "heavy", "agents": 5, "body": {"tau": 2.0}},
+        {"name": "repelled", "agents": [0, 1], "model": {"kind": "viragh_2014"}},
+    ]
+    with flying(settings={"agents": 12, "groups": groups}) as (player, view, _):
+        opened(tab, view)
+        tab.get_by_text("Tune", exact=True).click()
+        for folder, number in (("group heavy: body", "tau"), ("group repelled: model", "p_rep")):
+            tab.get_by_text(folder, exact=True).click()
+            slider = tab.locator(f'[role=slider][aria-label*="{number}"]').last
+            slider.focus(timeout=PATIENCE * 1000)
+            slider.press("ArrowRight")
+        keys = {"groups.heavy.body.tau", "groups.repelled.model.p_rep"}
+        changed = lambda: {key for event in player.flight.events for key in event.data}  # noqa: E731
+        until(lambda: changed() == keys, "the sliders changed something else, or nothing")
+        scenario = player.scenario
+        assert scenario.groups[0].numbers["b", "tau"] > 2.0 and scenario.body.tau == 1.0
+        until(lambda: "--set groups.heavy.body.tau=" in tab.inner_text("body"), "the command does not tell it")
         assert not tab.faults

@@ -141,7 +141,8 @@ def main() -> int:
         held = "yes" if row["held"] else "; ".join(row["broken"])
         margin = f"{row['short']} | {row['before']:.3g}{unit} | {row['after']:.3g}{unit} | {100.0 * row['gain']:+.0f} %"
         drones = f"{row['seed']} | {row['agents']} | {row['fitness']:.3f}"
-        print(f"| {drones} | {margin} | {row['cost']:+.3f} | {held} | {row['verdict']} |")
+        said = row["verdict"] if row["grown"] else "; ".join([row["verdict"], *row["undone"]])
+        print(f"| {drones} | {margin} | {row['cost']:+.3f} | {held} | {said} |")
     held, grown = sum(row["held"] for row in rows), sum(row["grown"] for row in rows)
     told = f"the short margin grew by 20 % for at most {COST:g} of fitness"
     print(f"{held} of {len(rows)} keep what held; in {grown} {told}")

@@ -158,3 +158,12 @@ def test_words_of_a_page_are_those_above_its_pictures_and_claims() -> None:
     text += "## One (a)\n\nWords.\n\n| a | b |\n\n![p](figures/p.png)\n\n| claim | x |\n\n## Two\n\n| claim | x |\n"
     assert words(text, "One (a)") == "Words.\n\n| a | b |" and words(text, "Two") == words(text, "Three") == ""
     assert above(text) == "About it.\n\nMore."
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_the_front_page_tells_the_fraction_that_is_committed(name: str) -> None:
+    told = re.search(rf"\| (\d+) of (\d+): \[papers/{name}\]", (ROOT.parent / "README.md").read_text(encoding="utf-8"))
+    paper = [claim.verdict for claim in read_claims(ROOT / name / "claims.toml")[1] if claim.kind == "paper"]
+    good, bad = paper.count("reproduced"), paper.count("not reproduced")
+    assert (told is None) == (good + bad == 0)
+    assert told is None or (int(told[1]), int(told[2])) == (good, good + bad)

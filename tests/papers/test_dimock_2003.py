@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from airflock.engine import fly
 from airflock.metrics import fitness_dimock
 from airflock.scenarios.files import load
 from airflock_papers.dimock_2003 import ga, robust, robust_claims, static
-from airflock_papers.dimock_2003.flights import Flight
+from airflock_papers.dimock_2003.flights import Flight, in_row
 from airflock_papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 
 
@@ -94,6 +95,29 @@ def test_a_generation_flies_no_controller_twice_and_loses_those_that_collide_or_
     assert run.flown == len(birds.tasks) == 2
     assert run.best == [run.best[0]] * 2 and run.champions[-1] == gains(points[0])
     assert run.timid == [0.0, 0.0]
+    assert run.lost == [0.25, 0.25]  # one of four collides; who cannot cohere was not flown
+
+
+def test_of_the_controllers_with_a_small_gain_those_that_collide_are_counted():
+    run = ga.Run(ga.READINGS["mean"], 1)
+    points = np.array([[0.1, k_a, 0.1, r_c, 0.1] for k_a, r_c in ((0.01, 0.5), (0.01, 0.5), (0.01, 0.0), (0.5, 0.5))])
+    run.note(points, np.array([20.0, ga.LOST, ga.LOST, ga.LOST]))
+    assert run.careless == [(3, 1)] and run.lost == [0.5] and run.timid == [0.75]
+
+
+@pytest.mark.parametrize(("aside", "behind", "row"), [(0.5, 1.0, True), (1.0, 0.5, False), (1.6, 5.0, False)])
+def test_a_row_is_longer_than_wide_and_a_span_wide_at_most(aside, behind, row):
+    rank = np.arange(5.0)
+    places = np.array([-behind * rank, aside * (rank % 3), 0.0 * rank]) * 0.3048 * 2.0
+    assert in_row(Flight({}, places[None])) == row
+
+
+def test_one_horseshoe_is_solved_as_the_dense_system_is():
+    keys = {"wing.segments": "1", "wing.positions": "free", "model.gradient": "none", "duration": 0.1}
+    scenario = load("dimock_2003/published", {**keys, "model.k_c": 0.0, "model.k_a": 0.0})
+    found = fly(scenario, record=True, device="python")
+    places = found.frames[0, :3].T.astype(float)
+    assert found.values["power"] == pytest.approx(static.Air(scenario.wing, 1).powers(places).mean(), rel=1e-3)
 
 
 def test_cmaes_takes_no_more_flights_than_it_is_given():

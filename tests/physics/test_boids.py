@@ -13,7 +13,7 @@ from airflock.engine import plan_of, score_flight
 from airflock.models import reynolds_1987 as boids
 from airflock.scenarios.files import load
 from airflock.world import edges, rays
-from inside import cpu, tables
+from inside import cpu, measuring, tables
 
 
 def test_arc_cosine_is_the_library_s():
@@ -95,8 +95,8 @@ def both(found, seed, start=None):
     """Final states by all pairs, interpreted, and by cells, compiled; their order parameters are the same."""
     flown, values = [], []
     for grid, device in ((False, "python"), (True, "cpu")):
-        plan = plan_of(found, precision=64, grid=grid, given_start=start is not None)
-        assert plan.grid == grid
+        plan = plan_of(found, precision=64, grid=grid, near=grid, given_start=start is not None)
+        assert plan.grid == plan.near == grid
         done = cpu.fly(plan, tables(found, plan, seed), start, device)
         flown.append(done.state)
         values.append(done.values)
@@ -137,16 +137,39 @@ def test_a_flock_along_a_line_or_in_a_plane_is_met_in_full(shape, seed):
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12 * STRETCHED[shape][0])
 
 
+@pytest.mark.parametrize("together", [20, 2])
+def test_groups_by_cells_are_those_of_all_pairs(together, seed):
+    """Tight groups, some of them across the edges of the box, and agents alone; a group has its own mean."""
+    found = load("zapotecatl_2016/best", {
+        "agents": 300, "update": "synchronous", "metrics.kind": "groups", "metrics.r_cluster": 0.25,
+        "metrics.max_e": 3.0, "world.edges": "periodic", "world.side": 4.0, "world.height": 4.0,
+    })  # fmt: skip
+    rng = np.random.default_rng(seed)
+    centres = np.repeat(rng.uniform(-2.0, 2.0, (3, 300 // together)), together, axis=1)
+    place = (centres + rng.normal(0.0, 0.1, (3, 300)) + 2.0) % 4.0 - 2.0
+    frames = np.concatenate([place, rng.normal(0.0, 0.1, (3, 300))])[None]
+    plans = [plan_of(found, precision=64, grid=near, near=near) for near in (False, True)]
+    one, two = (
+        measuring.measured(plan, tables(found, plan, 0), frames, device=device)[0]
+        for plan, device in zip(plans, ("python", "cpu"), strict=True)
+    )
+    assert one["n_groups"] > 5.0 and one["share_alone"] > 0.0
+    assert two == pytest.approx(one, rel=1e-9, abs=1e-9)
+
+
 def test_the_number_of_threads_changes_no_bit_of_a_grid(seed):
     found = crowd("periodic", 3.0)
-    plan = plan_of(found, precision=64, grid=True)
+    plan = plan_of(found, precision=64, grid=True, near=True)
     most = numba.get_num_threads()
-    states = []
+    states, values = [], []
     for threads in sorted({1, min(2, most), most}):
         numba.set_num_threads(threads)
-        states.append(cpu.fly(plan, tables(found, plan, seed)).state)
+        flown = cpu.fly(plan, tables(found, plan, seed))
+        states.append(flown.state)
+        values.append(flown.values)
     numba.set_num_threads(most)
     assert all((state == states[0]).all() for state in states)
+    assert all(value == values[0] for value in values)
 
 
 def test_a_periodic_box_too_small_for_images_is_met_in_all_pairs():

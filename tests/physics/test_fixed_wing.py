@@ -89,6 +89,18 @@ def test_level_flight_uses_the_power_of_its_drag():
     assert power == pytest.approx(drag_of(v, 1.0, WING, b) * WING.weight * v / b.use, rel=5e-3)
 
 
+def test_it_flies_as_long_as_its_battery_lasts_and_then_glides():
+    """Level flight for capacity over power; then the glide of an aircraft without an engine, at no further cost."""
+    b, v = Parameters(), 14.0
+    power = drag_of(v, 1.0, WING, b) * WING.weight * v / b.use
+    start = Memory(thrust=drag_of(v, 1.0, WING, b))
+    velocity, kept = flown((v, 0.0, 0.0), 60.0, (v, 0.0, 0.0), memory=start, battery="lithium", capacity=20.0 * power)
+    assert np.abs(velocity[:2000, 2]).max() < 1e-3 and velocity[2050, 2] < -0.01
+    assert kept[-1].energy == pytest.approx(20.0 * power, rel=0.02)
+    glides, _ = flown((v, 0.0, 0.0), 60.0, (v, 0.0, 0.0), thrust_max=0.0)
+    assert velocity[-1] == pytest.approx(glides[-1], rel=5e-3)
+
+
 def test_it_does_not_fly_slower_than_it_stalls():
     velocity, _ = flown((2.0, 0.0, 0.0), 40.0, (16.0, 0.0, 0.0))
     least = Parameters().margin * stall_speed(WING, 1.0)

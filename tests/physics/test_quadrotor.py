@@ -5,9 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import airflock
 from airflock.body import quadrotor
+from airflock.body.battery import hovering, left
 from airflock.body.quadrotor import Memory, Parameters, move
 from airflock.core.agent import answer
 from airflock.errors import RuleError, ScenarioError
@@ -93,8 +96,54 @@ def test_a_step_too_long_for_its_attitude_is_one_line():
     assert tilt.max() < 1.2 * Parameters().tilt_max and np.ptp(tilt[-100:]) < 0.01
 
 
-def test_any_cuts_of_a_flight_with_a_memory_give_its_bits(seed):
+@pytest.mark.parametrize("density", [1.0, 0.5])
+def test_it_hovers_as_long_as_its_battery_lasts_and_then_falls(density):
+    """Momentum theory: power of hovering over the root of the density; a fall ends at v² = g / (k drag)."""
+    rho = 1.225 * density
+    numbers = {"battery": "lithium", "capacity": 300.0, "hover_power": 150.0, "rho": rho, "thrust_max": 4.0}
+    velocity, kept = flown(STILL, 60.0, **numbers)
+    power = 150.0 / math.sqrt(density)
+    empty = math.ceil(300.0 / (power * 0.01) - 1e-9)  # step at which nothing is left
+    assert not velocity[: empty + 1].any() and velocity[empty + 1, 2] < 0.0
+    assert kept[empty // 2].used == pytest.approx(power * 0.01 * (empty // 2), rel=1e-12)
+    assert kept[-1].thrust < 1e-9 and kept[-1].used == pytest.approx(300.0, rel=0.05)  # and no more is drawn
+    assert velocity[-1, 2] == pytest.approx(-math.sqrt(Parameters().gravity / (Parameters().drag * density)), rel=1e-6)
+
+
+@given(thrust=st.floats(0.0, 4.0), times=st.floats(1.0, 9.0), used=st.floats(0.0, 2e5))
+def test_power_and_thrust_of_a_battery(thrust, times, used):
+    """Power grows with thrust to the power of 1.5; the emptier, the less thrust is left, from all to `weak`."""
+    b = Parameters()
+    assert hovering(times * thrust, 1.0, b) == pytest.approx(times**1.5 * hovering(thrust, 1.0, b), abs=1e-9)
+    share = left(used, b)
+    assert share == 0.0 if used >= b.capacity else b.weak < share <= 1.0
+    assert left(1.01 * used, b) <= share and left(0.0, b) == 1.0
+
+
+def test_a_tired_battery_leaves_less_thrust():
+    """Told to climb, with a tenth of the energy left: the largest thrust is that of the cells' voltage."""
+    b = Parameters(battery="lithium", tilt_max=0.1, a_max=100.0)
+    _, kept = flown(
+        (0.0, 0.0, 99.0), 1.0, memory=Memory(used=0.9 * b.capacity), battery="lithium", tilt_max=0.1, a_max=100.0
+    )
+    assert kept[-1].thrust == pytest.approx(b.thrust_max * (1.0 - 0.9 * (1.0 - b.weak)), rel=1e-3)
+
+
+def test_batteries_of_groups_differ_and_are_told(seed):
+    keys = {
+        "body.kind": "quadrotor", "body.battery": "lithium", "agents": 3, "start.separation": 5.0, "duration": 9.0,
+        "groups": [{"name": "old", "agents": [1], "body": {"capacity": "0.1 Wh"}}],
+    }  # fmt: skip
+    flight = airflock.open(load("vasarhelyi_2018/4ms", keys), seed, device="python").advance(steps=400)
+    used = [flight.look(agent).body.used for agent in range(3)]
+    assert 360.0 <= used[1] < 380.0 and min(used[0], used[2]) > 500.0
+    assert flight.look(1).body.thrust == pytest.approx(0.0, abs=1e-6) and flight.look(0).body.thrust > 0.5
+
+
+@pytest.mark.parametrize("battery", ["endless", "lithium"])
+def test_any_cuts_of_a_flight_with_a_memory_give_its_bits(battery, seed):
     keys = {"body.kind": "quadrotor", "agents": 4, "duration": 4.0, "start.separation": 5.0, "wind.gust": 1.0}
+    keys |= {"body.battery": battery, "body.capacity": 400.0}
     scenario, frames = load("vasarhelyi_2018/4ms", keys), []
     for steps in (400, 7, 1):
         flight = airflock.open(scenario, seed, record=True, device="python")

@@ -279,3 +279,5 @@ def test_the_exit_status_says_whether_the_limit_is_shown(tmp_path, limit, status
     assert tomllib.loads(path.read_text())["shown"] == (status == 0)
     checked = invoked(path, "--check")
     assert checked.exit_code == 0 and "same bits" in checked.output
+    other = invoked(path, "--check", "--set", "body.tau=2", "--agents", "4")
+    assert "leave out --set, --agents" in str(other.exception)

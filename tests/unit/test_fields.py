@@ -109,7 +109,7 @@ WRONG = {
 def test_a_wrong_field_is_one_line(tmp_path, name):
     features, said = WRONG[name]
     (line,) = faults_of(written(tmp_path, *features))
-    assert said in line and line.startswith("world.file = ")
+    assert said in line and line.startswith("vasarhelyi_2018/4ms: world.file = ")
 
 
 def test_faults_of_a_file_come_together_and_name_what_they_are_of(tmp_path):
@@ -126,6 +126,13 @@ def test_a_file_of_no_use_is_one_line(tmp_path, name, said):
         (tmp_path / name).write_text("{}")
     (line,) = faults_of(tmp_path / name)
     assert said in line
+
+
+def test_a_field_without_a_polygon_hides_no_other_fault(tmp_path):
+    """And brings no fault of its stand-in: four agents or four hundred have room."""
+    keys = {"agents": 400, "faults": [{"kind": "motor", "at": 1.0, "agents": [400]}], "body.kind": "quadrotr"}
+    lines = faults_of(written(tmp_path, *WRONG["none"][0]), **keys)
+    assert [re.search(r"holds no polygon|body.kind|no agent 400", line) is not None for line in lines] == [True] * 3
 
 
 def test_a_field_and_its_corners_are_not_given_twice():
@@ -146,7 +153,7 @@ def test_hostile_xml_ends_at_the_door(tmp_path, text):
         xml(text)
     (tmp_path / "a.kml").write_text(text)
     (line,) = faults_of(tmp_path / "a.kml")
-    assert line.startswith("world.file = ") and len(line) < 500
+    assert line.startswith("vasarhelyi_2018/4ms: world.file = ") and len(line) < 500
 
 
 def test_xml_is_read_without_namespaces():
@@ -163,7 +170,7 @@ def test_xml_is_read_without_namespaces():
 def test_hostile_geojson_is_one_line(tmp_path, text):
     (tmp_path / "a.geojson").write_text(text)
     (line,) = faults_of(tmp_path / "a.geojson")
-    assert line.startswith("world.file = ") and len(line) < 500
+    assert line.startswith("vasarhelyi_2018/4ms: world.file = ") and len(line) < 500
 
 
 def test_what_is_not_loaded_reads_no_file():

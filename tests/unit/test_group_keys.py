@@ -6,6 +6,7 @@ import pytest
 import airflock
 from airflock.engine import fly
 from airflock.errors import ScenarioError
+from airflock.scenarios.cost import seconds_of
 from airflock.scenarios.files import load
 from airflock.studio.controls import controls_of, fields
 from airflock.studio.side import value_of
@@ -101,3 +102,16 @@ def test_each_group_has_sliders_of_its_own_numbers():
             assert control.value == value_of(scenario, control.key) and control.low <= control.value <= control.high
     assert own["groups.old.ones.model.p_rep"].label.startswith("p_rep")
     assert fields({"groups.old.ones.model.p_rep": 0.2}) == "--set groups.old.ones.model.p_rep=0.2"
+
+
+@pytest.mark.parametrize(("model", "what"), [
+    ({"kind": "couzin_2005"}, "laws"), ({"dr_o": 3.0}, "numbers of the law"), ({}, ""),
+])  # fmt: skip
+def test_a_large_flock_that_groups_keep_from_cells_is_told_so_and_judged_so(model, what):
+    large = {"agents": 5000, "start.radius": 60.0, "groups": [{"name": "a", "agents": 9, "model": model}]}
+    found, plain = load("couzin_2002/torus", large), load("couzin_2002/torus", {**large, "groups": []})
+    told = [note for note in found.notes if note.startswith("groups: where")]
+    assert told == ([note for note in told if f"where {what} differ" in note] if what else [])
+    assert bool(told) is bool(what) is (seconds_of(found) > 10.0 * seconds_of(plain))
+    few = load("couzin_2002/torus", {**large, "agents": 100})
+    assert not any(note.startswith("groups: where") for note in few.notes)

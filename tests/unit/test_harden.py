@@ -140,6 +140,24 @@ def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):
     assert steps[-1].parameters == steps[0].parameters and "nothing was kept" in steps[-1].verdict
 
 
+def test_a_contact_in_a_few_flights_is_found_on_further_fresh_seeds(monkeypatch):
+    """The steps and the first round of fresh seeds see none; from then on 5 % of flights with more repulsion touch."""
+    luck = {np.random.default_rng(seed).normal() for seed in range(120, 240) if seed % 10 < 1}
+
+    def score(p, chance):
+        return {
+            "fitness": 0.9,
+            "r_min": 5.0 + p.p_rep,
+            "n_coll": 0.0,
+            "phi_wall": 1.0 * (chance in luck and p.p_rep > 0.1),
+        }
+
+    flown_by(monkeypatch, score)
+    steps = harden.harden(load("vasarhelyi_2018/6ms"), range(60))
+    assert steps[1].kept and steps[1].contacts == 0.0
+    assert not steps[-1].kept and "nothing was kept" in steps[-1].verdict
+
+
 def test_what_does_not_fly_is_not_hardened(monkeypatch):
     flown_by(monkeypatch, lambda p, chance: {"fitness": 0.0, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.0})
     with pytest.raises(ScenarioError, match="does not fly, so there is nothing to harden: f_wall is zero in 100 %"):

@@ -10,6 +10,7 @@ import pytest
 from airflock.body.registry import BODIES
 from airflock.core import maths
 from airflock.core.contract import model
+from airflock.core.contract.metrics import MEASURING
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
@@ -131,7 +132,7 @@ def test_every_shipped_body_and_order_parameter_is_lawful():
     for body in BODIES.values():
         assert law.faults(body.move) == []
     for metric in METRICS.values():
-        for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey"):
+        for kind in MEASURING:
             if getattr(metric, kind) is not None:
                 assert law.faults(getattr(metric, kind)) == [], (metric.name, kind)
 

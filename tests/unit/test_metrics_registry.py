@@ -1,6 +1,6 @@
 """What an order parameter means is told by the set that a flight is scored with."""
 
-from airflock.metrics.registry import SETS, reports
+from airflock.metrics.registry import METRICS, SETS, reports
 
 
 def test_each_kind_tells_of_its_own_fitness():
@@ -14,3 +14,14 @@ def test_each_kind_tells_of_its_own_fitness():
 def test_every_name_has_a_meaning():
     for kind in SETS:
         assert all(meaning for _, meaning in reports(SETS[kind]).values()), kind
+
+
+def test_every_order_parameter_says_what_it_is_while_some_are_absent():
+    """Of sums it is pooled, of means each instant counts once, whoever is there."""
+    said = {name: metric.absence(name) for metric in METRICS.values() for name in metric.reports}
+    for name, how in {
+        "phi_vel": "mean over instants", "phi_wall": "mean over agents and instants", "n_coll": "counted",
+        "r_min": "smallest", "clearance": "smallest",
+    }.items():  # fmt: skip
+        assert how in said[name], name
+    assert all("who are there" in how for how in said.values())

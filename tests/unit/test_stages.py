@@ -54,7 +54,6 @@ def test_no_text_in_a_stage_is_code(path):
 
 
 SILENT = {"sensors__noise": 0.0, "body__noise": 0.0}
-BY_CELLS = ("starts", "whose", "cell_of", "flat", "sides", "count")  # what only a search by cells is given
 CASES = {
     "paper": ("vasarhelyi_2018", {}),
     "dryden, quadrotor, polygon, 3-D": (
@@ -215,7 +214,7 @@ class World:
             else:
                 metrics = measure.measured(self.plan, clock)
                 least = judging.measure(
-                    self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts, *[None] * len(BY_CELLS),
+                    self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
                     plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
                 )  # fmt: skip

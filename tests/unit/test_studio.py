@@ -25,7 +25,7 @@ from airflock.stage import colours, shades
 from airflock.stage.clusters import clusters
 from airflock.stage.scene import dart, stage_of, turned
 from airflock.stage.shades import Shade
-from airflock.studio import door, measures
+from airflock.studio import charts, door, measures
 from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.collisions import BOTH, Collisions
 from airflock.studio.controls import controls_of, span
@@ -574,6 +574,37 @@ def test_a_bird_tells_what_the_wakes_of_others_save_it():
     assert len(legs) == 6  # two legs a bird
     np.testing.assert_allclose(np.abs(legs[:, 0, 1] - np.repeat(side.motion[0][:, 1], 2)), 0.5 * span, rtol=1e-5)
     assert (legs[:, 1, 0] < legs[:, 0, 0]).all() and "of a lone bird" in drawn.words
+
+
+@given(st.floats(-1e3, 1e5), st.floats(0.0, 1e5), st.integers(0, 600))
+def test_an_axis_ends_at_round_numbers_just_beyond_what_is_shown(first, span, count):
+    values = first + span * np.linspace(0.0, 1.0, count)
+    low, high = charts.ends(values)
+    assert low < high
+    if count:
+        slack = 1e-6 * (high - low)
+        assert low - slack <= values[0] and values[-1] <= high + slack
+    if count > 1 and span > 1e-3:
+        part = (values[-1] - values[0]) / charts.PARTS * 2.5  # at most: the next of 1, 2, 5
+        assert values[0] - low <= part * 1.001 and high - values[-1] <= part * 1.001
+
+
+def test_an_axis_is_told_only_where_a_round_end_is_passed():
+    class Handle:
+        told = 0
+
+        def __setattr__(self, name, value):
+            object.__setattr__(self, name, value)
+            Handle.told += name == "scales"
+
+    handle = Handle()
+    made = charts.Chart(handle)
+    for count in range(2, 500):  # 100 s, five moments a second
+        time = 0.2 * np.arange(count)
+        made.data = time, time**2
+        low, high = handle.scales["x"]["range"]
+        assert low <= time[0] and time[-1] <= high
+    assert handle.told < 30
 
 
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))

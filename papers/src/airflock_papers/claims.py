@@ -65,9 +65,13 @@ class Claim(Statement):
         if self.verdict != wanted:
             raise AirflockError(f"claim {self.id}: verdict = {self.verdict!r}, but its bound says {wanted!r}")
 
-    def as_dict(self) -> dict[str, Any]:
+    def stored(self) -> dict[str, Any]:
         """The claim as plain values, without what it does not have."""
-        return {key: value for key, value in asdict(self).items() if value not in (None, "", {}) and not _lost(value)}
+        return {key: value for key, value in asdict(self).items() if value not in (None, "", {})}
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same for JSON, which knows no number that is not finite."""
+        return {key: value for key, value in self.stored().items() if not _lost(value)}
 
 
 def verdict_of(claim: "Claim") -> str:
@@ -167,7 +171,7 @@ def write_claims(path: Path, claims: Iterable[Claim], above: Mapping[str, Any]) 
     table = tomlkit.aot()
     for claim in claims:
         entry = tomlkit.table()
-        for key, value in claim.as_dict().items():
+        for key, value in claim.stored().items():
             entry.add(key, _inline(value) if isinstance(value, Mapping) else _rounded(value))
         table.append(entry)
     document.add("claim", table)
@@ -279,7 +283,7 @@ def _numbers(claim: Claim) -> str:
 
 
 def _lost(value: Any) -> bool:
-    """Not finite: the ratio to a count of 0, say, which TOML readers and JSON do not agree on."""
+    """Not finite: the ratio to a count of 0, say."""
     return isinstance(value, float) and not math.isfinite(value)
 
 

@@ -45,7 +45,7 @@ def page(title: str, command: str, claims: Sequence[Claim], sections: Sequence[S
     paper = [claim for claim in claims if claim.kind == "paper"]
     lines = [f"# {title}", "", f"`{command}` computes this page again. {about}".strip(), ""]
     if paper:
-        lines += [f"**{records.headline(claims)}.**", "", *_legend(claims)]
+        lines += [f"**{records.headline(claims)}.**", "", *_legend(claims), *_overview(paper, sections)]
     lines += _table("Not reproduced", [claim for claim in paper if claim.verdict == "not reproduced"])
     for section in sections:
         mine = [claim for claim in paper if claim.id.startswith(section.start) and claim.verdict != "not reproduced"]
@@ -72,6 +72,23 @@ def _legend(claims: Sequence[Claim]) -> list[str]:
         words + (f" {others} further lines, at the end, are not the paper's and are not counted." * bool(others)),
         "",
     ]
+
+
+def _overview(paper: Sequence[Claim], sections: Sequence[Section]) -> list[str]:
+    """How many sentences of each section are reproduced; nothing for a page of one section."""
+    rows, rest = [], list(paper)
+    for section in sections:
+        mine = [claim for claim in rest if claim.id.startswith(section.start)]
+        rest = [claim for claim in rest if not claim.id.startswith(section.start)]
+        rows += [(section.title, mine)] if mine else []
+    rows += [("Other sentences", rest)] if rest else []
+    if len(rows) < 2:
+        return []
+    lines = ["| about | reproduced | not reproduced | neither |", "| --- | --- | --- | --- |"]
+    for title, mine in rows:
+        good, bad = (sum(claim.verdict == verdict for claim in mine) for verdict in records.VERDICTS["paper"][:2])
+        lines.append(f"| {title} | {good} | {bad} | {len(mine) - good - bad} |")
+    return [*lines, ""]
 
 
 def _table(title: str, claims: Sequence[Claim]) -> list[str]:

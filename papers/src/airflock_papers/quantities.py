@@ -18,6 +18,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "joint p": (),
     "four partial fitnesses": ("partial fitnesses",),
     "share of the loss by f_coll": ("collisions",),
+    "fitness at a velocity": ("velocity regimes",),
     "instants in range": ("distance",),
     "collided": ("collisions",),
     "share of flights": ("flight", "motion", "pattern", "circular"),
@@ -46,6 +47,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     **{f"evolved {name}": (name,) for name in ("r0_shill", "v_shill", "p_shill", "a_shill")},
     # Zapotecatl et al.
     "quality": ("quality",),
+    "quality as evaluated": ("evaluated similarly",),
     "extension_cm": ("extension",),
     "polarization_deg": ("polarization",),
     "f_collision": ("collision", "collide"),

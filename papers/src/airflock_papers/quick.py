@@ -63,7 +63,7 @@ def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) ->
         path = folder / f"{name}.{part}.json"
         kept = _kept(path, now)
         if kept is None:
-            kept = _flown(name, part, threads, _teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}"))
+            kept = _flown(name, part, threads, teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}"))
             atomic.write(path, json.dumps({"texts": now, "verdicts": kept}))
         found += [Verdict(name, part, *row) for row in kept]
     return found
@@ -90,7 +90,7 @@ def _flown(
     return [(claim.id, claim.verdict, float(f"{claim.ours or 0.0:.4g}")) for claim in claims]
 
 
-def _teller(log: Path, say: Callable[[str], None], what: str) -> Callable[[str, int, int], None]:
+def teller(log: Path, say: Callable[[str], None], what: str) -> Callable[[str, int, int], None]:
     """Progress as lines, to the log and to the caller, at most one every ten seconds."""
     last = -EVERY
 
@@ -115,7 +115,7 @@ def committed() -> list[Verdict]:
     try:
         text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
     except OSError as fault:
-        raise AirflockError(f"{COMMITTED}: {fault}; `python -m airflock_papers.quick` writes it") from fault
+        raise AirflockError(f"{COMMITTED}: {fault.strerror}; `python -m airflock_papers.quick` writes it") from fault
     return [Verdict(**row | {"ours": float(row["ours"])}) for row in csv.DictReader(io.StringIO(text))]  # type: ignore[arg-type]
 
 

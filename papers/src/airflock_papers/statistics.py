@@ -53,13 +53,19 @@ def difference(a: ArrayLike, b: ArrayLike) -> Estimate:
 
 
 def ratio(a: ArrayLike, b: ArrayLike) -> Estimate:
-    """Mean of a over mean of b with a bootstrap interval: for counts whose variance exceeds their mean."""
+    """Mean of a over mean of b with a bootstrap interval: for counts whose variance exceeds their mean.
+
+    Nothing over nothing is not a number, and says nothing: where a resample has no count on either side, the quotient
+    may be anything from 0 to infinity, so that the interval reaches there.
+    """
     x, y = _clean(a), _clean(b)
     below = _resampled(y, np.mean)
     tops = _resampled(x, np.mean, seed=1)
     quotients = np.divide(tops, below, out=np.full_like(tops, np.inf), where=below > 0.0)
-    low, high = _interval(quotients)
-    return Estimate(float(x.mean() / y.mean()) if y.mean() > 0.0 else np.inf, None, low, high, x.size)
+    low = _interval(np.where((tops == 0.0) & (below == 0.0), 0.0, quotients))[0]
+    high = _interval(quotients)[1]
+    nothing = np.nan if x.mean() == 0.0 else np.inf
+    return Estimate(float(x.mean() / y.mean()) if y.mean() > 0.0 else nothing, None, low, high, x.size)
 
 
 def rank_test(a: ArrayLike, b: ArrayLike) -> float:

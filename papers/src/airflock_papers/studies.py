@@ -21,16 +21,30 @@ def folder_of(name: str, number: int = 0, quick: bool = False) -> Path:
 
 
 def evolve(
-    flights: Flights, title: str, name: str, number: int = 0, settings: Mapping[str, Any] | None = None
+    flights: Flights,
+    title: str,
+    name: str,
+    number: int = 0,
+    settings: Mapping[str, Any] | None = None,
+    *,
+    space: Mapping[str, Any] | None = None,
+    folder: str = "",
+    search: Mapping[str, Any] | None = None,
 ) -> Result:
-    """Result of a run of a shipped study, begun or continued; settings: keys of the scenario to change."""
-    search: dict[str, Any] = {"seed": number, **(QUICK if flights.quick else {})}
-    study = load_study(name, settings=settings, search=search)
-    folder = folder_of(name, number, flights.quick)
-    open_folder(folder, study, resume=(folder / STUDY).exists())
+    """Result of a run of a shipped study, begun or continued.
+
+    settings : keys of the scenario to change; space : table that replaces the study's; folder : its name, if another
+    search   : keys of the search to change, in place of those of a quick one
+    """
+    keys = search if search is not None else QUICK if flights.quick else {}
+    study = load_study(
+        name, settings=settings, search={"seed": number, **keys}, tables={"space": space} if space else None
+    )
+    place = folder_of(folder or name, number, flights.quick)
+    open_folder(place, study, resume=(place / STUDY).exists())
 
     def watch(p: Progress) -> None:
         if flights.progress:
             flights.progress(title, p.done, p.total)
 
-    return run(study, folder, executor_for(study, threads=flights.threads), watch)
+    return run(study, place, executor_for(study, threads=flights.threads), watch)

@@ -11,7 +11,7 @@ from airflock.core.parameters import choice, quantity
 
 PAPER = "Dimock & Selig 2003"
 OURS = "our choice"
-SEGMENTS = ("5", "9", "10", "20", "40", "80")
+SEGMENTS = ("1", "5", "9", "10", "20", "40", "80")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Parameters(Record):
     )
     segments: str = choice(
         "20", SEGMENTS, source=f"{PAPER}: 10 discrete filaments; at least 20 resolve the core",
-        meaning="bound segments of a wing",
+        meaning="bound segments of a wing; 1 is a single horseshoe",
     )  # fmt: skip
     layout: str = choice(
         "inset", ("inset", "plain"), source="tip inset: exact to 0.4 % at 20 segments; plain: the paper, low by 10 %",
@@ -67,6 +67,8 @@ class Parameters(Record):
 
 def segments_of(wing):
     """Number of bound segments, a compile-time constant."""
+    if wing.segments == "1":
+        return 1
     if wing.segments == "5":
         return 5
     if wing.segments == "9":

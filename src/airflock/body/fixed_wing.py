@@ -12,6 +12,9 @@ suffice the nose goes down and speed is kept, as total-energy controllers do. Ba
 a largest rate of roll; there is no sideslip, no pitch dynamics and no flap. All is relative to the air, which the
 aircraft is taken to know: wind is a true airspeed, and a velocity over ground is followed with the nose into the wind.
 
+Energy is the work of thrust over `use`. With body.battery = "lithium" the largest thrust falls with it as in
+`body.battery`; when the battery is empty the aircraft glides. In a plane, which holds its height, it only grows slower.
+
 Integration: V, γ and χ one after another with the values after the step of the controllers, of first order in dt; turns
 keep the speed exactly. In a plane the height is held by the plane itself.
 """
@@ -20,9 +23,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from airflock.body.battery import left
 from airflock.core.maths import arc_cosine, clamp, norm
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core.parameters import choice, quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"
@@ -54,6 +58,14 @@ class Parameters(Record):
         0.5, "1", low=0.01, high=1.0, source="our choice: propeller and motor", meaning="share of energy that is thrust"
     )
     gravity: float = quantity(9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight / mass")
+    battery: str = choice("endless", ("endless", "lithium"), source=OURS, meaning="energy that never ends, or does")
+    capacity: float = quantity(
+        540e3, "J", low=1.0, high=1e9, source="our choice: 150 Wh", meaning="energy of the battery"
+    )
+    weak: float = quantity(
+        0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
+        meaning="share of the largest thrust that is left just before the battery is empty",
+    )  # fmt: skip
 
 
 class Memory(NamedTuple):
@@ -88,12 +100,20 @@ def limits(b, speed, start, wing):
     return found
 
 
-def climbing(up, v, drag, slow, wing, b):
+def largest_thrust(v, used, wing, b):
+    """Thrust over weight that engine and battery can give at an airspeed v (m/s); used : energy drawn, J."""
+    possible = min(b.thrust_max, b.power_max / (v * wing.weight))
+    if b.battery == "lithium":
+        possible = possible * left(used, b)
+    return possible
+
+
+def climbing(up, v, drag, slow, possible, b):
     """Sine of the climb angle that is asked: for a vertical speed `up` (m/s), within what thrust and speed allow.
 
-    slow : acceleration that the speed controller asks for, over gravity
+    slow : acceleration that the speed controller asks for, over gravity; possible : largest thrust over weight
     """
-    spare = min(b.thrust_max, b.power_max / (v * wing.weight)) - drag - slow
+    spare = possible - drag - slow
     low = -math.sin(b.dive_max)
     return clamp(up / v, low, clamp(spare, low, 1.0))
 
@@ -129,11 +149,12 @@ def move(vx, vy, vz, cx, cy, cz, wx, wy, wz, memory, dt, b, wing):
     angle = math.asin(sine)
     slow = (wish - v) / (b.tau_speed * b.gravity)
     drag = drag_of(v, steady_load(sine, bank, n_most), wing, b)
-    asked = math.asin(climbing(az, v, drag, slow, wing, b))
+    possible = largest_thrust(v, memory.energy, wing, b)
+    asked = math.asin(climbing(az, v, drag, slow, possible, b))
     n = clamp((math.cos(angle) + v * (asked - angle) / (b.tau_climb * b.gravity)) / math.cos(bank), 0.0, n_most)
     # thrust for the speed
     drag = drag_of(v, n, wing, b)
-    thrust_wish = clamp(drag + sine + slow, 0.0, min(b.thrust_max, b.power_max / (v * wing.weight)))
+    thrust_wish = clamp(drag + sine + slow, 0.0, possible)
     thrust = memory.thrust + (thrust_wish - memory.thrust) * (1.0 - math.exp(-dt / b.tau_thrust))
     speed = max(v + b.gravity * (thrust - drag - sine) * dt, 0.1 * v)
     climb = clamp(angle + b.gravity / v * (n * math.cos(bank) - math.cos(angle)) * dt, -1.5, 1.5)

@@ -9,6 +9,9 @@ direction, proportional and damped, with a limited angular acceleration; then mo
 Forces are per mass. Drag is relative to the air: a part proportional to the speed across n (rotor drag, as in Faessler
 et al. 2018) and a part that grows with its square; both, and the largest thrust, grow with the density of the air.
 
+With body.battery = "lithium" energy is drawn as in `body.battery`, the largest thrust falls with it, and when the
+battery is empty the motors stop: in space the quadrotor falls, in a plane drag brings it to rest.
+
 Integration: semi-implicit Euler, of first order in dt. In a plane the height is held by the plane itself.
 """
 
@@ -16,9 +19,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from airflock.body.battery import hovering, left
 from airflock.core.maths import norm, shorten
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import quantity
+from airflock.core.parameters import choice, quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"  # positions move by the velocity after the step
@@ -70,13 +74,24 @@ class Parameters(Record):
     gravity: float = quantity(
         9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight per mass"
     )
+    battery: str = choice("endless", ("endless", "lithium"), source=OURS, meaning="energy that never ends, or does")
+    capacity: float = quantity(
+        150e3, "J", low=1.0, high=1e9, source="our choice: 42 Wh, 17 min of hovering", meaning="energy of the battery"
+    )
+    hover_power: float = quantity(
+        150.0, "W", low=0.0, high=1e6, source=OURS, meaning="power of hovering, in air of density rho_0"
+    )
+    weak: float = quantity(
+        0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
+        meaning="share of thrust_max that is left just before the battery is empty",
+    )  # fmt: skip
 
 
 class Memory(NamedTuple):
     """What a quadrotor carries from step to step.
 
     n : direction of thrust; w, a : its turning rate (rad/s) and angular acceleration (rad/s²), which the motors give
-    thrust : over weight; i : integral of the velocity error, m/s²
+    thrust : over weight; i : integral of the velocity error, m/s²; used : energy drawn from the battery, J
     """
 
     nx: float = 0.0
@@ -92,6 +107,7 @@ class Memory(NamedTuple):
     ix: float = 0.0
     iy: float = 0.0
     iz: float = 0.0
+    used: float = 0.0
 
 
 def limits(b, dt):
@@ -170,7 +186,12 @@ def move(vx, vy, vz, mx, my, mz, cx, cy, cz, wx, wy, wz, memory, dt, b):
     lag = 1.0 - math.exp(-dt / b.motor)
     nx, ny, nz, ux, uy, uz, tx, ty, tz = turned(memory, fx, fy, fz, lag, dt, b)
     want = (fx * nx + fy * ny + fz * nz) / b.gravity
-    want = min(max(want, b.thrust_min), b.thrust_max * b.rho / b.rho_0)
+    possible = b.thrust_max * b.rho / b.rho_0
+    used = memory.used
+    if b.battery == "lithium":
+        possible = possible * left(used, b)
+        used = used + hovering(memory.thrust, b.rho / b.rho_0, b) * dt
+    want = min(max(want, b.thrust_min), possible)
     thrust = memory.thrust + (want - memory.thrust) * lag
     dx, dy, dz = dragged(vx - wx, vy - wy, vz - wz, nx, ny, nz, b)
     g = b.gravity
@@ -180,6 +201,6 @@ def move(vx, vy, vz, mx, my, mz, cx, cy, cz, wx, wy, wz, memory, dt, b):
         vz + (thrust * g * nz - g + dz) * dt,
         Memory(
             nx, ny, nz, ux, uy, uz, tx, ty, tz, thrust,
-            memory.ix + h * ex, memory.iy + h * ey, memory.iz + h * ez,
+            memory.ix + h * ex, memory.iy + h * ey, memory.iz + h * ez, used,
         ),
     )  # fmt: skip

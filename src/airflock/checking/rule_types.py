@@ -2,7 +2,7 @@
 
 LAW = ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide")
 LAW_NUMBERS = ("preferred_speed", "interaction_range")
-PARAMETER = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey")
+PARAMETER = ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "linked_within", "survey")
 MEASURES = (*PARAMETER, "fitness", "faults")
 SENSOR = ("measure", "error", "exact", "bounds")
 RADIO = ("missed", "missed_few", "receive", "late", "see", "carry", "lasts")
@@ -50,7 +50,7 @@ LETTERS = {"p": LAW, "q": MEASURES, "b": ("move", "limits"), "s": SENSOR, "k": R
 STATE = f"tuple[{', '.join(['float'] * 6)}]"
 VECTOR = "tuple[float, float, float]"
 RESULTS = {
-    **dict.fromkeys(("reach", "sight", "wall_reach", "within", *LAW_NUMBERS), "float"),
+    **dict.fromkeys(("reach", "sight", "wall_reach", "within", "linked_within", *LAW_NUMBERS), "float"),
     "neighbour": "Sums", "boundary": "Walls", "decide": VECTOR, "move": VECTOR, "flock": "None", "survey": "None",
     "meet": "None",
     "pair": "Pair", "linked": "float", "agent": "Agent", "member": "Member", "cluster": "Cluster", "sample": "Sample",

@@ -95,6 +95,13 @@ def certify(
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """
     if check:
+        others = {
+            "--limit": limit, "--flights": flights, "--out": out, "--resume": resume, "--tolerance": tolerance,
+            "--tolerance-of": tolerance_of, "--split": split, "--map": over, "--uncertain": uncertain, "--plot": plot,
+            "--scheduler": scheduler, "--set": changes, "--law": law, "--agents": agents, "--duration": duration,
+        }  # fmt: skip
+        left_out = ", ".join(name for name, value in others.items() if value)
+        options.refuse([f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else [])
         _check(scenario, threads, trust, as_json)
         return
     from airflock.certify.asked import asked, campaign_of, check_options

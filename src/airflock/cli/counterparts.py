@@ -54,7 +54,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         {
             "scenario": "what", "out": "out", **SETTINGS, **TABLE, "resume": "resume", "scheduler": "scheduler",
             "timeout": "timeout", "sensitivity": "sensitivity", "device": "device", "threads": "threads",
-            "quiet": "watch", "trust": "trust", "limit": "limit",
+            "quiet": "watch", "trust": "trust", "limit": "limit", "fast": "fast",
             **dict.fromkeys(SEARCH, "search_keys"),
         },
     ),

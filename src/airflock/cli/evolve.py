@@ -45,6 +45,10 @@ def evolve(
         int | None,
         typer.Option(help="Averages of the last means that also fly in the final.", show_default="0"),
     ] = None,
+    fast: Annotated[
+        bool,
+        typer.Option("--fast", help="A third of the flights: 24 candidates, each with one flight first and nine last."),
+    ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
     scheduler: options.Scheduler = None,
     timeout: Annotated[
@@ -91,6 +95,7 @@ def evolve(
         search_keys={key: value for key, value in given.items() if value is not None},
         limit=limit or (),
         trust=trust,
+        fast=fast,
     )
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"--sensitivity {sensitivity}: none of {', '.join(METHODS)}")

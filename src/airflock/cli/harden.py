@@ -79,7 +79,7 @@ def harden(
     else:
         from airflock.evolve.harden import harden
 
-        with options.progress(f"{scenario}: flights", 15 * seeds * len(found), quiet=as_json) as done:  # at most
+        with options.progress(f"{scenario}: flights", 19 * seeds * len(found), quiet=as_json) as done:  # at most
             steps = harden(found, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(found, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")

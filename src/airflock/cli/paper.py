@@ -1,5 +1,6 @@
 """Verb paper: recompute what a publication reports."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -28,12 +29,13 @@ def paper(
 
     Needs pip install airflock-papers; in a clone of the repository: pip install -e ./papers
 
-    `all --quick` flies the small form of every paper and fails if a verdict is not the committed one.
+    `all --quick` flies the small form of every paper and fails if a verdict is not the committed one. `all --breaks`
+    makes the change of every claim and fails if one that is committed as turned red no longer is.
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
     if name == "all":
-        _all(quick, keep, threads, as_json, {"--only": only, "--seeds": seeds, "--breaks": breaks})
+        _all(quick, breaks, keep, threads, as_json, {"--only": only, "--seeds": seeds})
         return
     if breaks:
         _breaks(name, only, seeds, threads, as_json)
@@ -49,8 +51,10 @@ def paper(
     print_claims(claims)
 
 
-def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]) -> None:
-    """Every paper in its small form, against the committed verdicts."""
+def _all(
+    quick: bool, breaks: bool, keep: Path | None, threads: int | None, as_json: bool, others: dict[str, object]
+) -> None:
+    """Every paper: in its small form, or every claim under its change, against what is committed."""
     from airflock.cache import cache_folder
     from airflock.errors import AirflockError
     from airflock.papers import installed
@@ -59,9 +63,13 @@ def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, oth
     from airflock_papers import quick as tier
 
     wrong = [option for option, given in others.items() if given]
-    if wrong or not quick:
-        told = f"{', '.join(wrong)} is of one paper; name it" if wrong else "takes days; add --quick, or name one paper"
-        raise AirflockError(f"all: {told}")
+    if wrong or quick == breaks:
+        told = "takes days; add --quick or --breaks, or name one paper"
+        told = "give --quick or --breaks, not both" if quick else told
+        raise AirflockError(f"all: {', '.join(wrong)} is of one paper; name it" if wrong else f"all: {told}")
+    if breaks:
+        _campaign(keep or cache_folder() / "papers" / "breaks", threads, as_json)
+        return
     before = tier.committed()
     rows = tier.fly(keep or cache_folder() / "papers" / "quick", tables.say, threads)
     changed = tier.changed(before, rows)
@@ -72,6 +80,24 @@ def _all(quick: bool, keep: Path | None, threads: int | None, as_json: bool, oth
             typer.echo(f"{row.paper} {row.id}: {row.committed or 'not committed'} is now {row.found or 'not flown'}")
         typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
     if changed:
+        raise typer.Exit(1)
+
+
+def _campaign(folder: Path, threads: int | None, as_json: bool) -> None:
+    """Every claim of every paper under its change, against what is committed."""
+    from airflock_papers import campaign
+
+    before = campaign.committed()
+    rows = campaign.fly(folder, tables.say, threads)
+    worse = campaign.worse(before, rows)
+    if as_json:
+        tables.emit_json({"claims": [row._asdict() for row in rows], "worse": [row._asdict() for row in worse]})
+    else:
+        for row in worse:
+            typer.echo(f"{row.paper} {row.id}: {row.result} with {row.change} ({row.ours}, then {row.changed})")
+        told = ", ".join(f"{number} {result}" for result, number in Counter(row.result for row in rows).items())
+        typer.echo(f"{len(rows)} claims under their changes: {told}")
+    if worse:
         raise typer.Exit(1)
 
 

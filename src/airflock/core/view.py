@@ -19,6 +19,7 @@ class View:
     sums, walls : what the law was given of all neighbours, and of all surfaces
     memory      : the law's memory after the decision
     command     : in the unit of the law's command
+    body        : what the body remembers, such as its thrust or the energy that it used; None if nothing
     """
 
     agent: int
@@ -33,3 +34,4 @@ class View:
     walls: Any
     memory: Any
     command: tuple[float, ...]
+    body: Any = None

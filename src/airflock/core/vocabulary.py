@@ -258,6 +258,7 @@ VOCABULARY: dict[str, dict[str, str]] = {
     "sample": {**SAMPLE, "q": "metric parameters"},
     "survey": {**FLOCK, "q": "metric parameters"},
     "within": {"q": "metric parameters"},
+    "linked_within": {"q": "metric parameters"},
     "settled": {
         "pair": "what the rule `pair` adds up to over all who are nearer than `beyond`, and perhaps some others",
         "beyond": "distance, m",

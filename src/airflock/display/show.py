@@ -1,7 +1,6 @@
 """A show: drones fly from shape to shape; a master assigns points, again when drones fail or are pushed away."""
 
-import json
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +8,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.core import random
 from airflock.display.assignment import assign, better
-from airflock.engine import fly
+from airflock.engine import Flight
 from airflock.errors import AirflockError
-from airflock.recordings.flights import plain
-from airflock.recordings.layout import dataset
+from airflock.recordings.flights import recording_of as recorded
+from airflock.scenarios.change import remade
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 
@@ -28,19 +26,6 @@ HALF = 0.35  # m; half side of the box that stands for a drone that hovers
 CLEAR = 1.6  # m; a point nearer than this to a drone that hovers is given to nobody
 
 Frames = NDArray[np.float64]
-
-
-@dataclass
-class Drones:
-    """Those in the air: numbers, state (6, drone) in m and m/s, the point of each; hulls of those that hover (hull, 3)
-    and bodies of those that fall, each with position and velocity (6,).
-    """
-
-    who: NDArray[np.int64]
-    state: Frames
-    target: NDArray[np.int64]
-    hulls: list[NDArray[np.float64]] = field(default_factory=list)
-    falling: list[NDArray[np.float64]] = field(default_factory=list)
 
 
 @dataclass
@@ -66,7 +51,7 @@ class Formed:
 @dataclass
 class Show:
     """What was flown: each shape's figures; frames (time, 6, drone; nan once failed), the time between them, s, and the
-    last frame of each shape; the scenario and the seed.
+    last frame of each shape; the scenario, the seed, and the flight, which is one from the first shape to the last.
     """
 
     formed: list[Formed]
@@ -75,19 +60,12 @@ class Show:
     ends: list[int]
     scenario: Scenario
     seed: int
+    flight: Flight
 
 
 def recording_of(show: Show) -> xr.Dataset:
-    """A show as a recording; drones that failed are missing from then on."""
-    dims = show.frames.shape[1] // 2
-    frames = np.concatenate([show.frames, np.full_like(show.frames[:, :dims], np.nan)], axis=1)
-    about = {
-        "airflock_scenario": json.dumps(plain(show.scenario.document)),
-        "airflock_name": "display",
-        "airflock_seed": show.seed,
-        "random_start": 0,
-    }
-    return dataset(frames, dims, show.period, about, show.scenario.model.command)
+    """A show as a recording with its events; drones that failed are missing from then on."""
+    return recorded(show.flight)
 
 
 def scenario_of(drones: int, settings: dict[str, Any] | None = None) -> Scenario:
@@ -127,139 +105,138 @@ def fly_show(
     for number, points in enumerate(shapes):
         if len(points) < drones:
             raise AirflockError(f"shape {number + 1} has {len(points)} points, fewer than {drones} drones")
-    scenario = scenario_of(drones, settings)
     rng = np.random.default_rng([seed, 3])
-    flock = Drones(np.arange(drones), np.zeros((6, drones)), np.arange(drones))
-    flock.state[:3] = ranks(drones).T
     doomed = rng.permutation(drones)[: round(failing * drones)]
     legs = np.array_split(doomed, len(shapes))
     kinds = {int(who): FAILURES[i % 2] if failure == "both" else failure for i, who in enumerate(doomed)}
-    formed: list[Formed] = []
-    frames: list[Frames] = []
-    ends: list[int] = []
-    for number, points in enumerate(shapes):
-        leg = _Leg(scenario, flock, points, drones, (seed, number))
-        formed.append(leg.fly([(int(who), kinds[int(who)], float(rng.uniform())) for who in legs[number]]))
-        frames += leg.frames
-        ends.append(sum(map(len, frames)) - 1)
-    return Show(formed, np.concatenate(frames), scenario.metrics.period, ends, scenario, seed)
+    show = _Master(scenario_of(drones, settings), shapes[0], drones, seed, comes_and_goes=bool(len(doomed)))
+    ends = []
+    for points, failures in zip(shapes, legs, strict=True):
+        show.form(points, [(int(who), kinds[int(who)], float(rng.uniform())) for who in failures])
+        ends.append(round(show.flight.time / show.period))
+    return Show(show.closed(), show.flight.frames[:, :6], show.period, ends, show.scenario, seed, show.flight)
 
 
-def segment_seed(seed: int, leg: int, segment: int) -> int:
-    """Seed of one segment of a leg: by a stream, so that no two segments of any shows fly the same noise."""
-    low, high, *_ = random.words(seed, random.SHOW, 0, leg, segment)
-    return int(low | high << 32)
+class _Master:
+    """Who gives the drones their points, and sees what becomes of them.
 
+    flight  : of all drones, from the first shape to the last
+    target  : of each drone the number of its point, also of those that have failed
+    hulls   : places of those that hover; falling : position and velocity (6,) of those that fall
+    """
 
-class _Leg:
-    """The way to one shape."""
+    def __init__(self, scenario: Scenario, points: Frames, drones: int, seed: int, *, comes_and_goes: bool):
+        self.scenario, self.period, self.points = scenario, scenario.metrics.period, points
+        self.target = assign(ranks(drones), points, np.zeros(len(points), bool))
+        self.hulls: list[NDArray[np.float64]] = []
+        self.falling: list[NDArray[np.float64]] = []
+        self.formed: list[Formed] = []
+        self.marks: list[int] = []  # how many windows of scores had been closed when a shape was begun
+        start = np.zeros((6, drones))
+        start[:3] = ranks(drones).T
+        keys: dict[str, Any] = {"goals.points": self._aims(), "duration": PATIENCE}
+        if comes_and_goes:  # one driver for the whole show
+            keys["faults"] = [*scenario.document.get("faults", ()), {"kind": "fails", "per_hour": 0.0}]
+        self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start)
 
-    def __init__(self, scenario: Scenario, flock: Drones, points: Frames, drones: int, leg: tuple[int, int]):
-        self.scenario, self.flock, self.points, self.total, self.leg = scenario, flock, points, drones, leg
-        self.frames: list[Frames] = []
-        self.collisions = self.struck = self.hulls = self.reassigned = self.segments = 0
-        self.placed: float | None = None
-        self.now = 0.0
-        self._assign()
-
-    def fly(self, failures: list[tuple[int, str, float]]) -> Formed:
+    def form(self, points: Frames, failures: list[tuple[int, str, float]]) -> None:
         """Fly until the shape stands; failures: who, how, and when as a share of the way."""
+        self.points, self.begun, self.placed = points, self.flight.time, float("nan")
+        self.struck = self.reassigned = 0
+        if self.formed:
+            self._assign(first=True)
+        self.marks.append(len(self.flight.windows))
         planned = self._under_way()
         for who, how, share in sorted(failures, key=lambda f: f[2]):
-            self._segment(max(share * planned - self.now, 0.0))
+            self._fly(max(share * planned - (self.flight.time - self.begun), 0.0))
             self._fail(who, how)
-        self._segment(max(self._under_way(), 1.0))
-        until = self.now + PATIENCE
-        while self.now < until and not self._stands():
-            changed = self._assign()
-            self._segment(self._under_way() + CHECK if changed else CHECK)
-        far = self._distances(self.flock.state)
-        return Formed(
-            self.placed if self.placed is not None else float("nan"), float(far.mean()), float(far.max()),
-            len(self.flock.who), self.collisions, self.struck, self.hulls, self.reassigned,
-        )  # fmt: skip
+        self._fly(max(self._under_way(), 1.0))
+        until = self.flight.time + PATIENCE
+        while self.flight.time < until and not self._stands():
+            self._fly(self._under_way() + CHECK if self._assign() else CHECK)
+        far = self._distances()
+        self.formed.append(
+            Formed(self.placed, float(far.mean()), float(far.max()), len(far), 0, self.struck, 0, self.reassigned)
+        )
 
-    def _assign(self) -> bool:
-        """Give points anew where that saves way; whether it did."""
-        flock, first = self.flock, self.now == 0.0
-        blocked = np.zeros(len(self.points), bool)
-        for hull in flock.hulls:
+    def closed(self) -> list[Formed]:
+        """End the flight with its last sample; the figures of all shapes, with the collisions of their windows."""
+        self.flight.change({"duration": self.flight.time})
+        scores = [window.scores for window in self.flight.windows] + [self.flight.finish()]
+        for formed, first, last in zip(self.formed, self.marks, [*self.marks[1:], len(scores)], strict=True):
+            formed.collisions = int(sum(found["n_coll"] for found in scores[first:last]))
+            formed.hulls = int(sum(found["n_env_coll"] for found in scores[first:last]))
+        return self.formed
+
+    def _assign(self, *, first: bool = False, failed: bool = False) -> bool:
+        """Give points anew where that saves way; whether it did. What stands in the way is told in any case."""
+        there, blocked = self.flight.present, np.zeros(len(self.points), bool)
+        for hull in self.hulls:
             blocked |= np.linalg.norm(self.points - hull, axis=1) < CLEAR
-        found = assign(flock.state[:3].T, self.points, blocked)
-        taken = not first and bool(blocked[flock.target].any())
-        if not (first or taken or better(flock.state[:3].T, self.points, flock.target, found)):
-            return False
-        self.reassigned += 0 if first else 1
-        flock.target = found
-        return True
+        places = self.flight.state[:3, there].T
+        found = assign(places, self.points, blocked)
+        anew = first or bool(blocked[self.target[there]].any())
+        anew = anew or better(places, self.points, self.target[there], found)
+        if anew:
+            self.reassigned += 0 if first else 1
+            self.target[there] = found
+        self.target[~there] = self.target[there][0]  # who has failed goes nowhere: any point that is free will do
+        if anew or failed:
+            boxes = [[*(hull - HALF), *(hull + HALF), 0.0] for hull in self.hulls]
+            self.flight.change({"goals.points": self._aims(), "scene.boxes": boxes})
+        return anew
+
+    def _aims(self) -> list[list[float]]:
+        """The point of each drone."""
+        return [list(map(float, self.points[k])) for k in self.target]
 
     def _under_way(self) -> float:
         """How long all are under way to their points, s."""
-        far = float(self._distances(self.flock.state).max())
-        return 1.5 * far / self.scenario.goals.speed + 4.0
+        return 1.5 * float(self._distances().max()) / self.scenario.goals.speed + 4.0
 
-    def _distances(self, state: Frames) -> Frames:
-        return np.asarray(np.linalg.norm(state[:3].T - self.points[self.flock.target], axis=1))
+    def _distances(self) -> Frames:
+        there = self.flight.present
+        away = self.flight.state[:3, there].T - self.points[self.target[there]]
+        return np.asarray(np.linalg.norm(away, axis=1))
 
     def _stands(self) -> bool:
-        return bool(self._distances(self.flock.state).max() <= NEAR)
+        return bool(self._distances().max() <= NEAR)
 
     def _fail(self, who: int, how: str) -> None:
         """Take one drone out of the flock: it falls, or stands in the way; the others get points anew."""
-        flock = self.flock
-        (place,) = np.flatnonzero(flock.who == who)
-        state = flock.state[:, place].copy()
+        state = self.flight.state[:, who].copy()
+        self.flight.remove(who, f"fails: {how}")
         if how == "hover":
-            flock.hulls.append(state[:3])
+            self.hulls.append(state[:3])
         else:
-            flock.falling.append(state)
-        keep = flock.who != who
-        flock.who, flock.state, flock.target = flock.who[keep], flock.state[:, keep], flock.target[keep]
-        self._assign()
+            self.falling.append(state)
+        self._assign(failed=how == "hover")
 
-    def _segment(self, seconds: float) -> None:
-        """Fly for a while with what is in the air as it is."""
-        period = self.scenario.metrics.period
-        steps = round(seconds / period)
-        if steps < 1:
-            return
-        flock, seed = self.flock, segment_seed(*self.leg, self.segments)
-        self.segments += 1
-        boxes = tuple((*(hull - HALF), *(hull + HALF), 0.0) for hull in flock.hulls)
-        aims = tuple(tuple(map(float, self.points[k])) for k in flock.target)
-        part = replace(
-            self.scenario,
-            flight=replace(self.scenario.flight, agents=float(len(flock.who)), duration=steps * period),
-            goals=replace(self.scenario.goals, points=aims),
-            scene=replace(self.scenario.scene, boxes=boxes),
-        )
-        flown = fly(part, seed, precision=64, record=True, start=flock.state, device="cpu")
-        assert flown.frames is not None
-        self.collisions += int(flown.values["n_coll"])
-        self.hulls += int(flown.values["n_env_coll"])
-        seen = flown.frames[1:, :6]
-        self._drop(seen, period)
-        whole = np.full((len(seen), 6, self.total), np.nan)
-        whole[:, :, flock.who] = seen
-        self.frames.append(whole)
-        for k, state in enumerate(seen):
-            inside = self._distances(state).max() <= NEAR
-            self.placed = (self.placed if self.placed is not None else self.now + (k + 1) * period) if inside else None
-        self.now += steps * period
-        flock.state = seen[-1].copy()
+    def _fly(self, seconds: float) -> None:
+        """Fly for a while, and look at each sample."""
+        flight = self.flight
+        samples = round(seconds / self.period)
+        if flight.time + samples * self.period > flight.scenario.flight.duration:
+            flight.change({"duration": flight.time + samples * self.period + PATIENCE})
+        for _ in range(samples):
+            flight.advance(self.period)
+            self._drop(flight.state[:3, flight.present])
+            if not self._stands():
+                self.placed = float("nan")
+            elif np.isnan(self.placed):
+                self.placed = flight.time - self.begun
 
-    def _drop(self, seen: Frames, period: float) -> None:
-        """Let fall who falls, and count whom it strikes."""
+    def _drop(self, places: Frames) -> None:
+        """Let fall who falls, and count whom it strikes; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
-        for body in self.flock.falling:
-            touching = np.zeros(seen.shape[2], bool)
-            for state in seen:
-                for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame
-                    body[5] -= GRAVITY * 0.1 * period
-                    body[:3] += 0.1 * period * body[3:]
-                    near = np.linalg.norm(state[:3].T - body[:3], axis=1) < reach
-                    self.struck += int((near & ~touching).sum())
-                    touching = near
+        for body in self.falling:
+            touching = np.zeros(places.shape[1], bool)
+            for _ in range(10):  # a fall of 10 m/s takes 10 cm in a tenth of a frame
+                body[5] -= GRAVITY * 0.1 * self.period
+                body[:3] += 0.1 * self.period * body[3:]
+                near = np.linalg.norm(places.T - body[:3], axis=1) < reach
+                self.struck += int((near & ~touching).sum())
+                touching = near
             if body[2] > 0.0:
                 left.append(body)
-        self.flock.falling = left
+        self.falling = left

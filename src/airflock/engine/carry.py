@@ -9,7 +9,8 @@ from airflock.engine.beginnings import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
-from airflock.engine.state import BEGUN, State
+from airflock.engine.stages.flight import BEGUN
+from airflock.engine.state import State
 
 
 def carry(old: State, new: State, step: int) -> None:
@@ -34,6 +35,10 @@ def carry(old: State, new: State, step: int) -> None:
     if old.plan.goals and new.plan.goals and old.arrays["reached"].shape == new.arrays["reached"].shape:
         for name in ("aim", "reached"):
             new.arrays[name][...] = old.arrays[name]
+    if new.plan.own:  # to new points all set out anew
+        new.arrays["aim"][3] = -1.0
+        if old.plan.own and np.array_equal(old.tables.goals, new.tables.goals):
+            new.arrays["aim"][:] = old.arrays["aim"]
     for name in _solved(old, new):
         new.arrays[name][...] = old.arrays[name]
     new.arrays["held"][BEGUN] = old.arrays["held"][BEGUN]

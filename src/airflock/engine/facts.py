@@ -36,6 +36,7 @@ class Build:
     record      : keep every sample (position, velocity, command) besides the running sums
     given_start : the flight starts from positions and velocities that are handed over
     grid        : neighbours by cells, all cores for one flock; else all pairs, one core
+    near        : order parameters look at pairs and links by cells, too, where their rules allow it; needs `grid`
     absence     : agents may be absent: they lie behind those who are there (`engine.presence`)
     """
 
@@ -43,6 +44,7 @@ class Build:
     record: bool = False
     given_start: bool = False
     grid: bool = False
+    near: bool = False
     absence: bool = False
 
 

@@ -72,9 +72,12 @@ class Flight(Acting):
         """Whether it flies at once; otherwise its driver is compiled first."""
         return self._course.ready
 
-    def compile(self) -> "Flight":
-        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it."""
-        self._course.compile()
+    def compile(self, *, aside: bool = False) -> "Flight":
+        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it.
+
+        aside : by another process, so that no other thread of this one is held up meanwhile
+        """
+        self._course.compile(aside)
         return self
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":
@@ -109,7 +112,7 @@ class Flight(Acting):
             event = self._planned.pop(0)
             self._advance(event.step)
             self.event(event.kind, **event.data)
-        self._advance(last)
+        self._advance(min(last, self._course.steps))  # a change on the way may have made the flight shorter
 
     def _advance(self, last: int) -> None:
         first = self.step
@@ -133,7 +136,7 @@ class Flight(Acting):
 
         Of a flight that was never changed these are the scores of the closed flight.
         """
-        if not self.over:
+        while not self.over:  # a change on the way may make it longer
             self._fly_to(self._course.steps)
         if self.step == self._course.steps and not self._state.ended:
             self._advance(self._course.steps + 1)

@@ -52,6 +52,7 @@ def view(scenario: Scenario, state: State, agent: int, step: int, seed: int, wor
     return View(
         agent, number * every * scenario.flight.dt, truth[agent], own, heard, met, tuple(terms), tuple(alike),
         _record(state, model.Sums, "sum", agent), _record(state, model.Walls, "wall", agent), memory, command,
+        _record(state, plan.body.Memory, "body", agent),
     )  # fmt: skip
 
 

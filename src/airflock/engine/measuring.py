@@ -74,13 +74,19 @@ def measured(
         measure(0, frames)
         return state.values(), series
     remembered = own["memory"][:, : frames.shape[2]].copy()
+    looked = [driver.ROWS[name] for name in (f"before_{axis}" for axis in plan.axes) if name in driver.ROWS]
+    before, known = np.zeros((len(looked), frames.shape[2]), real), np.zeros(frames.shape[2], bool)
     for first, last in _runs(present):
         there = np.flatnonzero(present[first])
         if len(there) >= min(2, frames.shape[2]):
+            lanes = slice(0, len(there))
             state.set_whole("agents", len(there))
-            own["memory"][:, : len(there)] = remembered[:, there]
+            own["memory"][:, lanes] = remembered[:, there]
+            # who was away has come no way that anybody saw
+            own["work"][looked, lanes] = np.where(known, before, frames[first, : len(looked)])[:, there]
             measure(first, frames[first:last][:, :, there])
-            remembered[:, there] = own["memory"][:, : len(there)]
+            remembered[:, there], before[:, there] = own["memory"][:, lanes], own["work"][looked, lanes]
+        known = present[first] if len(there) >= min(2, frames.shape[2]) else np.zeros_like(known)
     return state.values(), series
 
 

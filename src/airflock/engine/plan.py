@@ -60,6 +60,11 @@ class Plan(Facts):
         return self.build.grid
 
     @property
+    def near(self) -> bool:
+        """Whether order parameters look at pairs and links by cells."""
+        return self.build.grid and self.build.near
+
+    @property
     def absence(self) -> bool:
         """Whether agents may be absent."""
         return self.build.absence

@@ -12,7 +12,7 @@ from airflock.engine.facts import Build, OwnLaw
 from airflock.engine.plan import Plan
 from airflock.errors import ScenarioError
 from airflock.rules.probe import probe, probe_fault, probe_radio, probe_sensor, probe_topology
-from airflock.scenarios.cells import by_cells, has_room, takes_all_cores
+from airflock.scenarios.cells import by_cells, has_room, measured_by_cells, takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.world import arena
@@ -27,34 +27,44 @@ def plan_of(
     record: bool = False,
     metrics: tuple[Metric, ...] | None = None,
     grid: bool | None = None,
+    near: bool | None = None,
     given_start: bool = False,
     absence: bool = False,
 ) -> Plan:
     """Plan of a scenario's flight; its metrics are those that metrics.kind names, unless given.
 
     grid        : neighbours by cells or all pairs; by default what is faster, all pairs in a box too small for cells
+    near        : where neighbours are found by cells, order parameters go by cells, too; by default in large flocks
     given_start : the start is handed over with each flight
     absence     : agents may be absent; where a fault takes agents out they may in any case
     """
     if precision not in (32, 64):
         raise ScenarioError([f"precision = {precision} is neither 32 nor 64"])
-    key = "plan", precision, record, metrics, grid, given_start, absence
+    key = "plan", precision, record, metrics, grid, near, given_start, absence
     if key not in scenario.prepared:
-        build = _build(scenario, precision, record, grid, given_start, absence)
+        build = _build(scenario, precision, record, grid, near, given_start, absence)
         scenario.prepared[key] = _planned(scenario, metrics, build)
     found: Plan = scenario.prepared[key]
     return found
 
 
 def _build(
-    scenario: Scenario, precision: int, record: bool, grid: bool | None, given_start: bool, absence: bool
+    scenario: Scenario,
+    precision: int,
+    record: bool,
+    grid: bool | None,
+    near: bool | None,
+    given_start: bool,
+    absence: bool,
 ) -> Build:
     """How the driver of a scenario is built."""
+    cells = (takes_all_cores(scenario) if grid is None else grid) and has_room(scenario) and by_cells(scenario)
     return Build(
         bits=precision,
         record=record,
         given_start=given_start,
-        grid=(takes_all_cores(scenario) if grid is None else grid) and has_room(scenario) and by_cells(scenario),
+        grid=cells,
+        near=cells and (measured_by_cells(scenario) if near is None else near),
         absence=absence or any(kind.leaves is not None for kind in scenario.fault_kinds),
     )
 

@@ -16,6 +16,8 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
+from airflock.engine.locked import one_at_a_time
+
 ENDING = ".seal"
 
 
@@ -76,13 +78,14 @@ class SealedFiles(IndexDataCacheFile):  # type: ignore[misc]
 
 
 def seal(module: ModuleType, digest: str) -> None:
-    """Put the compiled functions of a driver under seals."""
+    """Put the compiled functions of a driver under seals, and have one process at a time compile them."""
     for found in vars(module).values():
         cache: Any = getattr(found, "_cache", None)
         files = getattr(cache, "_cache_file", None)
         if isinstance(files, IndexDataCacheFile):
             cache._cache_file = SealedFiles(files, digest)
             cache._impl.rebuild = _or_nothing(cache._impl.rebuild)
+            found.compile = one_at_a_time(found.compile, Path(cache.cache_path))
 
 
 def _or_nothing(rebuild: Callable[..., Any]) -> Callable[..., Any]:

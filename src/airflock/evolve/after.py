@@ -33,7 +33,7 @@ from airflock.executors import Executor
 from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 
-FINAL, SCORE = Batch("final", 0, 0), Batch("score", 0, 0)
+FINAL, AGAIN, SCORE = Batch("final", 0, 0), Batch("again", 0, 0), Batch("score", 0, 0)
 EXCESS = "excess"  # column: how far a candidate is from keeping all limits
 RESULT, BEST = "result.toml", "best.toml"
 
@@ -122,7 +122,10 @@ def conclude(
     n = study.whole("final_seeds")
     fresh = [study.seed(1, j) for j in range(n)]
     rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
-    i = _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
+    if study.whole("again"):
+        rows, i = flown_again(study, store, executor, points, rows, note)
+    else:
+        i = _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
     winner = study.space.parameters(points[i])
     others = [[study.seed(2, j) for j in range(n)]]
     evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
@@ -152,6 +155,29 @@ def conclude(
             write(folder / name, document, "The winner of a study, ready to fly.")
     tables.export(store, folder, study.labels)
     return result
+
+
+def flown_again(
+    study: Study,
+    store: Store,
+    executor: Executor,
+    points: NDArray[np.float64],
+    rows: Sequence[Sequence[float | None]],
+    note: Callable[[bool], None] | None = None,
+) -> tuple[list[list[float | None]], int]:
+    """Let the best finalists fly twice as many further seeds.
+
+    Returns the fitness of all finalists, of these over all their flights, and the index of the best of these.
+    """
+    sign, n = (1.0 if study.objectives[0].maximise else -1.0), study.whole("final_seeds")
+    sound = [k for k, row in enumerate(rows) if row[0] is not None]
+    best = sorted(sound, key=lambda k: -sign * float(rows[k][0] or 0.0))[: study.whole("again")]
+    further = [study.seed(1, n + j) for j in range(2 * n)]
+    found = evaluate(study, store, executor, AGAIN, points[best], note, seeds=[further] * len(best))
+    both = [list(row) for row in rows]
+    for k, (value,) in zip(best, found, strict=True):
+        both[k] = [None if value is None else (float(rows[k][0] or 0.0) + 2.0 * value) / 3.0]
+    return both, best[_winner(study, [both[k] for k in best])] if best else _winner(study, rows)
 
 
 def best_files(study: Study) -> list[str]:

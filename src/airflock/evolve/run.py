@@ -14,6 +14,7 @@ from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
 from airflock.evolve.search import Watch, search
+from airflock.evolve.search_table import fast as fast_keys
 from airflock.evolve.sensitivity import METHODS
 from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
@@ -48,6 +49,7 @@ def evolve(
     sensitivity: str = "",
     watch: Watch | None = None,
     trust: bool = False,
+    fast: bool = False,
     **search_keys: Any,
 ) -> Result:
     """Evolve the parameters of a flock, in a folder that survives whatever ends the process.
@@ -89,6 +91,8 @@ def evolve(
         Called with a Progress after each flight.
     trust : bool
         Whether code that files name may run: a law, fitness functions.
+    fast : bool
+        A third of the flights: a small population, with ever more flights of each candidate (docs/evolve.md).
     **search_keys
         Keys of the table [search]: algorithm, population, generations, seeds, seed, restarts, ...
 
@@ -117,7 +121,9 @@ def evolve(
     >>> 0.0 <= result.parameters["model.p_rep"] <= 1.0
     True
     """
-    study = study_of(what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust)
+    study = study_of(
+        what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast
+    )
     folder = Path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
@@ -139,10 +145,12 @@ def study_of(
     limit: str | Sequence[str] = (),
     *,
     trust: bool = False,
+    fast: bool = False,
 ) -> Study:
     """The study that `evolve` is asked for."""
     if isinstance(what, Study):
         return what
+    by_hand, search_keys = search_keys or {}, fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
     given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}
     tables = {key: value for key, value in given.items() if value is not None}
     if isinstance(what, Scenario) or (isinstance(what, Sequence) and not isinstance(what, str)):
@@ -160,7 +168,7 @@ def study_of(
         name = getattr(fitness, "__name__", "fitness")
         study = replace(study, objectives=(Objective(name, own=fitness, text=text),))
     limits = [limit] if isinstance(limit, str) else list(limit)
-    return with_limits(study, limits, seeds="seeds" in (search_keys or {})) if limits else study
+    return with_limits(study, limits, seeds="seeds" in by_hand) if limits else study
 
 
 def _text_of(code: Any) -> str:

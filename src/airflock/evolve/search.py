@@ -83,20 +83,22 @@ class Tally:
 def total_flights(study: Study) -> int:
     """Flights of the whole search."""
     runs = range(study.whole("restarts") + 1)
-    flights = sum(study.population(run) for run in runs) * study.whole("generations") * study.whole("seeds")
-    return flights * len(study.scenarios)
+    each = sum(study.seeds(generation) for generation in range(study.whole("generations")))
+    return sum(study.population(run) for run in runs) * each * len(study.scenarios)
 
 
 def search(study: Study, store: Store, executor: Executor, watch: Watch | None = None) -> list[NDArray[np.float64]]:
     """Run a study to its end, or to Ctrl-C.
 
-    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its last means if asked for.
+    Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
     """
     tally = Tally(total_flights(study), watch)
     centres: list[NDArray[np.float64]] = []
     for run in range(study.whole("restarts") + 1):
         means = _run(study, store, executor, run, tally)
-        centres += [means[-1], *averaged(means, study.whole("averages"))] if means else []
+        if means:
+            found = averaged(means, study.whole("averages")) + windowed(means, study.whole("windows"))
+            centres += [means[-1], *found]
     return centres
 
 
@@ -118,7 +120,7 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
         begun = tally.done
         racing = study.search.racing == "optimistic"
         rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share, racing=racing)
-        tally.total -= len(points) * study.whole("seeds") * len(study.scenarios) - (tally.done - begun)
+        tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
         values, told = [row[0] for row in rows], losses(rows, study.objectives)
         sound = values
         if study.limits:
@@ -144,6 +146,16 @@ def averaged(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray
     """
     spans = (max(1, len(means) >> (k + 1)) for k in range(windows))
     return [np.mean(means[-span:], axis=0) for span in spans]
+
+
+def windowed(means: Sequence[NDArray[np.float64]], windows: int) -> list[NDArray[np.float64]]:
+    """Average (axis,) of the means in each of so many equal parts of the last half.
+
+    CMA-ES ranks single flights and so ends where most flights are good, which is not where their mean is best if a few
+    are bad: on its way it may pass a better place.
+    """
+    late = np.array(means[len(means) // 2 :])
+    return [part.mean(axis=0) for part in np.array_split(late, min(windows, len(late)))] if windows else []
 
 
 def _start(study: Study) -> NDArray[np.float64] | None:
@@ -267,11 +279,11 @@ def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
 
 def _seeds(study: Study, batch: Batch, candidates: int) -> list[list[int]]:
     """Seeds (candidate, repeat) of a generation of the search."""
-    k = study.whole("seeds")
+    k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
     before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
     first = before + batch.generation * study.population(batch.run)
     how = study.search.random_numbers
     return [
-        [study.seed(0, k * {"fresh": first + i, "generation": first, "study": 0}[how] + j) for j in range(k)]
+        [study.seed(0, most * {"fresh": first + i, "generation": first, "study": 0}[how] + j) for j in range(k)]
         for i in range(candidates)
     ]

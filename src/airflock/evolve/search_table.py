@@ -1,7 +1,8 @@
 """The table [search] of a study file: which algorithm, how many flights, how long, from where; and what cannot be."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from airflock.core.parameters import Parameters as Record
 from airflock.core.parameters import choice, quantity
@@ -11,7 +12,20 @@ from airflock.evolve.space import Space
 
 S6 = "Vásárhelyi et al. 2018, Table S6"
 SEED_BITS = 40  # numbers of flights within one study; seeds 0, 1, 2, ... that people give by hand lie below all studies
+ALONE = 0.3  # share of generations after which flights of a candidate begin to grow from `seeds` to `late_seeds`
 FEWEST = 8  # generations of a search with growing flights: one at least of each length but the last
+
+
+# a third of the published study's flights; what it is worth stands in benchmarks/RESULTS-searches.md
+FAST: Mapping[str, Any] = {
+    "population": 24, "generations": 72, "late_seeds": 9, "averages": 2, "windows": 4, "pool": 20, "top": 4,
+    "final_seeds": 60, "again": 3,
+}  # fmt: skip
+
+
+def fast(given: Mapping[str, Any], *, limits: bool) -> dict[str, Any]:
+    """Keys of the fast search, and those that are given; with limits nobody flies again, as nothing compares them."""
+    return {key: value for key, value in FAST.items() if key != "again" or not limits} | dict(given)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +42,14 @@ class Search(Record):
     generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations of a run")
     seeds: float = quantity(
         1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights of a candidate"
+    )
+    late_seeds: float = quantity(
+        0,
+        "1",
+        low=0,
+        high=1e5,
+        source="our choice; docs/decisions/0121",
+        meaning="flights of a candidate in the last generation; they grow from seeds on, after three tenths of all",
     )
     random_numbers: str = choice(
         "fresh",
@@ -80,6 +102,14 @@ class Search(Record):
         source="our choice; docs/decisions/0072",
         meaning="further finalists: means of CMA-ES averaged over its last half, quarter, eighth, ... of generations",
     )
+    windows: float = quantity(
+        0,
+        "1",
+        low=0,
+        high=100,
+        source="our choice; docs/decisions/0121",
+        meaning="further finalists: means of CMA-ES averaged over each of so many equal parts of its last half",
+    )
     reserve: float = quantity(
         10.0,
         "1",
@@ -97,6 +127,14 @@ class Search(Record):
     final_seeds: float = quantity(
         100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"
     )
+    again: float = quantity(
+        0,
+        "1",
+        low=0,
+        high=1e4,
+        source="our choice; docs/decisions/0121",
+        meaning="best finalists that fly twice as many further fresh seeds before the winner is chosen; 0: none",
+    )
 
 
 def search_faults(
@@ -105,7 +143,19 @@ def search_faults(
     """What of a search cannot be, one line each; `space` as far as it could be read; limits: whether it has some."""
     faults = [
         f"search.{name} = {value:g} is not a whole number"
-        for name in ("population", "generations", "seeds", "restarts", "seed", "top", "pool", "final_seeds", "averages")
+        for name in (
+            "population",
+            "generations",
+            "seeds",
+            "restarts",
+            "seed",
+            "top",
+            "pool",
+            "final_seeds",
+            "averages",
+            "windows",
+            "again",
+        )
         if (value := getattr(search, name)) != int(value)
     ]
     if search.algorithm in SEVERAL and len(objectives) < 2:
@@ -121,6 +171,8 @@ def search_faults(
     faults += _only_cmaes(search) + _racing_faults(search, objectives, over_scenarios)
     if limits and search.racing != "none":
         faults.append("search.racing compares fitness and knows no limits; leave out objective.limits or search.racing")
+    if search.again and (limits or len(objectives) > 1):
+        faults.append("search.again compares one fitness; leave it at 0 with limits or several objectives")
     if search.flights == "growing":
         if search.generations < FEWEST:
             faults.append(
@@ -135,8 +187,9 @@ def search_faults(
         grown = "" if odd[0] == populations[0] else " after restarts that enlarge it"
         faults.append(f"search.population = {odd[0]}{grown} is odd: in algorithm ga two parents have two children")
     flights = search.population * search.growth**search.restarts * search.generations * (search.restarts + 1.0)
-    if flights * search.seeds >= 2 ** (SEED_BITS - 4):
-        faults.append(f"search: {flights * search.seeds:g} flights are more than a study can number")
+    flights *= max(search.seeds, search.late_seeds)
+    if flights >= 2 ** (SEED_BITS - 4):
+        faults.append(f"search: {flights:g} flights are more than a study can number")
     return faults
 
 
@@ -145,7 +198,7 @@ def _only_cmaes(search: Search) -> list[str]:
     if search.algorithm == "cmaes":
         return []
     usual, found = Search(), []
-    for name in ("flights", "racing", "start", "spread", "averages"):
+    for name in ("flights", "racing", "start", "spread", "averages", "windows"):
         value = getattr(search, name)
         if value != getattr(usual, name):
             shown = repr(value) if isinstance(value, str) else f"{value:g}"

@@ -14,7 +14,7 @@ from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_limits, read_objectives
-from airflock.evolve.search_table import SEED_BITS, Search, search_faults
+from airflock.evolve.search_table import ALONE, SEED_BITS, Search, search_faults
 from airflock.evolve.several import common_space, distinct, faults_together, read_scenarios
 from airflock.evolve.space import Space
 from airflock.evolve.space_table import read_space
@@ -60,6 +60,13 @@ class Study:
     def population(self, run: int) -> int:
         """Candidates of a generation in a run: restarts may enlarge it."""
         return round(self.search.population * self.search.growth**run)
+
+    def seeds(self, generation: int) -> int:
+        """Flights of a candidate in a generation of the search: from `seeds` up to `late_seeds` in equal ratios."""
+        first, last = self.search.seeds, self.search.late_seeds
+        begin, end = ALONE * self.search.generations, max(1.0, self.search.generations - 1.0)
+        grown = min(max(0.0, (generation - begin) / max(end - begin, 1.0)), 1.0)
+        return round(float(first * (max(first, last) / first) ** grown))
 
     def seed(self, part: int, number: int) -> int:
         """Seed of a flight: `part` 0 searches, others are further parts; unlike any seed 0, 1, 2, ... given by hand."""

@@ -29,6 +29,11 @@ def linked(r2, q):
     return r2 < q.r_cluster * q.r_cluster
 
 
+def linked_within(q):
+    """Distance beyond which no two agents are linked, m."""
+    return q.r_cluster
+
+
 def cluster(n, hx, hy, hz, hh):
     """Sum over i of 1/(n-1) sum over j != i of the cosine between their velocities (Eq. 13)."""
     return Cluster((hx * hx + hy * hy + hz * hz - hh) / max(n - 1.0, 1.0), n)

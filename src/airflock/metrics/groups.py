@@ -96,6 +96,11 @@ def linked(r2, q):
     return r2 < q.r_cluster * q.r_cluster
 
 
+def linked_within(q):
+    """Distance beyond which no two agents are linked, m."""
+    return q.r_cluster
+
+
 def member(x, y, z, hx, hy, hz, pair, mean, q):
     """One agent in its group, whose mean is `mean`."""
     offset = offset_from(x, y, z, mean)

@@ -27,6 +27,11 @@ def linked(r2, q):
     return r2 < q.r_cluster * q.r_cluster
 
 
+def linked_within(q):
+    """Distance beyond which no two agents are linked, m."""
+    return q.r_cluster
+
+
 def cluster(n):
     """A swarm or a straggler."""
     alone = 1.0 if n < 1.5 else 0.0

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scipy.stats import beta
-
 CONFIDENCE = 0.95
 
 
@@ -13,9 +11,9 @@ def upper_bound(events: int, flights: int, confidence: float = CONFIDENCE) -> fl
 
     events : flights in which it happened, out of `flights`. Returns 0 to 1; for no event 1 - (1 - confidence)^(1/n).
     """
-    if events >= flights:
-        return 1.0
-    return float(beta.ppf(confidence, events + 1, flights - events))
+    from scipy.special import betaincinv  # not on top, nor scipy.stats: the first table of a flight waits for imports
+
+    return 1.0 if events >= flights else float(betaincinv(events + 1, flights - events, confidence))
 
 
 def remarks(rows: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str]:

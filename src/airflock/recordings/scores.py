@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from airflock.aero import descent
 from airflock.body.registry import BODIES
@@ -171,7 +170,6 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.measured_by()
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
-    _refuse_gaps(scenario.alike(), present)
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
@@ -179,17 +177,6 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     return scores | ({} if present.all() else {"present": float(present.mean())}), course
-
-
-def _refuse_gaps(scenario: Scenario, present: NDArray[np.bool_]) -> None:
-    """Contacts with the scene are found on the way from frame to frame, which a gap cuts."""
-    metrics = scenario.order_parameters
-    sweeps = any(metric.agent is not None and "touches" in asks(metric.agent, "agent") for metric in metrics)
-    if scenario.scenic and sweeps and not present.all():
-        raise RecordingError(
-            f"recording: {1.0 - present.mean():.1%} of the positions are missing, and contacts with the scene are found"
-            " on the way from frame to frame; score it with --set metrics.kind=vasarhelyi, or fill the gaps"
-        )
 
 
 class _Nothing(Parameters):

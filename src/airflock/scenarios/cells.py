@@ -1,10 +1,19 @@
-"""Cells: whether neighbours are found by cells, as wide as the law's reach, instead of among all pairs."""
+"""Cells: whether neighbours are found by cells, as wide as the law's reach, instead of among all pairs.
+
+And whether order parameters look at pairs by cells.
+"""
+
+from dataclasses import replace
 
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.world.place import half_sizes
 
 GRID_FROM = 1000  # agents; below, all pairs on one core are as fast, and flights side by side use the cores
+
+# Agents from which order parameters look at pairs by cells: below, all pairs in vectors are as fast. A pair costs four
+# times as much where its offset goes to the nearest image (benchmarks/RESULTS-boids.md).
+NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 
 
 def takes_all_cores(scenario: Scenario) -> bool:
@@ -28,6 +37,19 @@ def takes_all_cores(scenario: Scenario) -> bool:
     )
 
 
+def group_notes(scenario: Scenario) -> list[str]:
+    """A note where only the groups keep a large flock from being flown by cells."""
+    if not scenario.groups or scenario.agents < GRID_FROM or takes_all_cores(scenario):
+        return []
+    if not takes_all_cores(replace(scenario, groups=())):
+        return []
+    what = "laws" if len(scenario.laws) > 1 else "numbers of the law"
+    return [
+        f"groups: where {what} differ, each of {scenario.agents} agents looks at all others, on one core, and not at "
+        "those in the cells around it, on all cores"
+    ]
+
+
 def by_cells(scenario: Scenario) -> bool:
     """Whether cells as wide as the law's reach hold all who decide whom an agent meets."""
     if len(scenario.laws) > 1 or (scenario.groups and scenario.laws[0].asks_for_groups):
@@ -43,3 +65,9 @@ def has_room(scenario: Scenario) -> bool:
         return True
     halves = half_sizes(scenario.world)[: scenario.dimensions]
     return min(halves) >= float(scenario.model.reach(scenario.parameters))
+
+
+def measured_by_cells(scenario: Scenario) -> bool:
+    """Whether order parameters look at pairs by cells, too, where neighbours are found so."""
+    periodic = scenario.world.edges == "periodic"
+    return bool(scenario.agents >= (NEAR_FROM_IN_A_BOX if periodic else NEAR_FROM))

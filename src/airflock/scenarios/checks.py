@@ -7,7 +7,7 @@ from airflock.core.contract import Body, Metric, MetricSet, Model
 from airflock.core.radio import Radio
 from airflock.core.sensor import Sensor
 from airflock.core.topology import Topology
-from airflock.core.vocabulary import asks
+from airflock.core.vocabulary import CLOCKS, asks
 from airflock.scenarios.geometry import largest_extension
 
 
@@ -95,10 +95,17 @@ MANY = 5000  # agents; below, a look at all pairs costs less than 10 ms
 def pair_notes(flight: Any, q: Any, metrics: tuple[Metric, ...], cells: bool) -> list[str]:
     """What order parameters over all pairs cost in a large flock.
 
-    cells : neighbours are found by cells, and so are pairs of order parameters that say when they are `settled`
+    cells : order parameters look at pairs by cells if all of a clock say when they are `settled`, at links if they say
+            how far they reach
     """
-    near = cells and all(item.settled for item in metrics if item.pair)
-    paired = [item.name for item in metrics if (item.pair and not near) or item.cluster or item.survey]
+    near = {
+        clock: cells and all(item.settled for item in metrics if item.pair and item.clock == clock) for clock in CLOCKS
+    }
+    paired = [
+        item.name
+        for item in metrics
+        if (item.pair and not near[item.clock]) or (item.cluster and not (cells and item.linked_within)) or item.survey
+    ]
     if flight.agents < MANY or not paired:
         return []
     seconds = 0.4e-9 * flight.agents**2  # one core, measured in benchmarks/RESULTS-boids.md

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from airflock.errors import FlightError
+from airflock.scenarios.cells import takes_all_cores
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 
@@ -43,7 +44,7 @@ def seconds_of(scenario: Scenario) -> float:
     """Seconds of one core that a flight takes, about, without its compilation; at all cores, cells take a share."""
     times, n, model = clock(scenario), float(scenario.agents), scenario.model
     decisions = times["steps"] / times["decide_every"]
-    pairs = min(n, 60.0) if n >= 1000 and model.reach is not None else n
+    pairs = min(n, 60.0) if takes_all_cores(scenario) else n
     seconds = (decisions + times["steps"] / times["sample_every"]) * n * pairs * PAIR + times["steps"] * n * STEP
     seconds += decisions * n * SIGHT if model.sight is not None else 0.0
     return seconds + (decisions * n * n * WING if model.flock is not None else 0.0)

@@ -123,11 +123,13 @@ def load(
         of_groups = {own.name: own for own in map(given_law, _several(laws))}
         given = replace(given, law=flown, kinds=_kinds(faults), laws=of_groups)
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told = with_ground(document, settings or {}, folder)
+        document, settings, told, wrong = with_ground(document, settings or {}, folder)
         if flown is not None:
             kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
             document = {**document, "model": {"kind": kind}, "published": {}}
-        return make(document, where, settings, folder=folder, given=given, notes=notes + told, trust=trust)
+        return make(
+            document, where, settings, folder=folder, given=given, notes=notes + told, known_faults=wrong, trust=trust
+        )
 
 
 def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:

@@ -13,36 +13,41 @@ from airflock.scenes.outlines import ground_of
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well
+INSTEAD = {"arena": "square", "side": 1e6}  # of a file that cannot be read, so that all else is judged in wide room
 
 
 def with_ground(
     document: Mapping[str, Any], settings: Mapping[str, Any], folder: Path | None
-) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...]]:
-    """Document and settings in which a field's file has become its keys, and notes.
+) -> tuple[dict[str, Any], Mapping[str, Any], tuple[str, ...], tuple[str, ...]]:
+    """Document and settings in which a field's file has become its keys, notes, and what is wrong with it.
 
     folder : where the scenario file lies, in which its files are looked for
-
-    Raises ScenarioError with one line per fault.
     """
     table = document.get("world", {})
     if not isinstance(table, Mapping):
-        return dict(document), settings, ()
+        return dict(document), settings, (), ()
     world = {**table, **{key[6:]: value for key, value in settings.items() if key.startswith("world.")}}
     name = world.get("file", "")
     if not isinstance(name, str) or not name:
-        return dict(document), settings, ()
+        return dict(document), settings, (), ()
     faults = [f"world.{key}: is given, and world.file as well; take one of them out" for key in GIVEN if key in world]
     path = Path(name) if is_file(name) or folder is None else folder / name
     faults += [] if is_file(path) else [f"world.file = {name!r}: no such file"]
     simplify = world.get("simplify", 0.0)
     if isinstance(simplify, bool) or not isinstance(simplify, (int, float)) or not 0.0 <= simplify <= 1000.0:
         faults.append(f"world.simplify = {simplify!r} lies outside [0, 1000] m")
-    if faults:
-        raise ScenarioError(faults)
-    found = ground_of(path, simplify=float(simplify), space=str(world.get("dimensions", "2")) == "3")
     kept = {key: value for key, value in table.items() if key not in ("file", "simplify", "arena", "walls")}
     rest = {key: value for key, value in settings.items() if key not in FROM_FILE}
-    return {**document, "world": {**found.keys, **kept}}, rest, (found.note,)
+    if not faults:
+        try:
+            found = ground_of(path, simplify=float(simplify), space=str(world.get("dimensions", "2")) == "3")
+        except ScenarioError as fault:
+            faults += str(fault).splitlines()
+        else:
+            return {**document, "world": {**found.keys, **kept}}, rest, (found.note,), ()
+    kept = {key: value for key, value in kept.items() if key not in GIVEN} | INSTEAD
+    rest = {key: value for key, value in rest.items() if key.removeprefix("world.") not in (*GIVEN, *INSTEAD, "walls")}
+    return {**document, "world": kept}, rest, (), tuple(faults)
 
 
 def file_faults(world: Any) -> list[str]:

@@ -23,7 +23,7 @@ from airflock.scenarios import (
     wings,
 )
 from airflock.scenarios.advice import advice
-from airflock.scenarios.cells import takes_all_cores
+from airflock.scenarios.cells import group_notes, measured_by_cells, takes_all_cores
 from airflock.scenarios.document import TOP, components, merged, with_kinds
 from airflock.scenarios.families import FAMILIES, METRICS, NOTHING, TOPOLOGY, Given
 from airflock.scenarios.gathering import Gathered, gathered
@@ -40,11 +40,12 @@ def make(
     folder: Path | None = None,
     given: Given = NOTHING,
     notes: tuple[str, ...] = (),
+    known_faults: tuple[str, ...] = (),
     trust: bool = False,
 ) -> Scenario:
     """Scenario from a nested dict.
 
-    where : names it in faults; notes : what is known of it already
+    where : names it in faults; notes : what is known of it already; known_faults : what is wrong already
     given : rules that fly in place of those that the document names
     trust : whether code that the document names may run
     """
@@ -54,7 +55,7 @@ def make(
     document, left_out = with_kinds(document, settings)
     whole, unknown = merged(document, {key: value for key, value in settings.items() if key not in short})
     flown, whole, more = gathered(whole, given, folder, trust=trust)
-    faults = unknown + faults + more
+    faults = [*known_faults, *unknown, *faults, *more]
     records = ({"model": flown.law.Parameters} if flown.law else {}) | flown.records
     whole, told, more = _written_out(whole, settings, short, records)
     faults += more
@@ -197,8 +198,9 @@ def _published(table: Any) -> dict[str, tuple[float, float | None]]:
 
 def _notes(scenario: Scenario) -> list[str]:
     """What cannot be meant, for a person to read; nothing here stops a flight."""
-    notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, takes_all_cores(scenario))
-    notes += timing.notes(scenario) + wings.notes(scenario)
+    cells = takes_all_cores(scenario) and measured_by_cells(scenario)
+    notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
+    notes += timing.notes(scenario) + wings.notes(scenario) + group_notes(scenario)
     p = scenario.parameters
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
         notes.append(

@@ -1,4 +1,4 @@
-"""Panel: the controls beside the scene, in the words of the studio. With `view`, the only files that know viser."""
+"""Panel: the controls beside the scene, in the words of the studio. Viser is known here, in `view` and in `charts`."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -8,6 +8,7 @@ import viser
 from viser import uplot
 
 from airflock.stage import colours
+from airflock.studio.charts import Chart
 from airflock.studio.controls import Control
 
 TONES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
@@ -94,7 +95,7 @@ class Panel:
             given.label, given.low, given.high, given.step, given.value, lambda v: told(given.key, v), given.hint
         )
 
-    def chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Any:
+    def chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:
         """A chart: `.data` is (time or what is `across`, *values). With a band, the last two are its ends, shaded."""
         series: list[Any] = [uplot.Series(label=across)]
         for number, name in enumerate(names):
@@ -104,11 +105,11 @@ class Panel:
             series.append(uplot.Series(label=name, points=points, stroke=stroke, width=width))
         shade = (uplot.Band(series=(len(names) - 1, len(names)), fill="rgba(230,159,0,0.2)"),) if band else None
         zero = np.zeros(2)
-        return self.server.gui.add_uplot(
+        return Chart(self.server.gui.add_uplot(
             (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade,
-            scales={"x": uplot.Scale(time=False)}, legend=uplot.Legend(show=True),
+            scales={"x": uplot.Scale(time=False, range=(0.0, 1.0))}, legend=uplot.Legend(show=True),
             axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
-        )  # fmt: skip
+        ))  # fmt: skip
 
     def download(self, name: str, content: bytes) -> None:
         """Send a file to every open page."""

@@ -7,7 +7,7 @@ from airflock import __version__
 from airflock.errors import StudyError
 
 SEARCH, HARDEN, CERTIFY = 0.45, 0.15, 0.4  # shares of the budget
-TRIED = 15  # rounds of flights that hardening takes at most: whole and half steps, the optimum, fresh seeds
+TRIED = 15  # rounds of flights that hardening is planned with; all whole and half steps and fresh seeds would be 19
 POPULATION = 24  # reaches a good set in less time than 100 do: small flocks' flights are few
 LEAST = 6  # generations
 FLIGHTS = 2  # of a candidate: from two on, chance can be told from merit

@@ -1,5 +1,6 @@
 """Flights of five birds: many controllers and starts, side by side on all cores."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -9,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine import compile_for, fly
+from airflock.errors import FlightError
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.threads import in_threads
-from airflock_papers.dimock_2003.units import FOOT, Gains
+from airflock_papers.dimock_2003.units import FOOT, SPAN, Gains
 from airflock_papers.flights import Progress, with_changes
 
 V_SETTLE = 0.5  # m/s; a formation that moves less has settled, twice what the noise in flight makes of it
@@ -63,13 +65,22 @@ class Birds:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(
-        self, title: str, tasks: Sequence[Task], duration: float = 20.0, noise: float = 0.0, **readings: str | float
+        self,
+        title: str,
+        tasks: Sequence[Task],
+        duration: float = 20.0,
+        noise: float = 0.0,
+        *,
+        scatter: bool = False,
+        **readings: str | float,
     ) -> list[Flight]:
-        """Fly tasks in the paper's air; `readings` are keys of the model, for instance gradient="cells".
+        """Fly tasks in the paper's air; `readings` are keys of the scenario; those without a dot are the model's.
 
-        noise : diffusion constant of the birds' positions in flight, m²/s
+        noise   : diffusion constant of the birds' positions in flight, m²/s
+        scatter : birds that leave the finite numbers are a flight that is not finite, instead of an error
         """
-        chosen = tuple(sorted(({"gradient": "cells_frozen"} | readings).items()))
+        named = {key if "." in key else f"model.{key}": value for key, value in readings.items()}
+        chosen = tuple(sorted(({"model.gradient": "cells_frozen"} | named).items()))
         bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
         for base in bases.values():
             compile_for(with_changes(base, self.changes))  # once, before threads ask for it
@@ -82,7 +93,7 @@ class Birds:
                 self.progress(title, count, len(tasks))
 
         def job(task: Task) -> Callable[[], Flight]:
-            return lambda: _flown(bases[task.start.flat], task, self.changes)
+            return lambda: _flown(bases[task.start.flat], task, self.changes, scatter)
 
         return list(in_threads([job(task) for task in tasks], self.threads, done))
 
@@ -91,12 +102,11 @@ class Birds:
 def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, flat: bool) -> Scenario:
     jostled = {"body.kind": "jostled", "body.noise": noise} if noise > 0.0 else {}
     settled = {"metrics.t_settle": 0.5 * duration, "metrics.v_settle": V_SETTLE}
-    model = {f"model.{key}": value for key, value in readings}
     plane = {"world.dimensions": "2"} if flat else {}
-    return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **model})
+    return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **dict(readings)})
 
 
-def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
+def _flown(base: Scenario, task: Task, changes: Mapping[str, Any], scatter: bool) -> Flight:
     s = task.start
     box = s.kind == "box"
     begin = replace(
@@ -105,7 +115,12 @@ def _flown(base: Scenario, task: Task, changes: Mapping[str, Any]) -> Flight:
         separation=s.sy * FOOT if box else None,
     )  # fmt: skip
     scenario = replace(base, parameters=replace(base.parameters, **task.gains.si()), start=begin)
-    found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
+    try:
+        found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
+    except FlightError:
+        if not scatter:
+            raise
+        return Flight({"power": math.nan, "n_coll": 0.0}, np.full((1, 3, base.agents), math.nan))
     assert found.frames is not None
     return Flight(found.values, found.frames)
 
@@ -126,6 +141,12 @@ def holds_vee(flight: Flight) -> bool:
     gaps = np.diff(np.sort(y))
     behind = x[1:3].max() <= x[0] + 1.0 and x[3:5].max() <= x[1:3].min() + 1.0
     return bool(behind and gaps.min() > 2.5 and gaps.max() < 10.0)
+
+
+def in_row(flight: Flight) -> bool:
+    """Whether at the end the birds fly in a row: nobody more than a span aside of another, and longer than wide."""
+    x, y = flight.frames[-1, 0] / FOOT, flight.frames[-1, 1] / FOOT
+    return bool(np.ptp(y) <= SPAN and np.ptp(x) > np.ptp(y))
 
 
 def median(values: Iterable[float]) -> float:

@@ -2,28 +2,34 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.evolve.cmaes import CMAES
 from airflock.evolve.genetic import decode, genetic
-from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task
+from airflock_papers.dimock_2003.flights import Birds, Flight, Start, Task, in_row
 from airflock_papers.dimock_2003.units import Gains, gains
 
-LOST = 1e3  # W: loss of a controller that collides, or whose range of cohesion lies inside that of avoidance
+LOST = 1e3  # W: loss of a controller that collides, scatters without end, or coheres over less than it avoids
 POPULATION, GENERATIONS = 50, 150
 SEEDS = (1, 2, 3)
 EARLY, MIDWAY = 5, 13  # generations of Figs 6 and 7
+TIMID = 2.0  # ft/s: a small K_a, as the paper counts it
+GREEDY = 50.0  # ft²/(lbf s): a high K_d, the upper half of its range
 Points = NDArray[np.float64]
 
 
 class Reading(NamedTuple):
-    """What the paper leaves open: what divides the weighted sums (Eq. 2), and the start of the V."""
+    """What the paper leaves open: what divides the weighted sums (Eq. 2), and the start of the V.
+
+    wing : keys of a scenario for other wings than those of the paper's last simulation
+    """
 
     centroid: str
     start: Start
+    wing: tuple[tuple[str, str | float], ...] = ()
 
     @property
     def words(self) -> str:
@@ -37,6 +43,15 @@ READINGS = {
     "near": Reading("others", Start(sx=5.0, sy=5.0)),  # the prototype's, tip to tip from the start
     "n": Reading("n", Start()),  # those under which the published gains hold a V
 }
+# The paper's first simulation: one horseshoe a wing, before it had a grid. Its gradient is not described: ours is the
+# derivative of the same filaments. Their core keeps it finite for two birds abreast, and is far narrower than a row.
+HORSESHOE: dict[str, str | float] = {
+    "wing.segments": "1",
+    "wing.positions": "free",
+    "wing.core": 0.01,
+    "model.gradient": "frozen",
+}
+FIRST = Reading("others", Start(), tuple(HORSESHOE.items()))
 
 
 @dataclass
@@ -44,6 +59,10 @@ class Run:
     """One run: by generation the best-ever and the mean power of the fit (W), share of K_a below 2 ft/s.
 
     champions : the best-ever controller after each generation
+    lost      : by generation the share of controllers that collide
+    careless  : by generation how many have a K_a below 2 ft/s, and how many of them collide
+    rows      : of every flight the K_d, ft²/(lbf s), and whether it ended in a row
+    scattered : flights whose birds left the finite numbers
     flown     : flights; a controller that comes again is not flown again
     flights   : of the best-ever after the paper's generations 5 and 13 and the last; full gradient of the last
     """
@@ -54,6 +73,10 @@ class Run:
     mean: list[float] = field(default_factory=list)
     timid: list[float] = field(default_factory=list)
     champions: list[Gains] = field(default_factory=list)
+    lost: list[float] = field(default_factory=list)
+    careless: list[tuple[int, int]] = field(default_factory=list)
+    rows: list[tuple[float, bool]] = field(default_factory=list)
+    scattered: int = 0
     flown: int = 0
     flights: dict[str, Flight] = field(default_factory=dict)
 
@@ -70,15 +93,21 @@ class Run:
         self.champions.append(gains(points[i]) if better else self.champions[-1])
         self.best.append(float(losses[i]) if better else self.best[-1])
         self.mean.append(float(fit.mean()) if fit.size else float("nan"))
-        self.timid.append(float(np.mean([gains(point).k_a < 2.0 for point in points])))
+        each = [gains(point) for point in points]
+        timid = np.array([g.k_a < TIMID for g in each])
+        collided = np.array([g.r_c >= g.r_a for g in each]) & (losses >= LOST)
+        self.timid.append(float(timid.mean()))
+        self.lost.append(float(collided.mean()))
+        self.careless.append((int(timid.sum()), int((timid & collided).sum())))
 
 
 @dataclass
 class Evolution:
-    """All runs of the genetic algorithm by the name of their reading, and of CMA-ES, seed by seed."""
+    """All runs of the genetic algorithm by the name of their reading, on wings of one horseshoe, and of CMA-ES."""
 
     runs: dict[str, list[Run]]
     cmaes: list[Run]
+    first: list[Run] = field(default_factory=list)
 
     @property
     def winners(self) -> list[Gains]:
@@ -87,11 +116,14 @@ class Evolution:
 
 
 def evolve(birds: Birds, quick: bool = False, until: int | None = None) -> Evolution:
-    """Three readings and CMA-ES, three seeds each; quick: one seed, few generations; until: so many instead."""
+    """Three readings, one horseshoe a wing, and CMA-ES, three seeds each.
+
+    quick : one seed, few generations; until : so many generations instead
+    """
     seeds, usual = (SEEDS[:1], 12) if quick else (SEEDS, GENERATIONS)
     generations = until or usual
     count, title = 0, "evolution"
-    total = len(seeds) * (len(READINGS) + 1)
+    total = len(seeds) * (len(READINGS) + 2)
 
     def told(run: Run) -> Run:
         nonlocal count
@@ -104,7 +136,9 @@ def evolve(birds: Birds, quick: bool = False, until: int | None = None) -> Evolu
         name: [told(with_genetic(birds, reading, seed, generations)) for seed in seeds]
         for name, reading in READINGS.items()
     }
-    return Evolution(runs, [told(with_cmaes(birds, READINGS["mean"], run.seed, run.flown)) for run in runs["mean"]])
+    first = [told(with_genetic(birds, FIRST, seed, generations)) for seed in seeds]
+    cmaes = [told(with_cmaes(birds, READINGS["mean"], run.seed, run.flown)) for run in runs["mean"]]
+    return Evolution(runs, cmaes, first)
 
 
 def with_genetic(birds: Birds, reading: Reading, seed: int, generations: int = GENERATIONS) -> Run:
@@ -133,10 +167,15 @@ def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]
         fresh = {point.tobytes(): gains(point) for point in points if point.tobytes() not in known}
         inside = {key: found for key, found in fresh.items() if found.r_c >= found.r_a}
         tasks = [Task(found, run.reading.start) for found in inside.values()]
-        flown = birds.fly("", tasks, centroid=run.reading.centroid)
+        flown = birds.fly("", tasks, scatter=bool(run.reading.wing), **settings_of(run.reading))
         run.flown += len(flown)
+        run.rows += [(task.gains.k_d, in_row(flight)) for task, flight in zip(tasks, flown, strict=True)]
         known.update(dict.fromkeys(fresh, LOST))
-        known.update((key, LOST if f.collided else f.power) for key, f in zip(inside, flown, strict=True))
+        for key, flight in zip(inside, flown, strict=True):
+            finite = bool(np.isfinite(flight.power))
+            run.scattered += not finite
+            good = finite and not flight.collided
+            known[key] = flight.power if good else LOST
         every = np.array([known[point.tobytes()] for point in points])
         run.note(points, every)
         return every
@@ -144,12 +183,20 @@ def losses_of(birds: Birds, run: Run) -> Callable[[Points], NDArray[np.float64]]
     return losses
 
 
+def settings_of(reading: Reading) -> dict[str, Any]:
+    """Keys of the scenario that a reading sets."""
+    return {"model.centroid": reading.centroid, **dict(reading.wing)}
+
+
 def _flown_again(birds: Birds, run: Run) -> Run:
     last = len(run.best) - 1
     moments = {"early": EARLY, "midway": MIDWAY, "final": last}
     tasks = [Task(run.champions[min(at, last)], run.reading.start) for at in moments.values()]
-    flown = birds.fly("", tasks, centroid=run.reading.centroid)
+    settings = settings_of(run.reading)
+    flown = birds.fly("", tasks, scatter=bool(run.reading.wing), **settings)
     run.flights = dict(zip(moments, flown, strict=True))
-    full = birds.fly("", tasks[-1:], centroid=run.reading.centroid, gradient="cells")[0]
-    run.flights["full gradient"] = full
+    whole = {"frozen": "analytic"}.get(settings.get("model.gradient", ""), "cells")
+    run.flights["full gradient"] = birds.fly(
+        "", tasks[-1:], scatter=bool(run.reading.wing), **settings | {"model.gradient": whole}
+    )[0]
     return run

@@ -7,12 +7,13 @@ import numpy as np
 from airflock.scenarios.files import load
 from airflock_papers.claims import Measured
 from airflock_papers.dimock_2003.flights import Flight, holds_vee, spacing
-from airflock_papers.dimock_2003.ga import EARLY, GENERATIONS, READINGS, Evolution, Run
+from airflock_papers.dimock_2003.ga import EARLY, FIRST, GENERATIONS, GREEDY, READINGS, Evolution, Run
 from airflock_papers.dimock_2003.static import Air
 from airflock_papers.dimock_2003.units import FT_LBF, SPAN
 from airflock_papers.statistics import Estimate
 
 TAKEN = 10  # the generation by which the paper says that the small gain had taken hold
+TENTH = 10  # generations that are compared with as many later ones
 BEFORE, AFTER = slice(0, 10), slice(-10, None)  # frames: the first and the last second
 
 
@@ -35,6 +36,8 @@ def measured(found: Evolution) -> list[Measured]:
         *(_timid(name, runs) for name, runs in found.runs.items()),
         *(_vee(name, runs) for name, runs in found.runs.items()),
         *_course_of_the_search(found.runs["mean"]),
+        *_collisions(found.runs["mean"]),
+        *([_rows(found.first)] if found.first else []),
         *(
             Measured(
                 f"ga.range.{name}",
@@ -56,11 +59,54 @@ def _course_of_the_search(runs: Sequence[Run]) -> list[Measured]:
     if last != GENERATIONS - 1:
         return []
     swings = [spacing(run.flights["early"])[1] - spacing(run.flights["final"])[1] for run in runs]
+    note = f"{_each(swings, 3)} ft by seed"
     courses = [_course(run.flights["final"]) for run in runs]
     return [
-        Measured("ga.early", "disorder", f"generation {EARLY} less generation {last}, swing in ft", _spread(swings)),
+        Measured(
+            "ga.early", "disorder", f"generation {EARLY} less generation {last}, swing in ft", _spread(swings), note
+        ),
         Measured("ga.drag", "power over time", f"generation {last}, last second over first", _spread(courses)),
     ]
+
+
+def _collisions(runs: Sequence[Run]) -> list[Measured]:
+    """How the share of controllers that collide grows, and how many of those with a small K_a do."""
+    words = READINGS["mean"].words
+    found = []
+    if len(runs[0].lost) >= 2 * TENTH:
+        stretches = (slice(0, TENTH), slice(TENTH, 2 * TENTH), slice(-TENTH, None))
+        parts = [[float(np.mean(run.lost[stretch])) for run in runs] for stretch in stretches]
+        note = f"{', '.join(_percent(part) for part in parts)} in the first ten generations, the next and the last"
+        at = f"share of controllers, generations {TENTH} to {2 * TENTH - 1} less 0 to {TENTH - 1}, {words}"
+        rise = [b - a for a, b in zip(*parts[:2], strict=True)]
+        found.append(Measured("ga.sporadic.rise", "collided", at, _spread(rise), note))
+    late = [np.sum(run.careless[TAKEN:], axis=0) for run in runs if len(run.careless) > TAKEN]
+    shares = [float(collided / timid) for timid, collided in late if timid]
+    if shares:
+        at = f"share of those with K_a below 2, generation {TAKEN} to the last, {words}"
+        note = f"{_percent(shares)} by seed"
+        found.append(Measured("ga.sporadic.stay", "collided", at, _spread(shares), note))
+    return found
+
+
+def _rows(runs: Sequence[Run]) -> Measured:
+    """Share of the flights with a high K_d, on wings of one horseshoe, that end in a row; all seeds together."""
+    ends = {
+        greedy: [row for run in runs for k_d, row in run.rows if (k_d >= GREEDY) == greedy] for greedy in (True, False)
+    }
+    share = {greedy: float(np.mean(rows)) if rows else 0.0 for greedy, rows in ends.items()}
+    best = _each([run.best[-1] / FT_LBF for run in runs])
+    lost = sum(run.scattered for run in runs)
+    note = (
+        f"{share[False]:.1%} of {len(ends[False])} flights with a lower K_d; {lost} scatter beyond the finite numbers; "
+        f"best-ever {best} ft lbf/s by seed: {'; '.join(run.gains.text() for run in runs)}"
+    )
+    at = f"flights with K_d of {GREEDY:g} ft²/(lbf s) or more, one horseshoe a wing, {FIRST.words}"
+    return Measured("ga.row", "rows", at, Estimate(share[True], None, None, None, len(ends[True])), note)
+
+
+def _percent(shares: Sequence[float]) -> str:
+    return " / ".join(f"{share:.1%}" for share in shares)
 
 
 def _solo() -> float:

@@ -44,6 +44,7 @@ MEANS: Mapping[str, tuple[str, ...]] = {  # Table S2, likewise; the rows that ar
 }
 NAMES = tuple(PRINTED)
 WALLS = ("eq15", "program")  # averages of the excursion
+ALPHA = 0.05  # bound of the joint p
 SURE = ("f_disc", "f_cluster")  # 1 in every flight inside the digits
 READINGS = ("", "digits")  # of the means of Table S2: exact, or what rounds to them
 

@@ -12,8 +12,18 @@ from airflock_papers.claims import Claim, Measured, judge, unflown
 from airflock_papers.flights import Flights, progress_bar
 from airflock_papers.page import Section
 from airflock_papers.statements import load
-from airflock_papers.vasarhelyi_2018.published import COLUMNS, SPEEDS
-from airflock_papers.vasarhelyi_2018.rounding import NAMES, PRINTED, SURE, Target, box, judged
+from airflock_papers.vasarhelyi_2018.published import COLUMNS, SPEEDS, program_runs
+from airflock_papers.vasarhelyi_2018.rounding import (
+    ALPHA,
+    NAMES,
+    PRINTED,
+    SURE,
+    Target,
+    box,
+    judged,
+    measured_as,
+    printed,
+)
 from airflock_papers.vasarhelyi_2018.rounding_search import (
     QUICK,
     Budget,
@@ -31,10 +41,11 @@ MAPPED = tuple(row for row in COLUMNS if row not in SURE)
 
 
 class Column(NamedTuple):
-    """One column: what was flown for the map, by whose points, and the judged sets."""
+    """One column: what was flown for the map, by whose points; the sets of the search; and the judged sets."""
 
     trajectories: NDArray[np.float64]
     screen: Sequence[Point]
+    near: Sequence[Point]
     judged: Mapping[Target, Point]
 
 
@@ -48,7 +59,8 @@ def fly(flights: Flights, speeds: Sequence[int] = SPEEDS) -> Data:
     for v in speeds:
         store = kept(v)
         last = fresh(store, v, flights, budget)
-        found[v] = Column(*screened(store, v, flights, budget), last)
+        near = [point for point in store.points if point.stage == "near" and point.key.startswith(f"{budget} ")]
+        found[v] = Column(*screened(store, v, flights, budget), near, last)
     return found
 
 
@@ -65,7 +77,7 @@ def _joint(v: int, target: Target, point: Point) -> Measured:
     coarse = ", ".join(
         f"{name} = {values[NAMES.index(name)]:.4g}" for name in ("p_rep", "c_frict", "v_frict", "r0_rep")
     )
-    missed = ", ".join(f"{row} (p = {p:.1g})" for row, p in rows.items() if p < 0.05)
+    missed = ", ".join(f"{row} (p = {p:.1g})" for row, p in rows.items() if p < ALPHA)
     note = f"{coarse}; rejected: {missed or 'no row'}"
     words = f"{v} m/s, {AVERAGES[target.wall]}"
     return Measured(f"rounding.{target.name}.{v}ms", "joint p", words, statistics.one(joint, runs), note)
@@ -97,8 +109,52 @@ def write(folder: Path, claims: list[Claim], data: Data) -> None:
         f"each line by a polynomial of all flights; each line is judged once.\n\n{_counted(claims)}"
     )
     told = "search 1000000 to 2999999, judged 3000000 to 3003099"
-    parts = (Section("map", "The map of the digits", MAP if data else "", ("rounding",) if data else ()),)
+    parts = (
+        Section("left", "What is left", residual(data)),
+        Section("map", "The map of the digits", MAP if data else "", ("rounding",) if data else ()),
+    )
     page.write(folder, TITLE, COMMAND, claims, parts, about, told, ("rounding.toml", "ROUNDING.md"))
+
+
+LEFT = (
+    "Every row that is rejected (p below 0.05, corrected) in the sets that are judged. Printed and ours are means ± SD "
+    "of 100 flights; the gap is in printed SDs. `search` is the span of the means of all sets that the search flew, "
+    "each of 20 flights: an entry of Table S2 outside it is out of reach of the digits. `program` is the authors' "
+    "program with Table S1 as printed (program_runs.csv; F_wall by Eq. 15)."
+)
+
+
+def residual(data: Data) -> str:
+    """Rows of Table S2 that no set inside the digits reproduced, as a table; empty if there is none."""
+    lines = []
+    for v, column in data.items():
+        for target, point in column.judged.items():
+            flown = {name: np.array(values) for name, values in point.rows.items()}
+            for row, p in judged(v, flown, target)[1].items():
+                if p < ALPHA:
+                    lines.append(_left(v, row, target, flown[measured_as(row, target)], column.near, p))
+    if not lines:
+        return ""
+    head = ("column", "read as", "row", "printed", "ours", "gap", "p", "search", "program")
+    return "\n".join([LEFT, "", _row(head), _row(["---"] * len(head)), *lines])
+
+
+def _left(v: int, row: str, target: Target, ours: NDArray[np.float64], near: Sequence[Point], p: float) -> str:
+    mean, sd = printed(v, row)
+    found = [float(np.mean(each.rows[measured_as(row, target)])) for each in near]
+    runs = program_runs(v)
+    theirs = f"{runs[row].mean():.3g} ± {runs[row].std():.2g} ({len(runs)} runs)" if row in runs else ""
+    gap = f"{(ours.mean() - mean) / sd:+.2f}" if sd > 0.0 else ""
+    told = f"{v} m/s", f"`{target.name}`", f"`{row}`", f"{mean:.4g} ± {sd:.2g}"
+    return _row([*told, f"{ours.mean():.4g} ± {ours.std(ddof=1):.2g}", gap, f"{p:.1g}", _span(found), theirs])
+
+
+def _span(values: Sequence[float]) -> str:
+    return f"{min(values):.3g} to {max(values):.3g}" if values else ""
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
 
 
 def _counted(claims: Sequence[Claim]) -> str:

@@ -1,8 +1,9 @@
 """Zapotecatl, Muñoz-Meléndez and Gershenson 2016: performance metrics of collective coordinated motion in flocks.
 
 Parts: sequential (the authors' order of updates), synchronous, printed (Eqs 2-12 as they stand). Each flies boids with
-r_s and r_a in {0, 10, .. 50} cm and compares extension, polarization, collisions, consistencies and quality. And
-evolved (radii, fields of view and weights evolved for quality), which is flown only when it is asked for by name.
+r_s and r_a in {0, 10, .. 50} cm and compares extension, polarization, collisions, consistencies and quality. Then
+subgroups (what the measures make of a flock that split), and evolved (radii, fields of view and weights evolved for
+quality), which is flown only when it is asked for by name.
 
 The figures were measured by the authors' program, so the first two parts count collisions as it does
 (`metrics.count = "program"`); printed counts by Eq. 18, and one claim shows what Eq. 18 would change. The sentences of
@@ -21,7 +22,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock_papers.claims import Measured
 from airflock_papers.flights import Flights
 from airflock_papers.paper import Flown, Paper
-from airflock_papers.zapotecatl_2016 import evolved, verdicts
+from airflock_papers.zapotecatl_2016 import evolved, subgroups, verdicts
 
 RADII = (0, 10, 20, 30, 40, 50)  # cm
 COARSE = {"dt": 0.004, "duration": 89.996}  # 22,500 samples
@@ -58,6 +59,10 @@ def fly(wanted: Sequence[str], flights: Flights) -> Flown:
             found[part] = evolved.fly(flights)
             measured += evolved.measured(found[part])
             continue
+        if part == "subgroups":
+            found[part] = subgroups.fly(flights)
+            measured += subgroups.measured(found[part])
+            continue
         found[part] = _fly(part, flights)
         measured += verdicts.measured(part, found[part], published().drop(COARSE_OFF if flights.quick else []))
         if part == "sequential" and not flights.quick:
@@ -83,7 +88,7 @@ def _fly_by_eq_18(flights: Flights) -> pd.DataFrame:
 PAPER = Paper(
     "Zapotecatl et al. 2016, Performance Metrics of Collective Coordinated Motion in Flocks",
     __name__,
-    ("sequential", "synchronous", "printed"),
+    ("sequential", "synchronous", "printed", "subgroups"),
     fly,
     long=("evolved",),
 )

@@ -8,6 +8,13 @@ from airflock.core.contract.namespaces import names_of
 from airflock.core.vocabulary import CLOCKS, OVER_TIME, REDUCTIONS, asks
 from airflock.errors import RuleError
 
+ABSENCE = {  # by how instants combine, `vocabulary.OVER_TIME`
+    "mean": "mean over instants, each as that of a flock of those who are there",
+    "sum": "counted over all instants, of those who are there",
+    "min": "the smallest over all instants, of those who are there",
+    "max": "the largest over all instants, of those who are there",
+}
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -15,6 +22,8 @@ class Metric:
 
     within  : `within(q)`, m; the metric promises to contribute nothing, and to keep its Memory at its start values,
               while no two agents are nearer than that. A driver may then skip the pair loop.
+    linked_within : `linked_within(q)`, m; the metric promises that no two agents farther apart than that are linked.
+              Large flocks then look for links among those who are near
     settled : whether nobody farther than `beyond` (m) can change what `pair` adds up to for an agent. Large flocks then
               look no farther than they must
     clock   : "sample" (metrics.period) or "collision" (metrics.collision_period)
@@ -40,6 +49,7 @@ class Metric:
     Memory: type | None = None
     within: Callable[..., float] | None = None
     settled: Callable[..., bool] | None = None
+    linked_within: Callable[..., float] | None = None
     survey: Callable[..., None] | None = None
     Shared: type | None = None
     workspace: Callable[..., Any] | None = None
@@ -53,7 +63,18 @@ class Metric:
     def __hash__(self) -> int:
         return hash((self.name, self.sample, self.pair, self.agent, self.cluster))
 
+    def absence(self, name: str) -> str:
+        """How one of its order parameters is taken while some agents are absent, for people to read."""
+        how = {self.over_time.get(field, "mean") for field in self.Sample._fields}  # type: ignore[attr-defined]
+        how = {self.over_time.get(name, "mean")} if name in self.Sample._fields else how  # type: ignore[attr-defined]
+        if name not in self.Sample._fields and "sum" in how:  # type: ignore[attr-defined]
+            return "mean over agents and instants, of those who are there"
+        return ABSENCE[how.pop() if len(how) == 1 else "mean"]
 
+
+MEASURING = (
+    "pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "linked_within", "survey",
+)  # fmt: skip
 RULES_AND_RECORDS = (
     ("sample", "Sample"), ("pair", "Pair"), ("agent", "Agent"), ("member", "Member"), ("cluster", "Cluster"),
     ("cluster", "linked"), ("survey", "Shared"), ("survey", "workspace"),
@@ -102,7 +123,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
     for rule, record in RULES_AND_RECORDS:
         if rule in found and record not in found:
             raise RuleError(f"metric {name} has a rule {rule} but no {record}")
-    for kind in ("pair", "linked", "agent", "member", "cluster", "sample", "within", "settled", "survey"):
+    for kind in MEASURING:
         if kind in found:
             asks(found[kind], kind, name)
     fields = {f for record in ("Pair", "Agent", "Member", "Cluster") for f in getattr(found.get(record), "_fields", ())}
@@ -117,7 +138,7 @@ def metric(namespace: Any, name: str = "") -> Metric:
         raise RuleError(f"metric {name}: CLOCK = {clock!r}; give one of {CLOCKS}")
     records = (
         "sample", "Sample", "pair", "Pair", "agent", "Agent", "linked", "member", "Member", "cluster", "Cluster",
-        "Memory", "within", "settled", "total", "survey", "Shared", "workspace",
+        "Memory", "within", "settled", "linked_within", "total", "survey", "Shared", "workspace",
     )  # fmt: skip
     return Metric(
         name=name,

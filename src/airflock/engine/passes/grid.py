@@ -38,6 +38,7 @@ def memory(
 
     starts : first place of each cell; tally : agents by chunk and cell, in one row; cell_of : of each agent
     packed : (place, component) states and, as an integer, the slot; flat : (component, place) states; ident : agents
+    Between two sorts, `tally` and `ident` are scratch of whoever looks for links by cells.
     """
     if not plan.grid:
         return ()
@@ -71,9 +72,6 @@ def neighbours(
 
     met : where an agent meets but some of whom it hears, lines before `inner` that find out: of each candidate, at last
     """
-    build.function(
-        "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
-    )
     for c, name in enumerate(build.plan.motion):
         before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
@@ -99,8 +97,11 @@ def neighbours(
     found = re.findall(r"\w+", "\n".join(line for part in met or () for line in part))
     rows = [f"{name} = np.zeros(room + {2 * BLOCK}, work.dtype)" for name in FOUND if name in found]
     body = [*_slabs(build, who), *rows, *loop("ox in range(count[0])", cell)]
-    lines = [*lines, *opened(build), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
-    lines += [f"most_cells = {CELLS} * n", *_sorted(build, who)]
+    lines = [*lines, *sort(build, "near", f"{CELLS} * n"), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
+    if who:
+        number = "order[whose[e]]" if build.slots else "whose[e]"
+        each = loop("e in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [f"ident[e] = {number}"])
+        lines += [*build.order(), *loop("chunk in prange(CHUNKS)", each)]
     lines += loop("line in prange(count[1] * count[2])", body)
     back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
         f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)
@@ -111,17 +112,15 @@ def neighbours(
     build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
 
 
-def sort(build: Builder) -> list[str]:
-    """Lines that sort agents into cells of about one each, at any time; makes the function `sort` of them."""
+def sort(build: Builder, near: str, most: str) -> list[str]:
+    """Lines that sort agents into about `most` cells no smaller than `near` (m); they call the function `sort`."""
     if not any("def sort(" in text for text in build.functions):
-        if not any("def cells_of(" in text for text in build.functions):
-            build.function(
-                "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
-            )
-        lines = ["near = real(0.001); most_cells = n", *opened(build)]
-        lines += must_replace(_sorted(build, False), "CHUNKS", str(CHUNKS))
-        build.function("sort(n, row, work, cells)", lines, "return size, count", parallel=True)
-    return [*opened(build), "sides, count = sort(n, row, work, cells)"]
+        build.function(
+            "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
+        )
+        lines = must_replace([*opened(build), *_sorted(build)], "CHUNKS", str(CHUNKS))
+        build.function("sort(n, near, most_cells, row, work, cells)", lines, "return size, count", parallel=True)
+    return [*opened(build), f"sides, count = sort(n, {near}, {most}, row, work, cells)"]
 
 
 def _found(each: list[str], last: list[str]) -> list[str]:
@@ -160,16 +159,14 @@ def _box(build: Builder) -> list[str]:
     return lines + [f"size[{c}] = width[{c}] / real(count[{c}])" for c in range(len(axes))]
 
 
-def _sorted(build: Builder, who: bool) -> list[str]:
+def _sorted(build: Builder) -> list[str]:
     """Agents sorted by cell: starts (first of each cell), place (of each agent), packed (agent, position and velocity).
-
-    The lines before say how small cells may be (`near`, m) and how many there may be (`most_cells`).
 
     Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
     """
     axes = build.plan.axes
     names = build.plan.motion
-    lines = [*build.bind(names), *build.order(), "low, size, count = cells_of(n, near, most_cells, row, work)"]
+    lines = [*build.bind(names), "low, size, count = cells_of(n, near, most_cells, row, work)"]
     lines += ["total = count[0] * count[1] * count[2]"]
     inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
     part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
@@ -186,7 +183,6 @@ def _sorted(build: Builder, who: bool) -> list[str]:
     put += [f"packed[d, {c}] = {name}[i]" for c, name in enumerate(names)]
     lines += loop("chunk in prange(CHUNKS)", ["head = chunk * total", *loop(part, put)])
     each = [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))]
-    each += ["ident[e] = " + ("order[whose[e]]" if build.slots else "whose[e]")] * who
     return lines + loop("chunk in prange(CHUNKS)", loop(must_replace(part, "i in", "e in"), each))
 
 

@@ -1,18 +1,24 @@
 """Measure: order parameters of one instant, and how instants add up. The same text scores flights and recordings."""
 
+from typing import Any
+
+from airflock.core.contract import Metric
 from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
 from airflock.engine.plan import Plan
+from airflock.engine.replace import must_replace
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
+from airflock.engine.stages.links import clusters_by_cells
 from airflock.engine.stages.measure import Measured
-from airflock.engine.stages.near import pairs_by_cells
+from airflock.engine.stages.near import PARTS, SURE, pairs_by_cells
 from airflock.engine.stages.words import fields, wants
 
 CLOCKS = ("sample", "collision")
+BY_CELLS = "n, row, whole, work, cells"  # what a search by cells is called with
 
 
 def arguments(build: Builder, cells: bool = False) -> str:
@@ -28,25 +34,54 @@ def measure(build: Builder, clock: str) -> None:
     """
     metrics = measured(build.plan, clock)
     paired = [one.metric for one in metrics if one.metric.pair is not None]
-    cells = build.plan.grid and bool(paired) and all(metric.settled is not None for metric in paired)
+    near = build.plan.near and bool(paired) and all(metric.settled is not None for metric in paired)
+    looked = pairs(build, clock, metrics) if near else None
     outside = any(wants(one.metric.agent, "excursion") for one in metrics)
     parts = {f"survey_{one.metric.name}": flock.survey(build, one.metric) for one in metrics if one.metric.survey}
-    grouped = {one.metric.name: build.clusters(one.metric) for one in metrics if build.clusters and one.metric.cluster}
-    parts |= {f"clusters_{name}": lines for name, lines in grouped.items()}
+    clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
-        build, measuring.measure, metrics=metrics, nearest=clock == "collision",
-        over=pairs_by_cells if cells else None, abreast=build.abreast,
+        build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
-        clustered={
-            one.metric.name: Call(f"clusters_{one.metric.name}()") if one.metric.name in grouped else clusters_of
-            for one in metrics
-        },
+        clustered=clustered,
     )  # fmt: skip
-    lines = [*(grid.sort(build) if cells else []), *made.lines]
+    lines = made.lines
     for name, part in parts.items():
         lines = in_place(lines, name, part)
+    cells = near or any(linked(build, one.metric) for one in metrics)
     build.function(f"measure_{clock}({arguments(build, cells)})", lines, f"return {made.answer}")
+
+
+def pairs(build: Builder, clock: str, metrics: tuple[Measured, ...]) -> Call:
+    """Function near_<clock>: the pair rules of a clock by cells of about one agent each; its call."""
+    made = specialise(build, pairs_by_cells, metrics=metrics, nearest=clock == "collision")
+    called = f"near_{clock}({BY_CELLS})"
+    lines = [*grid.sort(build, "real(0.001)", "n"), *made.lines]
+    lines = must_replace(lines, f"part in range({PARTS})", f"part in prange({PARTS})", 1)
+    build.function(called, lines, f"return {made.answer}", parallel=True)
+    return Call(called)
+
+
+def linked(build: Builder, metric: Metric) -> bool:
+    """Whether the links of a metric are looked for by cells."""
+    return build.plan.near and metric.cluster is not None and metric.linked_within is not None
+
+
+def clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) -> Any:
+    """What finds the clusters of a metric: a stage or a call. Lines that stand in place of a call go to `parts`."""
+    name = f"clusters_{metric.name}"
+    if linked(build, metric):
+        assert metric.linked_within is not None
+        reach = f"least({build.call(metric.linked_within, 'linked_within', {})} / real({SURE}), LIMIT)"
+        made = specialise(build, clusters_by_cells, metric=metric)
+        called = f"{name}(mean, labels, {BY_CELLS})"
+        lines = [*build.records("q"), *grid.sort(build, reach, "n"), *made.lines]
+        build.function(called, lines, f"return {made.answer}")
+        return Call(called)
+    if build.clusters and metric.cluster:
+        parts[name] = build.clusters(metric)
+        return Call(f"{name}()")
+    return clusters_of
 
 
 def measured(plan: Plan, clock: str) -> tuple[Measured, ...]:

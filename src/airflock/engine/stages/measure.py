@@ -223,10 +223,10 @@ def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n
 
 def measure(
     flock: Flock, numbers: Any, whole: Any, time: float, n: int, m: int, edges: Any, spans: Any, scene: Any,
-    memory: Any, labels: Any, values: Any, starts: Any, whose: Any, cell_of: Any, flat: Any, sides: Any, count: Any,
+    memory: Any, labels: Any, values: Any,
     excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
     clustered: Mapping[str, Callable[..., Any]],
-    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[..., Any] | None,
+    *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[[], Any] | None,
     abreast: bool,
 ) -> Any:  # fmt: skip
     """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
@@ -237,14 +237,12 @@ def measure(
     clustered      : finds its clusters
     nearest        : whether the least distance is asked for
     abreast        : whether two agents may go through the others of a pair rule together
-    over           : what goes through pairs by cells, of which starts to count tell; None: all pairs
+    over           : what goes through pairs by cells; None: all pairs
     """
     x = flock.position
     mean = headings(flock, n, plan=plan)
     if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
-        least2 = over(
-            flock, numbers, n, starts, whose, cell_of, flat, sides, count, plan=plan, metrics=metrics, nearest=nearest
-        )
+        least2 = over()
     else:
         least2 = pairs(flock, numbers, n, m, plan=plan, metrics=metrics, nearest=nearest, abreast=abreast)
     if any(wants(one.metric.agent, "excursion") for one in metrics):

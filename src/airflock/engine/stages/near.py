@@ -1,11 +1,13 @@
 """Pairs by cells: the pair rules of order parameters over those around an agent, until nobody else could change them.
 
-An agent looks at its own cell, at the ring of cells around that, at the next ring, and so on. What is found is that of
-all pairs but for the order of sums.
+An agent looks at its own cell and the ring of cells around that, at the next ring, and so on. What is found is that of
+all pairs but for the order of sums. Parts of the flock are looked at side by side.
 """
 
 import math
 from typing import Any
+
+import numpy as np
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import Measured, names_of, ways
@@ -27,95 +29,171 @@ from airflock.engine.stages.words import (
     least,
     real,
     reduced,
+    repeat,
     totals,
     vector,
 )  # fmt: skip
 from airflock.world.edges import nearest_image
 
 SURE = 0.999  # of what rings are wide: the cell of an agent at its cell's edge may be that beside it, by rounding
+PARTS = 64  # of the flock, whatever the number of threads
 
 
-def pairs_by_cells(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, n: int, starts: Any, whose: Any, cell_of: Any, flat: Any, sides: Any, count: Any,
+def placed(at: Any, cell: Any, count: Any) -> None:
+    """Put the place of a cell along each axis into the vector `at`."""
+    at[X] = cell % count[X]
+    at[Y] = cell // count[X] % count[Y]
+    at[Z] = cell // (count[X] * count[Y])
+
+
+def wrapped(c: Any, count: Any, *, plan: Plan) -> Any:
+    """Number of a cell along an axis, where a periodic box goes on at its other end."""
+    return c + (count if c < 0 else 0) - (count if c >= count else 0) if plan.periodic else c
+
+
+def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
+    """Put the offset from a place to the agent at place f into the vector d, m; returns its square, m²."""
+    for a in range(plan.dimensions):
+        d[a] = flat[a, f] - own[a]
+    if plan.periodic:
+        for a in range(plan.dimensions):
+            d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
+    return sum(d[a] * d[a] for a in range(plan.dimensions)) + TINY
+
+
+def in_run(
+    first: Any, last: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, whose: Any,
+    flat: Any, *, plan: Plan, paired: list[Measured], nearest: bool,
+) -> Any:  # fmt: skip
+    """Add all pairs with those at places first to last - 1 to the sums of the agent at place e; its least square."""
+    for f in range(first, last):
+        d = vector()
+        r2 = apart(d, own, flat, f, numbers.w, plan=plan)
+        r = math.sqrt(r2)
+        ok = f != e
+        for metric, _, _, start in paired:
+            t = ask(
+                metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
+                lower=(ONE if integer(flock.number[whose[f]]) < ii else ZERO),
+            )  # fmt: skip
+            for c, way in enumerate(ways(metric.Pair, metric)):
+                sums[start + c] = reduced(way, sums[start + c], choose(ok, t[c], START[way]))
+        if nearest:
+            near2 = least(near2, choose(ok, r2, FAR))
+    return near2
+
+
+def in_ring(
+    ring: int, at: Any, low: Any, high: Any, count: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any,
+    flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any,
+    *, plan: Plan, paired: list[Measured], nearest: bool,
+) -> Any:  # fmt: skip
+    """The same of all cells of a ring around the cell of the agent, of the first ring with what is inside of it.
+
+    Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
+
+    low, high : how many cells there are below and above its own, along each axis
+    """
+    for oz in range(max(-ring, low[Z]), min(ring, high[Z]) + 1):
+        for oy in range(max(-ring, low[Y]), min(ring, high[Y]) + 1):
+            row = wrapped(at[Z] + oz, count[Z], plan=plan) * count[Y] + wrapped(at[Y] + oy, count[Y], plan=plan)
+            full = (ring == 1) | (abs(oz) == ring) | (abs(oy) == ring)
+            for end in range(1 if full else 2):  # of a row that passes through the ring its two ends
+                west = at[X] + max(-ring if end == 0 else ring, low[X])
+                east = at[X] + min(ring if full or end == 1 else -ring, high[X])
+                for turn in range(
+                    -1 if plan.periodic and west < 0 else 0, 2 if plan.periodic and east >= count[X] else 1
+                ):
+                    begin = max(west - turn * count[X], 0)
+                    stop = min(east - turn * count[X], count[X] - 1) + 1
+                    if begin < stop:
+                        near2 = in_run(
+                            starts[row * count[X] + begin], starts[row * count[X] + stop], e, ii, near2, own, sums,
+                            flock, numbers, whose, flat, plan=plan, paired=paired, nearest=nearest,
+                        )  # fmt: skip
+    return near2
+
+
+def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[Measured], nearest: bool) -> Any:
+    """Whether somebody farther than `beyond` could still change what is summed, 1 or 0."""
+    open_ = 0
+    for metric, _, _, first in paired:
+        pair = metric.Pair(*[sums[first + c] for c in fields(metric.Pair)])  # type: ignore[misc]
+        if not ask(metric.settled, pair=pair, beyond=beyond, q=numbers.q):
+            open_ = 1
+    if nearest:  # noqa: SIM102 - the outer one is of the plan
+        if near2 > beyond * beyond:
+            open_ = 1
+    return open_
+
+
+def pairs_of_place(
+    e: int, at: Any, low: Any, high: Any, flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any, side: Any,
+    rings: int, count: Any, *, plan: Plan, paired: list[Measured], nearest: bool,
+) -> Any:  # fmt: skip
+    """Sum the pair rules for the agent at place e, ring by ring; returns the square of its least distance, m²."""
+    i = whose[e]
+    ii = integer(flock.number[i])
+    own, sums = vector(), totals()
+    for a in range(plan.dimensions):
+        own[a] = flat[a, e]
+    for metric, _, _, first in paired:
+        for c, way in enumerate(ways(metric.Pair, metric)):
+            sums[first + c] = START[way]
+    near2 = FAR
+    ring = 1
+    going = 1
+    while going == 1:
+        near2 = in_ring(
+            ring, at, low, high, count, e, ii, near2, own, sums, flock, numbers, starts, whose, flat, plan=plan,
+            paired=paired, nearest=nearest,
+        )  # fmt: skip
+        beyond = real(SURE) * real(ring) * side
+        open_ = unsettled(beyond, near2, sums, numbers, paired=paired, nearest=nearest)
+        going = open_ if ring < rings else 0
+        ring += 1
+    for metric, _, _, first in paired:
+        for c, name in enumerate(names_of(metric.Pair)):
+            flock.pair(metric.name, name)[i] = sums[first + c]
+    return near2
+
+
+def pairs_by_cells(
+    flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any, sides: Any, count: Any,
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
 ) -> Any:  # fmt: skip
     """What `pairs` finds, for metrics that say when their pairs are `settled`.
 
-    starts, whose, cell_of, flat : first place of each cell, who is at each place, the cell of each, and their states
-    sides, count                 : size of a cell (m), and number of cells, along each axis
+    starts, whose, flat : first place of each cell, who is at each place, and their states
+    sides, count        : size of a cell (m), and number of cells, along each axis
     """
-    axes, x = range(plan.dimensions), flock.position
     paired = [one for one in metrics if one.metric.pair is not None]
-    least2 = FAR
+    total = count[X] * count[Y] * count[Z]
     side = sides[X]
     rings = count[X]
-    for a in axes:
+    for a in range(1, plan.dimensions):
         side = least(side, sides[a])
         rings = max(rings, count[a])
-    for e in range(n):
-        i = whose[e]
-        ii = integer(flock.number[i])
-        own, sums = vector(), totals()
-        for a in axes:
-            own[a] = x[a][i]
-        for metric, _, _, first in paired:
-            for c, way in enumerate(ways(metric.Pair, metric)):
-                sums[first + c] = START[way]
-        near2 = FAR
-        at_x = cell_of[i] % count[X]
-        at_y = cell_of[i] // count[X] % count[Y]
-        at_z = cell_of[i] // (count[X] * count[Y])
-        # a periodic box has no ends: half of its cells lie on either side
-        west = -((count[X] - 1) // 2) if plan.periodic else -at_x
-        east = count[X] // 2 if plan.periodic else count[X] - 1 - at_x
-        south = -((count[Y] - 1) // 2) if plan.periodic else -at_y
-        north = count[Y] // 2 if plan.periodic else count[Y] - 1 - at_y
-        down = -((count[Z] - 1) // 2) if plan.periodic else -at_z
-        up = count[Z] // 2 if plan.periodic else count[Z] - 1 - at_z
-        ring = 0
-        going = 1
-        while going == 1:
-            for oz in range(max(-ring, down), min(ring, up) + 1):
-                for oy in range(max(-ring, south), min(ring, north) + 1):
-                    outer = (abs(oz) == ring) | (abs(oy) == ring)
-                    for ox in range(-ring, ring + 1, 1 if outer else 2 * ring):
-                        if (ox >= west) & (ox <= east):
-                            row = (at_z + oz) % count[Z] * count[Y] + (at_y + oy) % count[Y]
-                            here = row * count[X] + (at_x + ox) % count[X]
-                            for f in range(starts[here], starts[here + 1]):
-                                d = vector()
-                                for a in axes:
-                                    d[a] = flat[a, f] - own[a]
-                                if plan.periodic:
-                                    for a in axes:
-                                        d[a] = nearest_image(d[a], getattr(numbers.w, SIDES[a]))
-                                r2 = sum(d[a] * d[a] for a in axes) + TINY
-                                r = math.sqrt(r2)
-                                ok = f != e
-                                for metric, _, _, first in paired:
-                                    t = ask(
-                                        metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
-                                        lower=(ONE if integer(flock.number[whose[f]]) < ii else ZERO),
-                                    )  # fmt: skip
-                                    for c, way in enumerate(ways(metric.Pair, metric)):
-                                        sums[first + c] = reduced(way, sums[first + c], choose(ok, t[c], START[way]))
-                                if nearest:
-                                    near2 = least(near2, choose(ok, r2, FAR))
-            beyond = real(SURE) * real(ring) * side
-            going = 0 if ring >= rings else 1
-            open_ = 0
-            for metric, _, _, first in paired:
-                pair = metric.Pair(*[sums[first + c] for c in fields(metric.Pair)])  # type: ignore[misc]
-                if not ask(metric.settled, pair=pair, beyond=beyond, q=numbers.q):
-                    open_ = 1
-            if nearest:  # noqa: SIM102 - the outer one is of the plan
-                if near2 > beyond * beyond:
-                    open_ = 1
-            going = going * open_
-            ring += 1
-        for metric, _, _, first in paired:
-            for c, name in enumerate(names_of(metric.Pair)):
-                flock.pair(metric.name, name)[i] = sums[first + c]
-        if nearest:
-            least2 = least(least2, near2)
+    nearest2 = np.empty(PARTS, np.float64)
+    for part in repeat(PARTS):
+        part2 = FAR
+        at, low, high = vector(), vector(), vector()
+        for here in range(total * part // PARTS, total * (part + 1) // PARTS):
+            if starts[here] < starts[here + 1]:
+                placed(at, here, count)
+                for a in (X, Y, Z):  # a periodic box has no ends: half of its cells lie on either side
+                    low[a] = -((count[a] - 1) // 2) if plan.periodic else -at[a]
+                    high[a] = count[a] // 2 if plan.periodic else count[a] - 1 - at[a]
+                for e in range(starts[here], starts[here + 1]):
+                    near2 = pairs_of_place(
+                        e, at, low, high, flock, numbers, starts, whose, flat, side, rings, count, plan=plan,
+                        paired=paired, nearest=nearest,
+                    )  # fmt: skip
+                    if nearest:
+                        part2 = least(part2, near2)
+        nearest2[part] = part2
+    least2 = FAR
+    if nearest:
+        for c in repeat(PARTS):
+            least2 = least(least2, real(nearest2[c]))
     return least2

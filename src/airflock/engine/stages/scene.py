@@ -60,13 +60,15 @@ def aim(flock: Flock, numbers: Any, time: float, elapsed: float, n: int, scene: 
 
 
 def glide(flock: Flock, numbers: Any, time: float, n: int, scene: Any, *, plan: Plan) -> int:
-    """Send each agent's own goal on its way from where the agent started.
+    """Send each agent's own goal on its way from where the agent was when all set out.
 
-    aim[3] keeps how long all are under way, s: the longest way at goals.speed, which a smooth course exceeds by half.
+    aim[0] keeps when they set out, s. aim[3] keeps how long all are under way, s: the longest way at goals.speed, which
+    a smooth course exceeds by half; it is negative where points are new, so that all set out now.
     """
     x, w, at, axes = flock.position, numbers.w, scene.aim, range(plan.dimensions)
     who = flock.number
-    if time <= ZERO:
+    if (time <= ZERO) | (at[3] < ZERO):
+        at[X] = time
         far = ZERO
         for i in range(n):
             for a in axes:
@@ -75,7 +77,7 @@ def glide(flock: Flock, numbers: Any, time: float, n: int, scene: Any, *, plan: 
         at[3] = 1.5 * math.sqrt(far) / w.goal_speed if w.goal_speed > ZERO else ZERO
     for i in range(n):
         for a in axes:
-            flock.goal[a][i] = goals.glide(flock.departed[a][i], scene.goals[who[i], a], time, at[3])
+            flock.goal[a][i] = goals.glide(flock.departed[a][i], scene.goals[who[i], a], time - at[X], at[3])
     return 0
 
 

@@ -1,0 +1,65 @@
+"""Locked: of several processes that need a driver nobody has compiled yet, one compiles it and the others load it.
+
+The lock is one of the system's on a file beside the driver: it ends with the process that holds it, however that ends.
+"""
+
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core.event import trigger_event
+
+NAME = "lock"
+LOOK = 0.05  # s from one try to the next
+PATIENCE = 300.0  # s; whoever holds a lock for longer has been stopped, and is waited for no more
+
+
+def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any], Any]:
+    """What compiles a function for a signature, or loads it from a folder, by one process at a time.
+
+    Where the folder holds an index, the function is loaded, for which nobody waits.
+    """
+
+    def locked(signature: Any) -> Any:
+        if any(folder.glob("*.nbi")):
+            return compile_(signature)
+        with alone(folder):
+            return compile_(signature)  # which loads what another process has compiled meanwhile
+
+    return locked
+
+
+@contextmanager
+def alone(folder: Path, patience: float = PATIENCE) -> Iterator[bool]:
+    """Hold the lock of a folder; whether it is held. It is not where the file system knows no locks.
+
+    While it waits, who listens to the compiler's passes is told of each try: an interruption is heard.
+    """
+    handle = -1
+    try:
+        with suppress(OSError):  # a folder that was removed meanwhile, a full disk: then all compile
+            handle = os.open(folder / NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        yield handle >= 0 and _taken(handle, time.monotonic() + patience)
+    finally:
+        if handle >= 0:
+            os.close(handle)
+
+
+def _taken(handle: int, until: float) -> bool:
+    """Whether the lock was free in time."""
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > until:
+                return False
+            with trigger_event("numba:run_pass", {"name": "waiting for another process"}):
+                time.sleep(LOOK)
+        except OSError:
+            return False
+        else:
+            return True

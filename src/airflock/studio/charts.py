@@ -1,0 +1,50 @@
+"""Charts of a page: lines over an axis that ends at round numbers and grows with what is shown."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from viser import uplot
+
+ROUND = (1.0, 2.0, 5.0, 10.0)  # times a power of ten
+PARTS = 4  # an axis ends within a part, so large, of the span that is shown
+
+
+def ends(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Round ends of an axis that holds all values, which ascend: from the first to the last, and a little more."""
+    low, high = (float(values[0]), float(values[-1])) if len(values) else (0.0, 0.0)
+    span = high - low
+    if not span > 0.0:
+        return low, low + 1.0
+    power = 10.0 ** np.floor(np.log10(span / PARTS))
+    part = next(power * step for step in ROUND if PARTS * power * step >= span * (1.0 - 1e-9))
+    return float(np.floor(low / part + 1e-9) * part), float(np.ceil(high / part - 1e-9) * part)
+
+
+class Chart:
+    """One chart of viser, whose axis is told.
+
+    Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
+    hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
+    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed.
+    """
+
+    def __init__(self, handle: Any):
+        self._handle = handle
+        self._ends: tuple[float, float] | None = None
+
+    @property
+    def data(self) -> tuple[NDArray[np.float64], ...]:
+        """(time or what else is across, *values), one array a line, all of one length."""
+        return tuple(self._handle.data)
+
+    @data.setter
+    def data(self, columns: tuple[NDArray[np.float64], ...]) -> None:
+        if (told := ends(columns[0])) != self._ends:
+            self._ends = told
+            self._handle.scales = {"x": uplot.Scale(time=False, range=told)}
+        self._handle.data = columns
+
+    def remove(self) -> None:
+        """Take it from the page."""
+        self._handle.remove()
