@@ -9,7 +9,7 @@ BAD = {
     "wing.span": (0.0, "wing.span = 0 m lies outside [0.01, 100] m"),
     "wing.weight": (0.0, "wing.weight = 0 N lies outside"),
     "wing.speed": (0.0, "wing.speed = 0 m/s lies outside [0.1, 300] m/s"),
-    "wing.segments": ("1", "wing.segments = '1' is none of 5, 9, 10, 20, 40, 80"),
+    "wing.segments": ("2", "wing.segments = '2' is none of 1, 5, 9, 10, 20, 40, 80"),
     "wing.cl_max": (0.5, "the wing stalls, its lift coefficient of 0.925 is beyond wing.cl_max = 0.5"),
     "start.spacing_x": (0.2, "the wings of agents 0 and 1 overlap by"),
     "wing.positions": ("grid", "model.gradient = 'analytic' is a derivative; it needs wing.positions = 'free'"),

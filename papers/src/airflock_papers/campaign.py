@@ -23,6 +23,7 @@ from airflock_papers.statements import load
 from airflock_papers.texts import texts
 
 COMMITTED = "breaks.csv"
+UNMADE = "not made yet"  # in the table: a change that nobody has flown so far
 # flights per number where those of the quick form are too few to show that a claim holds beforehand
 SEEDS = {
     ("vasarhelyi_2018", "s2"): 40,
