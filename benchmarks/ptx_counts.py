@@ -1,6 +1,6 @@
 """What kernels of a GPU are made of, counted in their PTX: no GPU is needed, and no speed is told.
 
-    python benchmarks/kernels.py [--capability 8.0] [KERNEL ...]
+    python benchmarks/ptx_counts.py [--capability 8.0] [KERNEL ...]
 
 The kernels are those of `tests/unit/test_ptx.py`. Instructions are all lines of the text that do something, each once;
 doubles are those that name `.f64`; local memory is what a thread keeps beyond its registers by the text, in bytes.
