@@ -188,6 +188,9 @@ def test_moments_of_other_flights_are_refused(scenario):
     moment = airflock.open(scenario, 4).snapshot()
     with pytest.raises(FlightError, match="not of this flight"):
         airflock.open(scenario, 4).restore(moment)
+    for other in (None, 3, "moment", (1, 2)):
+        with pytest.raises(FlightError, match="is not what snapshot\\(\\) of a flight returns"):
+            airflock.open(scenario, 3).restore(other)
 
 
 # ---------------------------------------------------------------------------------------------------------- changes

@@ -197,6 +197,16 @@ def test_what_is_wrong_for_all_laws_is_said_once_and_files_name_their_import(tmp
     assert "--scale" in str(fault.value)
 
 
+def test_held_out_steps_have_a_density_that_one_wild_step_does_not_decide():
+    z = np.linspace(-400.0, 400.0, 400_001)
+    density = np.exp(-select.surprises(z))
+    assert density.sum() * (z[1] - z[0]) == pytest.approx(1.0, abs=1e-6)
+    near = np.abs(z) < 2.0
+    normal = np.exp(-0.5 * z[near] ** 2) / np.sqrt(2.0 * np.pi)
+    assert density[near] == pytest.approx(normal, rel=2e-3)
+    assert select.surprises(np.array([30.0]))[0] < 15.0  # 451 by a normal density alone
+
+
 def test_the_best_is_named_with_its_doubts():
     def law(name, gain, missed, surprise):
         return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))

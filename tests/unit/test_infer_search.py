@@ -24,7 +24,7 @@ from airflock.infer.fit import (
 from airflock.infer.flights import Noise
 from airflock.infer.likelihood import Model
 from airflock.infer.ridges import ridges
-from airflock.infer.search import drawn, profile, race, usual
+from airflock.infer.search import drawn, groups, hills, profile, race, usual
 from airflock.infer.told import simplify, telling
 
 STEPS, NOISE = 400, 0.05
@@ -96,6 +96,23 @@ def test_a_valley_is_crossed_where_the_others_follow():
     best = climb(model, np.array(truth), [0, 1])
     assert wrong.loss > best.loss + 20.0
     assert profile(model, wrong, [0], quietly).loss < best.loss + 1.0
+
+
+def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_anew():
+    def law(x, a, b, slope):  # two hills of a and b together, the farther one higher; beyond 0.5 slope acts alone
+        height = np.exp(-150.0 * ((a - 0.8) ** 2 + (b - 0.2) ** 2)) + 0.5 * np.exp(
+            -150.0 * ((a - 0.3) ** 2 + (b - 0.7) ** 2)
+        )
+        return np.where(x < 0.5, height * x, slope * (x - 0.5))
+
+    truth = (0.8, 0.2, 0.6)
+    model = Line(law, ("a", "b", "slope"), truth)
+    beside = climb(model, np.array([0.31, 0.69, 0.5]), [0, 1, 2])
+    best = climb(model, np.array(truth), [0, 1, 2])
+    assert beside.loss > best.loss + 20.0
+    assert profile(model, beside, [0], quietly).loss > best.loss + 20.0
+    assert groups(model, beside, [0]) == [[0, 1]]
+    assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
 
 
 def test_what_is_usual_stays_until_the_rest_is_found():

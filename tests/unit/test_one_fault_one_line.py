@@ -38,6 +38,10 @@ def test_a_law_by_its_bare_name_is_one_line(tmp_path):
     assert faults(tmp_path, 'model = "vicsek_1995"') == [table]
 
 
+def test_a_key_of_the_top_that_stands_in_a_section_is_told_its_place(tmp_path):
+    assert faults(tmp_path, "[flight]\ndt = 0.01") == ["flight.dt: unknown key; did you mean dt?"]
+
+
 def test_what_the_kind_that_cannot_be_had_shares_with_all_is_judged(tmp_path):
     assert faults(tmp_path, '[sensors]\nkind = "gps"\nperiod = 99.0\nsd = 1.5') == [
         "sensors.kind = 'gps': unknown sensor; did you mean gnss?",

@@ -42,6 +42,19 @@ def test_a_show_is_one_flight_and_its_recording_is_scored(interpreted, failure, 
     assert values["n_coll"] == sum(formed.collisions for formed in found.formed)
 
 
+def test_faults_of_the_scenario_fly_in_a_show(interpreted, seed):
+    """Once, at their time, and one who drops out by itself is missed like the others."""
+    entries = [
+        {"kind": "pretender", "at": 1.0, "lasts": 1.0, "agents": [2], "east": 9.0},
+        {"kind": "fails", "at": 2.0, "agents": [4]},
+    ]
+    shapes = [points_of(text, 6, seed=number) for number, text in enumerate("AO")]
+    found = fly_show(shapes, 6, 0.17, "fall", seed, {"faults": entries})
+    begun = [(fault["kind"], fault["agent"]) for fault in found.flight.faults]
+    assert begun == [("pretender", 2), ("fails", 4)]
+    assert [formed.drones for formed in found.formed] == [4, 4] and not found.flight.present[4]
+
+
 def test_what_a_change_leaves_alone_goes_on_on_its_way(seed):
     """Goals that are under way, and packets: a number that nothing reads changes no bit."""
     plain, changed = opened(4, seed), opened(4, seed)

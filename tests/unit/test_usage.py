@@ -18,6 +18,8 @@ from airflock.plots.picture import KINDS
         ("xyzzy", "xyzzy: unknown command; airflock --help lists them"),
         ("--hlep", "--hlep: unknown option; did you mean --help?"),
         ("run x --sed 3", "run: --sed: unknown option; did you mean --seeds?"),
+        ("import x.csv --out y.nc", "import: --out: unknown option; did you mean --save?"),
+        ("evolve x --output y", "evolve: --output: unknown option; did you mean --out?"),
         ("run x --zzz", "run: --zzz: unknown option; airflock run --help lists them"),
         ("run x --seeds 0", "run: --seeds 0 lies outside [1, 1000000]"),
         ("run x --seeds=-3", "run: --seeds -3 lies outside [1, 1000000]"),

@@ -6,6 +6,8 @@ from typing import Any
 
 from airflock.spelling import meant
 
+PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
+
 
 def usage_fault(fault: Any, words: Sequence[str]) -> str:
     """One line for what typer refuses; `words` are those of the command line.
@@ -22,7 +24,9 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
     parameter = getattr(fault, "param", None)
     if kind == "NoSuchOption":
         known = [name for one in context.command.params for name in one.opts] if context is not None else []
-        return f"{fault.option_name}: unknown option{_near(fault.option_name, [*known, '--help'], context)}"
+        same = [name for name in PLACES if name in known and fault.option_name in (*PLACES, "--output")]
+        hint = f"; did you mean {same[0]}?" if same else _near(fault.option_name, [*known, "--help"], context)
+        return f"{fault.option_name}: unknown option{hint}"
     unknown = re.match(r"No such command '(.*?)'", message)
     if unknown is not None:
         return f"{unknown[1]}: unknown command{_near(unknown[1], list(context.command.commands), context)}"

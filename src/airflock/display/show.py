@@ -136,7 +136,7 @@ class _Master:
         start[:3] = ranks(drones).T
         keys: dict[str, Any] = {"goals.points": self._aims(), "duration": PATIENCE}
         if comes_and_goes:  # one driver for the whole show
-            keys["faults"] = [{"kind": "fails", "per_hour": 0.0}]
+            keys["faults"] = [*scenario.document.get("faults", ()), {"kind": "fails", "per_hour": 0.0}]
         self.flight = Flight(remade(scenario, keys), seed, precision=64, record=True, start=start)
 
     def form(self, points: Frames, failures: list[tuple[int, str, float]]) -> None:

@@ -9,7 +9,8 @@ from airflock.engine.beginnings import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan
-from airflock.engine.state import BEGUN, State
+from airflock.engine.stages.flight import BEGUN
+from airflock.engine.state import State
 
 
 def carry(old: State, new: State, step: int) -> None:

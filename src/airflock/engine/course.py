@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock import __version__
 from airflock.engine import cpu, failure
+from airflock.engine.aside import compile_aside
 from airflock.engine.carry import carry
 from airflock.engine.drivers import flying, is_compiled
 from airflock.engine.moments import Snapshot, Window
@@ -74,9 +75,12 @@ class Course:
         """Whether the driver in force flies at once."""
         return is_compiled(self.state.driver)
 
-    def compile(self) -> None:
-        """Have it compiled."""
-        self.state.compile()
+    def compile(self, aside: bool = False) -> None:
+        """Have it compiled, here or by another process."""
+        if aside:
+            compile_aside(self.state)
+        else:
+            self.state.compile()
 
     def advance(self, last: int) -> None:
         """Fly all steps before `last`, and keep their samples."""
@@ -145,7 +149,7 @@ class Course:
         """The state that is to take over, written and compiled aside; interpreted, it is written at once."""
         if self.device == "python":
             return in_background(self._opened(scenario, absence).compile)
-        return in_background(lambda: self._opened(scenario, absence).compile())
+        return in_background(lambda: compile_aside(self._opened(scenario, absence)))
 
     def take_over(self) -> None:
         """Take the change over that has been compiled meanwhile."""
@@ -212,6 +216,8 @@ class Course:
 
     def restore(self, moment: Snapshot) -> None:
         """Go back (or on) to a moment of this course or of a twin of it. Raises FlightError for any other."""
+        if not isinstance(moment, Snapshot):
+            raise FlightError(f"snapshot = {moment!r} is not what snapshot() of a flight returns")
         if moment.version != __version__:
             raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
         if moment.origin is not self.origin:

@@ -72,9 +72,12 @@ class Flight(Acting):
         """Whether it flies at once; otherwise its driver is compiled first."""
         return self._course.ready
 
-    def compile(self) -> "Flight":
-        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it."""
-        self._course.compile()
+    def compile(self, *, aside: bool = False) -> "Flight":
+        """Have its driver compiled, and fly nothing; in any thread, while nothing else is asked of it. Returns it.
+
+        aside : by another process, so that no other thread of this one is held up meanwhile
+        """
+        self._course.compile(aside)
         return self
 
     def advance(self, seconds: float | None = None, *, steps: int | None = None) -> "Flight":

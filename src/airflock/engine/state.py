@@ -17,6 +17,7 @@ from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
+from airflock.engine.stages.flight import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
 from airflock.engine.striking import strike
 from airflock.engine.tables import Tables, tables
@@ -25,9 +26,6 @@ from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
 
 AGENTS, RING = WHOLE.index("agents"), WHOLE.index("ring")
-ENDED = 3  # place in `held` of the mark that the flight has ended at a collision
-GAP = 1  # place in `held` of how far agents may come before pairs must be looked at again, m
-BEGUN = 4  # place in `held` of the mark that agents have their places
 
 
 class State:
@@ -70,10 +68,15 @@ class State:
             tuple(np.zeros(size, real) if spare else own[name] for name, size, spare in parts) for parts in scratch
         )
         self.cells = grid.memory(plan, agents, aligned_zeros)
-        self._given = self._arguments()
+        self._given = self._arrays()
 
-    def _arguments(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """What the driver is called with before and after the frames; the arrays stay the same all flight long."""
+    def arguments(self, first: int, last: int, half: int = 0, frames: NDArray[Any] | None = None) -> tuple[Any, ...]:
+        """What the driver is called with."""
+        before, after = self._given
+        return first, last, half, *before, self.no_frames if frames is None else frames, *after
+
+    def _arrays(self) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Arguments before and after the frames; they stay the same all flight long."""
         own, tables = self.arrays, self.tables
         before = (
             own["held"], own["row"], own["whole"], tables.faces, tables.edges, tables.spans, self.scene, self.start,
@@ -105,6 +108,8 @@ class State:
 
         It stops on the way where a fault is due. What is due at a step is done before it is flown or sensed.
         """
+        if not self.tables.due:
+            return self._fly(first, last, half, frames)
         due = sorted({onset.step for onset in self.tables.due if first <= onset.step < last})
         step, skipped, every = first, -(-first // self.whole("sample_every")), self.whole("sample_every")
         for stop in [*(step for step in due if step > first or not half & 1), last]:
@@ -133,11 +138,8 @@ class State:
         if few and not self.here:
             self.arrays["there"][1] += self.agents * (last - first)  # time passes
             return last
-        before, after = self._given
         kept = self.arrays["sums"].copy() if few else None
-        done = int(
-            self.driver.advance(first, last, half, *before, self.no_frames if frames is None else frames, *after)
-        )
+        done = int(self.driver.advance(*self.arguments(first, last, half, frames)))
         if kept is not None:
             self.arrays["sums"][:] = kept
         if self.plan.absence and not half & 2:

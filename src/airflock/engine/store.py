@@ -38,6 +38,7 @@ def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
         path = _written(spare() / DRIVERS / digest, label, text)
     module = ModuleType(name)
     module.__file__ = str(path)
+    module.TEXT = text  # type: ignore[attr-defined]
     sys.modules[name] = module
     exec(compile(text, path, "exec"), vars(module))  # our own text, and not what the file may hold by now
     seal(module, digest)

@@ -45,13 +45,6 @@ class Score:
         n = float(self.count.sum())
         return float(self.along.sum()) / n, float(self.across.sum()) / (n * (self.axes - 1))
 
-    def surprise(self, along: float, across: float) -> Array:
-        """Negative log-likelihood of each span at given variances."""
-        k = self.axes - 1
-        constant = math.log(along) + k * math.log(across) + self.axes * math.log(2.0 * math.pi)
-        found: Array = 0.5 * (self.count * constant + self.along / along + self.across / across)
-        return found
-
 
 class Model:
     """A law (or none) with the numbers that are fitted, on the tracks.

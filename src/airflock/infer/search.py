@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import WIDE, Fit, climb, curvature, followed, loss_at
+from airflock.infer.fit import FINE, WIDE, Fit, climb, curvature, followed, jacobian, loss_at
 from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
@@ -22,6 +22,12 @@ SCAN = 10  # places along the range of one number
 PROFILE, FOLLOW = 6, 2  # the same while the others follow, by so many steps
 SWEEPS = 3  # of all numbers
 BETTER = 1.0  # loss that a move has to gain
+TOGETHER = 4  # numbers that are drawn anew together, at most
+ALIKE = 0.5  # overlap of where two numbers act, from which they are
+GROUPS = 3  # of them, those told worst first
+REDRAWN = 8  # two to the power of this: places of a group that are looked at
+NEARLY = 3.0  # loss above the fit on few frames, up to which a hill is climbed on all
+REGROUPED = ((8, 6), (3, 10))  # how many climb, by how many steps: the group alone, then all numbers
 
 
 def usual(model: Model) -> list[int]:
@@ -102,6 +108,47 @@ def profile(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None
         if best.loss > before - BETTER:
             break
     return best
+
+
+def hills(model: Model, fit: Fit, few: Sequence[int], spans: Sequence[int], say: Callable[[], None]) -> Fit:
+    """The fit, or a better one elsewhere for numbers that act together, such as those of a wall.
+
+    Such numbers have several hills, with valleys between that no single number crosses. The rest of the law is known by
+    now, so places of these few numbers, spread over their whole ranges, tell where else to climb.
+
+    few, spans : on which is looked, and on which is fitted
+    """
+    from scipy.stats import qmc
+
+    for group in groups(model, fit, few):
+        places = np.tile(fit.place, (2**REDRAWN, 1))
+        places[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
+        for (count, steps), free in zip(REGROUPED, (group, fit.free), strict=True):
+            places = np.array(sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[:count])
+            places = np.array([climb(model, u, free, few, steps, slopes=(WIDE,)).place for u in places])
+        highest = loss_at(model, fit.place, fit.free, few) + NEARLY
+        likely = [u for u in places if loss_at(model, u, fit.free, few) < highest]
+        found = [climb(model, u, fit.free, spans, REGROUPED[1][1], slopes=(WIDE, FINE)) for u in likely]
+        fit = min([fit, *found], key=lambda each: each.loss)
+        say()
+    return fit
+
+
+def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
+    """Groups of named numbers that act on the same steps, around those that are told worst."""
+    named = [k for k in fit.free if k < model.named]
+    slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
+    flat = slopes.reshape(-1, len(named))
+    sizes = np.maximum(np.linalg.norm(flat, axis=0), 1e-30)
+    overlap = (flat.T @ flat) / np.outer(sizes, sizes)
+    errors = np.diag(np.linalg.inv(curvature(model, fit, spans)))[[fit.free.index(k) for k in named]]
+    found: list[list[int]] = []
+    for k in np.argsort(-errors).tolist():
+        near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
+        group = sorted(named[f] for f in (k, *near))
+        if near and not any(named[k] in other for other in found) and len(found) < GROUPS:
+            found.append(group)
+    return found
 
 
 def _moved(place: Array, number: int, x: float) -> Array:

@@ -40,10 +40,15 @@ def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[di
             made[section] = {**overruled(made[section], {name: value}), name: value}
         else:
             made[section] = value
-    for key in made:
-        if key not in TOP:
-            faults.append(f"{key}: unknown key; {meant(key, TOP, 'known: ' + ', '.join(TOP))}")
-    return made, faults
+    return made, faults + [_unknown(key, value) for key, value in made.items() if key not in TOP]
+
+
+def _unknown(key: str, value: object) -> str:
+    """A line about a key that no scenario has; of a section, such as `flight`, in which a key of the top stands."""
+    above = next((name for name in value if name in TOP), None) if isinstance(value, Mapping) else None
+    if above is not None:
+        return f"{key}.{above}: unknown key; did you mean {above}?"
+    return f"{key}: unknown key; {meant(key, TOP, 'known: ' + ', '.join(TOP))}"
 
 
 def understood(document: dict[str, Any], section: str, record: type) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import hashlib
 import inspect
 import json
 from importlib import util
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import FunctionType, ModuleType
 
@@ -39,11 +40,11 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
             [f"{told}: would run the code in {path.absolute()}; if you trust it, add --trust (in Python: trust=True)"]
         )
     spec = util.spec_from_file_location(path.stem, path)
-    if spec is None or spec.loader is None:
+    if spec is None or not isinstance(spec.loader, SourceFileLoader):
         raise ScenarioError([f"{told}: is not a Python file"])
     module = util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
+    try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
+        exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
     except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
         reason = bounded(" ".join(str(fault).split()))
         raise RuleError(f"{path}: {type(fault).__name__}: {reason}") from fault

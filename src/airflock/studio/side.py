@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ class Side:
         self.preset, self.flight = origin.flight(seed)
         self._compiled: Future[Flight] | None = None
         if at_once and origin.recording is None and self.flight.agents <= MOST_AT_ONCE and not self.flight.ready:
-            self._compiled = in_background(self.flight.compile)
+            self._compiled = in_background(partial(self.flight.compile, aside=True))
             _, self.flight = origin.flight(seed, "python")
         self.changed: dict[str, Any] = {}
         self._before: list[dict[str, Any]] = []

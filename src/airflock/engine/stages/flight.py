@@ -14,6 +14,7 @@ Stages = Mapping[str, Callable[..., Any]]  # by name: each takes what it asks fo
 Order = Mapping[str, tuple[str, ...]]  # stages of each event that a plan has (`engine.schedule`)
 Sampled = Iterable[tuple[int, str]]  # places among all values, and how they add up over time
 EVERY = 64  # decisions from one rearrangement to the next; a boid crosses about a cell meanwhile
+TRAVELLED, GAP, CALM, ENDED, BEGUN = range(5)  # places in `held` (`passes.driver.flight` says what each is)
 SLACK = 0.01  # m, covers the rounding of positions in single precision
 
 
@@ -85,7 +86,7 @@ def prepare(
     if order["send"]:
         for slot in range(whole.ring):
             ask(stages["snapshot"], slot=slot, ring=past)
-    held[4] = ONE
+    held[BEGUN] = ONE
 
 
 def sense(
@@ -120,14 +121,14 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     slots      : whether agents lie in slots
     """
     late = real(whole.delay) * numbers.c.dt
-    if held[4] < HALF:
+    if held[BEGUN] < HALF:
         status = ask(stages["begin"])
         if status < 0:
             return status  # type: ignore[no-any-return]
         prepare(held, flock, whole, m, past, stages=stages, order=order, slots=slots)
-    travelled = held[0]
-    gap = held[1]
-    calm = held[2] > HALF
+    travelled = held[TRAVELLED]
+    gap = held[GAP]
+    calm = held[CALM] > HALF
     fastest = ZERO
     following = last
     for step in range(first, last):
@@ -153,7 +154,7 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                 else:
                     take(name, time, values, sums, stages=stages, sampled=sampled)
         if plan.stop and values[collided] > HALF:
-            held[3] = ONE
+            held[ENDED] = ONE
             following = step
             break
         if step % whole.sample_every == 0:
@@ -163,9 +164,9 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
         if step < whole.steps:
             fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt
-    held[0] = travelled
-    held[1] = gap
-    held[2] = ONE if calm else ZERO
+    held[TRAVELLED] = travelled
+    held[GAP] = gap
+    held[CALM] = ONE if calm else ZERO
     return following
 
 

@@ -6,8 +6,9 @@ from typing import Any
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
+from airflock.engine.stages.air import crowd, shade
 from airflock.engine.stages.pair import ADD, BOTH, HEAR, pair
-from airflock.engine.stages.receive import crowd, first_of_four, sent, shade
+from airflock.engine.stages.receive import first_of_four, sent
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     LIMIT,

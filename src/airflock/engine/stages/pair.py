@@ -8,16 +8,15 @@ from airflock.core import random
 from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.engine.plan import Plan
+from airflock.engine.stages.air import carries, unshaded
 from airflock.engine.stages.receive import (
     believed,
     by_clock,
     carried,
-    carries,
     hear,
     newest,
     on_record,
     unheard,
-    unshaded,
     word_of,
 )  # fmt: skip
 from airflock.engine.stages.state import Flock

@@ -1,0 +1,33 @@
+"""One driver compiled and kept by a process of its own; `engine.aside` starts it. Nobody imports this file.
+
+What it is asked for comes by its standard input: the text of a driver, which holds every rule, so that no file of
+anybody's is run. The input stays open; its end means that whoever asked has gone.
+"""
+
+import json
+import os
+import pickle
+import sys
+from threading import Thread
+
+
+def main() -> None:
+    """Compile what is asked for."""
+    asked = json.loads(sys.stdin.readline())
+    Thread(target=_end_with_the_input, daemon=True).start()
+    sys.path[:] = asked["paths"]
+    from airflock.engine.store import load_driver
+
+    driver = load_driver(asked["text"], asked["label"])
+    driver.advance.compile(pickle.loads(bytes.fromhex(asked["types"])))
+
+
+def _end_with_the_input() -> None:
+    """Wait for the end of the input, and end this process at once."""
+    while os.read(sys.stdin.fileno(), 1):
+        continue
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

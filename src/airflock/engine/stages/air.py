@@ -1,0 +1,69 @@
+"""Air: what the true places of agents say of their packets: how far they carry, how many talk, what shades them."""
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from airflock.engine.plan import Plan
+from airflock.engine.stages.meet import free_way
+from airflock.engine.stages.state import Flock
+from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, X, Y, Z, choose, integer, least, vector
+from airflock.world.edges import nearest_image
+
+
+def carries(i: int, j: int, range2: Any, flock: Flock, *, plan: Plan) -> Any:
+    """Square of how far packets of agent j carry to agent i, m²; who is seen need not send."""
+    return (
+        range2
+        if not plan.suffers("radio")
+        else least(range2, flock.reach_in[i])
+        if plan.sees
+        else least(least(range2, flock.reach_in[i]), flock.reach_out[j])
+    )
+
+
+def apart(there: Any, here: Any, a: int, w: Any, *, plan: Plan) -> Any:
+    """Offset between two coordinates along one axis, to the nearest image, m."""
+    return nearest_image(there - here, getattr(w, SIDES[a])) if plan.periodic else there - here
+
+
+def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
+    """How many others are truly within the range of the radio of agent i."""
+    talkers = ZERO
+    for j in others:
+        o = vector()
+        for a in range(plan.dimensions):
+            o[a] = apart(flock.position[a][j], flock.position[a][i], a, w, plan=plan)
+        audible = sum(o[a] * o[a] for a in range(plan.dimensions)) <= range2
+        talkers = talkers + choose(audible & (integer(j) != integer(i)), ONE, ZERO)
+    return talkers
+
+
+def shade(
+    i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any,
+    *, plan: Plan,
+) -> None:  # fmt: skip
+    """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
+    for j in others:
+        open_way = unshaded(i, j, range2, flock, w, whole, edges, spans, scene, plan=plan)
+        flock.clear[j] = open_way
+
+
+def unshaded(
+    i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan
+) -> Any:
+    """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
+    x = flock.position
+    open_way = ONE
+    o = vector()
+    for a in range(plan.dimensions):
+        o[a] = apart(x[a][j], x[a][i], a, w, plan=plan)
+    apart2 = sum(o[a] * o[a] for a in range(plan.dimensions))
+    if (apart2 <= range2) & (integer(j) != integer(i)):
+        r = math.sqrt(apart2 + TINY)
+        ux = o[X] / r
+        uy = o[Y] / r
+        uz = o[Z] / r
+        free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
+        open_way = ZERO if free < r else ONE
+    return open_way
