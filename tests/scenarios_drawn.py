@@ -22,6 +22,7 @@ from airflock.core.topology import topology as topology_of_ones_own
 from airflock.errors import ScenarioError
 from airflock.faults.registry import KINDS
 from airflock.radios.registry import RADIOS
+from airflock.scenarios.families import Given
 from airflock.scenarios.laws import MODELS, find_model
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -80,7 +81,7 @@ def drawn(rng: Random) -> Draw:
         keys, start = settings(rng)
         try:
             own = OWN_TOPOLOGY if keys.get("topology.kind") == OWN_TOPOLOGY.name else None
-            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys, own_topology=own)
+            found = make({"model": {"kind": keys["model.kind"]}}, "drawn", keys, given=Given(own_topology=own))
         except ScenarioError:
             continue  # a crowd without room, or a goal inside a building: the border says so, and it draws again
         return Draw(found, rng.randrange(2**32), start, keys)

@@ -673,7 +673,7 @@ def test_a_fault_is_an_event_and_back_takes_it_away(interpreted, player):
 def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp_path, monkeypatch):
     monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: flight.device == "python"))
     compiled, go = Flight.compile, threading.Event()
-    monkeypatch.setattr("airflock.engine.Flight.compile", lambda flight: go.wait() and compiled(flight))
+    monkeypatch.setattr("airflock.engine.Flight.compile", lambda flight, **how: go.wait() and compiled(flight, **how))
     player = Player(PRESET, FEW, 3, at_once=True)
     player.start()
     assert player.compiling and "compiling" in player.status and player.flight.device == "python"
@@ -699,7 +699,7 @@ def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp
 
 
 def test_what_the_compiler_refuses_stops_a_flight_that_has_begun(monkeypatch):
-    def refuse(flight):
+    def refuse(flight, *, aside):
         raise RuleError("model m: a rule does not compile")
 
     monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: False))

@@ -19,13 +19,14 @@ def sums_of(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def combined(plan: Plan, sums: NDArray[np.float64]) -> dict[str, float]:
-    """Named order parameters from the sums over time."""
+    """Named order parameters from the sums over time, which end with the counts of both clocks; more may follow."""
+    found = _columns(plan)
     totals: list[float] = sums.tolist()  # numbers of Python's are divided in a fifth of the time
-    *own_totals, samples, looks = totals
+    samples, looks = totals[len(found) : len(found) + 2]
     counts = {"sample": max(samples, 1.0), "collision": max(looks, 1.0)}
     over_time = {
         name: total / counts[when] if how == "mean" else total
-        for total, (name, how, when) in zip(own_totals, _columns(plan), strict=True)
+        for total, (name, how, when) in zip(totals, found, strict=False)
     }
     named: dict[str, float] = {}
     for metric in plan.metrics:

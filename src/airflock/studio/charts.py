@@ -8,14 +8,15 @@ from viser import uplot
 
 ROUND = (1.0, 2.0, 5.0, 10.0)  # times a power of ten
 PARTS = 4  # an axis ends within a part, so large, of the span that is shown
+LEAST = 1e-9  # a span below this share of its ends is none
 
 
 def ends(values: NDArray[np.float64]) -> tuple[float, float]:
     """Round ends of an axis that holds all values, which ascend: from the first to the last, and a little more."""
     low, high = (float(values[0]), float(values[-1])) if len(values) else (0.0, 0.0)
     span = high - low
-    if not span > 0.0:
-        return low, low + 1.0
+    if not span > LEAST * max(abs(low), abs(high), 1.0):
+        return low, high + 1.0
     power = 10.0 ** np.floor(np.log10(span / PARTS))
     part = next(power * step for step in ROUND if PARTS * power * step >= span * (1.0 - 1e-9))
     return float(np.floor(low / part + 1e-9) * part), float(np.ceil(high / part - 1e-9) * part)
