@@ -8,7 +8,7 @@ import pytest
 import airflock
 import airflock_papers
 from airflock.errors import AirflockError
-from airflock_papers import breaks, campaign, quick, statistics
+from airflock_papers import breaks, campaign, committed, quick, statistics
 from airflock_papers.claims import Claim, Measured, read_claims
 from airflock_papers.flights import Flights, scenario_keys, with_changes
 from airflock_papers.paper import Paper
@@ -194,5 +194,5 @@ def test_a_campaign_goes_on_where_it_was_cut_off_and_tells_what_got_worse(tmp_pa
     lost = [rows[0]._replace(result=breaks.UNSHOWN), rows[1]._replace(result=breaks.GREEN)]
     assert campaign.worse(rows, lost) == lost
     assert campaign.worse(lost, lost) == lost[1:]  # what was never seen red cannot get worse, what still holds is told
-    campaign.write(rows, tmp_path / "breaks.csv")
+    committed.write(campaign.Row._fields, rows, tmp_path / "breaks.csv")
     assert (tmp_path / "breaks.csv").read_text().splitlines()[1] == ",".join(rows[0])

@@ -5,18 +5,15 @@ off goes on where it stopped. `python -m airflock_papers.campaign FOLDER` flies 
 `airflock paper all --breaks` compares.
 """
 
-import csv
-import io
 import json
 from collections.abc import Callable, Iterable, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
 from airflock.doors import TextError, json_object, read_text
-from airflock.errors import AirflockError
 from airflock_papers import PAPERS, breaks
+from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.quick import teller
 from airflock_papers.statements import load
@@ -93,11 +90,7 @@ def committed() -> list[Row]:
 
     Raises AirflockError if there is nothing.
     """
-    try:
-        text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
-    except OSError as fault:
-        raise AirflockError(f"{COMMITTED}: {fault.strerror}; `python -m airflock_papers.campaign` writes it") from fault
-    return [Row(**row) for row in csv.DictReader(io.StringIO(text))]
+    return [Row(**row) for row in tables.read(COMMITTED, "python -m airflock_papers.campaign")]
 
 
 def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Row]:
@@ -109,21 +102,5 @@ def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Row]:
     ]  # fmt: skip
 
 
-def write(rows: Sequence[Row], path: Path) -> None:
-    """Write what came of the changes as a table, complete or not at all."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(Row._fields)
-    table.writerows(rows)
-    atomic.write(path, text.getvalue())
-
-
 if __name__ == "__main__":
-    import argparse
-    import sys
-
-    parser = argparse.ArgumentParser(description="Make the change of every claim and commit what comes of it.")
-    parser.add_argument("folder", type=Path, help="where what is done is kept")
-    asked = parser.parse_args()
-    rows = fly(asked.folder, lambda line: print(line, file=sys.stderr))  # noqa: T201
-    write(rows, Path(str(resources.files("airflock_papers"))) / COMMITTED)
+    tables.renew("Make the change of every claim and commit what comes of it.", COMMITTED, Row._fields, fly)

@@ -4,19 +4,16 @@ A part that is done is kept in a folder with a hash of all texts that decide a f
 goes on where it stopped. `python -m airflock_papers.quick` flies everything and commits what it finds.
 """
 
-import csv
-import io
 import json
 import time
-from collections.abc import Callable, Iterable, Sequence
-from importlib import resources
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
 from airflock.doors import TextError, json_object, read_text
-from airflock.errors import AirflockError
 from airflock_papers import PAPERS
+from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
 from airflock_papers.texts import texts
 
@@ -112,11 +109,8 @@ def committed() -> list[Verdict]:
 
     Raises AirflockError if there are none.
     """
-    try:
-        text = resources.files("airflock_papers").joinpath(COMMITTED).read_text(encoding="utf-8")
-    except OSError as fault:
-        raise AirflockError(f"{COMMITTED}: {fault.strerror}; `python -m airflock_papers.quick` writes it") from fault
-    return [Verdict(**row | {"ours": float(row["ours"])}) for row in csv.DictReader(io.StringIO(text))]  # type: ignore[arg-type]
+    rows = tables.read(COMMITTED, "python -m airflock_papers.quick")
+    return [Verdict(**row | {"ours": float(row["ours"])}) for row in rows]  # type: ignore[arg-type]
 
 
 def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed]:
@@ -127,21 +121,5 @@ def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed
     return [Changed(*key, old.get(key, ""), new.get(key, "")) for key in keys if old.get(key, "") != new.get(key, "")]
 
 
-def write(rows: Sequence[Verdict], path: Path) -> None:
-    """Write verdicts as a table, complete or not at all."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(Verdict._fields)
-    table.writerows(rows)
-    atomic.write(path, text.getvalue())
-
-
 if __name__ == "__main__":
-    import argparse
-    import sys
-
-    parser = argparse.ArgumentParser(description="Fly the small form of every page and commit its verdicts.")
-    parser.add_argument("folder", type=Path, help="where what is done is kept")
-    asked = parser.parse_args()
-    rows = fly(asked.folder, lambda line: print(line, file=sys.stderr))  # noqa: T201
-    write(rows, Path(str(resources.files("airflock_papers"))) / COMMITTED)
+    tables.renew("Fly the small form of every page and commit its verdicts.", COMMITTED, Verdict._fields, fly)

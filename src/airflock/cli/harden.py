@@ -77,9 +77,9 @@ def harden(
         stricter = (r_coll or 1.0, delay or 1.0)
         steps = _evolved_again(scenario, found[0], stricter, generations, out, numbers, threads, as_json)
     else:
-        from airflock.evolve.harden import harden
+        from airflock.evolve.harden import MOST, harden
 
-        with options.progress(f"{scenario}: flights", 19 * seeds * len(found), quiet=as_json) as done:  # at most
+        with options.progress(f"{scenario}: flights", MOST * seeds * len(found), quiet=as_json) as done:
             steps = harden(found, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
     for each, place in zip(found, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")

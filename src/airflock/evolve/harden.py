@@ -38,6 +38,7 @@ SLACK = 0.02  # by which the mean of one may fall, and the share of flights with
 COST = 0.05  # of fitness, at most
 WALLS = ("clearance", "phi_wall", "n_contacts")  # scores of what flies into walls and obstacles
 ROUNDS = 3  # of fresh seeds: 4 % of flights with a contact pass 60 seeds in 30 % of all cases, 180 in 7 %
+MOST = 19  # rounds of flights, with all whole and half steps and the fresh seeds
 RESERVE = Search().reserve  # how many times rarer than allowed an event is to look, as in a search
 
 
