@@ -149,8 +149,8 @@ def study_of(
 ) -> Study:
     """The study that `evolve` is asked for."""
     if isinstance(what, Study):
-        asked = {"settings": settings, "space": space, "objective": objective, "fitness": fitness, "limit": limit}
-        asked |= {"over_scenarios": over_scenarios, "fast": fast}
+        asked: dict[str, Any] = {"settings": settings, "space": space, "objective": objective, "fitness": fitness}
+        asked |= {"limit": limit, "over_scenarios": over_scenarios, "fast": fast}
         beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
         if beside:
             said = ", ".join(beside)
