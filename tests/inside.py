@@ -46,6 +46,8 @@ MODULES = {
 NAMES = {
     "CALLED": ("compiler", "CALLED"),
     "INNER": ("compiler", "INNER"),
+    "SPARED": ("sparing", "SPARED"),
+    "implementations": ("sparing", "implementations"),
     "Flown": ("cpu", "Flown"),
     "SCRIPT": ("aside", "SCRIPT"),
     "alone": ("locked", "alone"),

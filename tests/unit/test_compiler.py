@@ -2,13 +2,16 @@
 
 import gc
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import njit
 from numba.core.errors import NumbaError
 
-from inside import CALLED, INNER
+from inside import CALLED, INNER, SPARED
 
 OPTIONS = {"fastmath": True, "error_model": "numpy", "nogil": True, "forceinline": True, "_nrt": False}
 
@@ -74,3 +77,59 @@ def test_the_garbage_collector_is_left_as_it_was():
             assert gc.get_threshold() == threshold
         finally:
             gc.set_threshold(*usual)
+
+
+def parts_of_numba():
+    return [vars(owner)[name] for owner, name, _ in SPARED]
+
+
+def test_numba_is_left_as_it_was():
+    usual = parts_of_numba()
+    rule, loop = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED)
+    loop(np.ones(3, np.float32), np.ones(3, np.float32))
+    assert parts_of_numba() == usual
+
+    @njit(**CALLED)
+    def wrong(x):
+        return x + "m"
+
+    with pytest.raises(NumbaError):
+        wrong(1.0)
+    assert parts_of_numba() == usual
+
+
+def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
+    @njit(**CALLED)
+    def of_all(xs):
+        def doubled(x):
+            return 2.0 * x
+
+        whole = 3.0 * xs + np.sqrt(xs) - xs
+        return whole.sum() + np.array([doubled(x) for x in xs]).sum()
+
+    xs = np.array([1.0, 4.0, 9.0])
+    assert of_all(xs) == 14.0 * 2.0 + 6.0 + 14.0 * 2.0
+
+
+def test_a_driver_compiles_without_scipy_and_whoever_needs_it_has_it():
+    text = """
+import sys
+import numpy as np
+from numba import njit
+from numba.core.compiler_lock import global_compiler_lock
+sys.path.insert(0, {tests!r})
+from inside import CALLED, implementations
+with global_compiler_lock:
+    implementations()
+ours = njit(lambda x: x + 1.0, **CALLED)
+assert ours(1.0) == 2.0
+assert "scipy.linalg" not in sys.modules
+from numba.np import arraymath, linalg
+assert arraymath.ensure_blas is linalg.ensure_blas is not None
+theirs = njit(lambda a, b: np.dot(a, b) + np.correlate(a, b)[0] + np.linalg.norm(a))
+a = np.array([3.0, 4.0])
+assert theirs(a, a) == 25.0 + 25.0 + 5.0
+assert "scipy.linalg" in sys.modules
+"""
+    given = text.replace("{tests!r}", repr(str(Path(__file__).parents[1])))
+    subprocess.run([sys.executable, "-c", given], check=True)

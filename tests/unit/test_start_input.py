@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from airflock.engine import fly
+from airflock.engine import driver_text, fly, plan_of
 from airflock.errors import FlightError, ScenarioError
+from airflock.scenarios.files import load
 from flocks import scenario
 
 BOUNCE = {"world__edges": "bounce", "world__side": 20.0, "duration": 0.2}
@@ -51,3 +52,12 @@ def test_a_collision_over_the_face_of_a_periodic_box_is_seen_from_the_first_step
     found = scenario("vicsek_1995", **PERIODIC, agents=2, duration=1.0, metrics__kind="vasarhelyi", metrics__r_coll=0.5)
     start = np.array([[0.0, 8.05], [0.0, 0.0], [0.01, 0.01], [0.0, 0.0]])
     assert fly(found, seed, start=start, device="python").values["n_coll"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "bounded"), [("vicsek_1995/ordered", False), ("vasarhelyi_2018/4ms", True), ("kidger/city", True)]
+)
+def test_places_are_asked_whether_they_lie_inside_where_they_may_lie_outside(name, bounded):
+    found = load(name)
+    assert plan_of(found).bounded is bounded
+    assert ("excursion(s_x" in driver_text(found)) is bounded

@@ -6,19 +6,24 @@ Here the others stay what their callers link, optimised code of LLVM (`options`)
 what it asks again and again about the same types is asked once.
 """
 
-import gc
-from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Hashable
+from types import SimpleNamespace
 from typing import Any
 
 from numba import types
+from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.imputils import RegistryLoader, builtin_registry
-from numba.core.typed_passes import NativeLowering, NopythonTypeInference
+from numba.core.runtime import rtsys  # type: ignore[attr-defined]
+from numba.core.typed_passes import NativeLowering, NopythonRewrites, NopythonTypeInference
+from numba.core.untyped_passes import InlineClosureLikes
 
-SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
+from airflock.engine.sparing import sparing
+
+LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
+ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array
 
 
 class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and below
@@ -38,7 +43,23 @@ class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and b
         return self._usual | self._values
 
 
-class InlinedLibrary(JITCodeLibrary):  # type: ignore[misc]
+class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function."""
+
+    counted = True  # whether it counts references to arrays
+
+    def add_linking_library(self, library: Any) -> None:
+        """Link another one; that which counts references only where any are counted."""
+        if self.counted or library is not rtsys.library:
+            super().add_linking_library(library)
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+        written = [found for found in module.functions if not found.is_declaration]
+        super()._optimize_functions(SimpleNamespace(functions=written))
+
+
+class InlinedLibrary(DriverLibrary):
     """Code of a function that only compiled functions call: optimised, and never turned into machine code."""
 
     def _finalize_final_module(self) -> None:
@@ -48,15 +69,29 @@ class InlinedLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
-class InlinedLowering(NativeLowering):  # type: ignore[misc]
+class Lowering(NativeLowering):  # type: ignore[misc]
+    """Lowering of a function of a driver."""
+
+    _name = "driver_lowering"
+    _library: type[DriverLibrary] = DriverLibrary
+
+    def run_pass(self, state: Any) -> bool:
+        """Make what callers link."""
+        state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.counted = bool(state.flags.nrt)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class InlinedLowering(Lowering):
     """Lowering of a function that only compiled functions call."""
 
     _name = "inlined_lowering"
+    _library = InlinedLibrary
 
     def run_pass(self, state: Any) -> bool:
         """Make what callers link, and enter the function where they look for it."""
-        state.library = InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
         state.flags.no_compile = True
         super().run_pass(state)
         found, described = state["cr"], state["cr"].fndesc
@@ -65,6 +100,37 @@ class InlinedLowering(NativeLowering):  # type: ignore[misc]
         state.targetctx.insert_user_function(entry, described, [state.library])
         state["cr"] = found._replace(cfunc=entry)
         return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class Closures(InlineClosureLikes):  # type: ignore[misc]
+    """Inlining of closures and of arrays out of lists, where a function has any."""
+
+    _name = "closures_if_any"
+
+    def run_pass(self, state: Any) -> bool:
+        """Look for what begins one."""
+        blocks = state.func_ir.blocks.values()
+        return any(True for block in blocks for op in LATER for _ in block.find_exprs(op)) and super().run_pass(state)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class ArrayRewrites(NopythonRewrites):  # type: ignore[misc]
+    """Rewriting of expressions whose values are whole arrays, and of texts as indices, where a function has any."""
+
+    _name = "array_rewrites_if_any"
+
+    def run_pass(self, state: Any) -> bool:
+        """Look for one."""
+        texts = any(isinstance(kind, types.StringLiteral) for kind in state.typemap.values())
+        values = (
+            found.target.name
+            for block in state.func_ir.blocks.values()
+            for found in block.find_insts(ir.Assign)
+            if getattr(found.value, "op", None) in ARRAY_VALUED
+        )
+        arrays = any(isinstance(state.typemap[name], types.Array) for name in values)
+        return (texts or arrays) and super().run_pass(state)
 
 
 class Remembering:
@@ -118,14 +184,19 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         """Numba's passes, with those of this file in their places."""
         found = DefaultPassBuilder.define_nopython_pipeline(self.state)
         inner = self.state.flags.no_cpython_wrapper
-        other = {NopythonTypeInference: Typing, NativeLowering: InlinedLowering if inner else NativeLowering}
+        other = {
+            InlineClosureLikes: Closures,
+            NopythonTypeInference: Typing,
+            NopythonRewrites: ArrayRewrites,
+            NativeLowering: InlinedLowering if inner else Lowering,
+        }
         made = PassManager("driver")
         made.passes = [(other.get(kind, kind), said) for kind, said in found.passes]
         made.finalize()
         return [made]
 
     def _compile_core(self) -> Any:
-        with _seldom_collected():  # below Numba's lock: one thread at a time
+        with sparing():  # below Numba's lock: one thread at a time
             return super()._compile_core()
 
 
@@ -141,16 +212,6 @@ def _when_grown(refresh: Callable[[], None]) -> Callable[[], None]:
             refresh()
 
     return grown
-
-
-@contextmanager
-def _seldom_collected() -> Iterator[None]:
-    usual = gc.get_threshold()
-    gc.set_threshold(max(usual[0], SELDOM[0]) if usual[0] else 0, *map(max, usual[1:], SELDOM[1:]))
-    try:
-        yield
-    finally:
-        gc.set_threshold(*usual)
 
 
 INNER: dict[str, Any] = {"pipeline_class": DriverCompiler, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}

@@ -11,7 +11,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
+
+from airflock.engine.sparing import implementations, seldom_collected
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next
@@ -24,11 +27,16 @@ def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any
     Where the folder holds an index, the function is loaded, for which nobody waits.
     """
 
+    def under_lock(signature: Any) -> Any:
+        with global_compiler_lock, seldom_collected():  # the first of all reads half of Numba's modules
+            implementations()
+            return compile_(signature)
+
     def locked(signature: Any) -> Any:
         if any(folder.glob("*.nbi")):
-            return compile_(signature)
+            return under_lock(signature)
         with alone(folder):
-            return compile_(signature)  # which loads what another process has compiled meanwhile
+            return under_lock(signature)  # which loads what another process has compiled meanwhile
 
     return locked
 

@@ -11,6 +11,7 @@ from airflock.core.radio import forward
 from airflock.core.vectors import vectors_of
 from airflock.engine.facts import Facts
 from airflock.world import edges
+from airflock.world.excursion import beyond_nothing
 
 WHOLE = (
     "agents", "steps", "decide_every", "sample_every", "collide_every", "delay", "ring", "world", "seed_low",
@@ -98,6 +99,11 @@ class Plan(Facts):
     def suffers(self, *rules: str) -> tuple[Fault, ...]:
         """Kinds of fault that have one of these rules."""
         return tuple(kind for kind in self.faults if any(rule in kind.rules for rule in rules))
+
+    @property
+    def bounded(self) -> bool:
+        """Whether a place may lie outside: there is an arena, or something stands in the world."""
+        return self.excursion is not beyond_nothing or bool(self.obstacles) or self.scene
 
     @property
     def believes(self) -> bool:

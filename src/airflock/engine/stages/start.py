@@ -40,7 +40,11 @@ def tried(
     w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
     for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
         s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
-    free = excursion(s[X], s[Y], s[Z], w, edges, spans, whole.corners, whole.obstacles, scene) <= -w.wall_clearance
+    free = (
+        excursion(s[X], s[Y], s[Z], w, edges, spans, whole.corners, whole.obstacles, scene) <= -w.wall_clearance
+        if plan.bounded
+        else True
+    )
     if plan.start == "ball":
         free = free & places.in_ball(s[X], s[Y], s[Z], w.extent_x)
     return free

@@ -1,0 +1,165 @@
+"""Work of Numba's that changes nothing, left out while a driver is compiled. Same machine code.
+
+What Numba asks again for every statement is asked once, and what nobody reads is not computed. For that, parts of Numba
+are exchanged under its lock and put back before it is released: whatever else a process compiles meets Numba as it is.
+"""
+
+import gc
+import sys
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from numba.core import base, event, interpreter, ssa, transforms, types
+from numba.core.postproc import PostProcessor, VariableLifetime
+
+SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
+
+_signatures: dict[Hashable, Any] = {}
+_sizes: dict[Hashable, int] = {}
+_places: dict[Callable[..., Any], bool] = {}
+
+
+@contextmanager
+def sparing() -> Iterator[None]:
+    """Around the passes over one function, below Numba's lock; may be entered again for another one that it calls."""
+    with ExitStack() as changed:
+        changed.enter_context(seldom_collected())
+        for owner, name, spare in SPARED:
+            changed.enter_context(_exchanged(owner, name, spare))
+        yield
+
+
+def implementations() -> None:
+    """Read the modules in which Numba implements NumPy without SciPy, which takes longer than all the others.
+
+    Numba imports it to learn that it is there; what needs it looks again when it is called. Below Numba's lock.
+    """
+    if "numba.np.arraymath" in sys.modules:
+        return
+    from numba.np import linalg
+
+    usual = linalg.ensure_blas
+    linalg.ensure_blas = _there
+    try:
+        from numba.np import arraymath
+
+        arraymath.ensure_blas = usual  # type: ignore[attr-defined]  # Numba has no types, here and below
+    finally:
+        linalg.ensure_blas = usual
+
+
+def _there() -> None:
+    """Nothing: SciPy is required by this package."""
+
+
+@contextmanager
+def seldom_collected() -> Iterator[None]:
+    """Look for garbage seldom; to be held below Numba's lock, one thread at a time."""
+    usual = gc.get_threshold()
+    gc.set_threshold(max(usual[0], SELDOM[0]) if usual[0] else 0, *map(max, usual[1:], SELDOM[1:]))
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+@contextmanager
+def _exchanged(owner: Any, name: str, spare: Callable[..., Any]) -> Iterator[None]:
+    """Put `spare` in the place of a method or a module's function; it is given what stood there."""
+    usual = vars(owner)[name]
+    if getattr(usual, "spare", None) is spare:  # further out
+        yield
+        return
+
+    def exchanged(*given: Any, **named: Any) -> Any:
+        return spare(usual, *given, **named)
+
+    exchanged.spare = spare  # type: ignore[attr-defined]
+    setattr(owner, name, exchanged)
+    try:
+        yield
+    finally:
+        setattr(owner, name, usual)
+
+
+def _call_type(usual: Callable[..., Any], function: Any, context: Any, given: Any, named: Any) -> Any:
+    """Signature of a call of a function of Numba's, which its typing and its lowering ask for each statement."""
+    if named:
+        return usual(function, context, given, named)
+    key = function, tuple(given)
+    if key not in _signatures:
+        _signatures[key] = usual(function, context, given, named)
+    return _signatures[key]
+
+
+def _size(usual: Callable[..., int], context: Any, kind: Any) -> int:
+    """Bytes of a type of LLVM, for which Numba writes, reads and compiles a module."""
+    text = str(kind)
+    if "%" in text:  # a name, of which the text does not tell the parts
+        return usual(context, kind)
+    key = context.target_data, text
+    if key not in _sizes:
+        _sizes[key] = usual(context, kind)
+    return _sizes[key]
+
+
+def _processed(usual: Callable[..., None], processor: Any, emit_dels: bool = False, **named: Any) -> None:
+    """Blocks in order after a pass. Which variables live where is computed only if it is asked for."""
+    code = processor.func_ir
+    if code.is_generator:
+        usual(processor, emit_dels, **named)
+        return
+    code.blocks = transforms.canonicalize_cfg(code.blocks)  # type: ignore[no-untyped-call]
+    code.variable_lifetime = VariableLifetime(code.blocks)  # type: ignore[no-untyped-call]
+    code.generator_info = None
+    if emit_dels:
+        processor._insert_var_dels(**named)
+
+
+def _rewritten(usual: Callable[..., Any], blocks: dict[int, Any], states: Any, handler: Any) -> dict[int, Any]:
+    """Blocks with versions of one variable: of those that name it. The others stay as they are."""
+    naming = {label: block for label, block in blocks.items() if states["varname"] in _named(block)}
+    made = usual(naming, states, handler)
+    for label, block in made.items():
+        block.named = naming[label].named
+    return {label: made.get(label, block) for label, block in blocks.items()}
+
+
+def _named(block: Any) -> set[str]:
+    """Variables that a block named before any got versions."""
+    if not hasattr(block, "named"):
+        block.named = {variable.name for statement in block.body for variable in statement.list_vars()}
+    return block.named  # type: ignore[no-any-return]
+
+
+def _takes_place(usual: Callable[..., bool], function: Callable[..., Any]) -> bool:
+    """Whether an implementation of Numba's takes the place in the text as an argument."""
+    if function not in _places:
+        _places[function] = usual(function)
+    return _places[function]
+
+
+def _without_exits(usual: Callable[..., Any], code: Any) -> Any:
+    """Statements without those that end a `with`, which no rule and no stage holds."""
+    held = any(name.startswith("$setup_with_exitfn") for name in code.blocks[min(code.blocks)].scope.localvars._con)
+    return usual(code) if held else code
+
+
+def _told(usual: Callable[..., None], kind: str, *given: Any, **named: Any) -> None:
+    """An event; not each call of LLVM, where only the sums of their times are kept."""
+    kept = all(type(listener) is event.TimingListener for listener in event._registered[kind])
+    if not (kind == "numba:llvm_lock" and kept):
+        usual(kind, *given, **named)
+
+
+SPARED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
+    (types.functions.BaseFunction, "get_call_type", _call_type),
+    (base.BaseContext, "get_abi_sizeof", _size),
+    (base, "_has_loc", _takes_place),
+    (PostProcessor, "run", _processed),
+    (interpreter, "peep_hole_delete_with_exit", _without_exits),
+    (ssa, "_run_block_rewrite", _rewritten),
+    (event, "start_event", _told),
+    (event, "end_event", _told),
+)
