@@ -123,10 +123,8 @@ def measured(flown: Flown) -> list[Measured]:
         goals = statistics.mean(final["goals_reached"] / final["goals"])
         avoided = f"{final['n_avoid'].mean():.0f} avoidances per boid"
         at = f"{scene}, final set, share"
-        found += [
-            Measured(f"schemes.{scene}.goals", "goals reached", at, goals, avoided),
-            _reason(flown.overruled[scene], scene),
-        ]
+        found.append(Measured(f"schemes.{scene}.goals", "goals reached", at, goals, avoided))
+        found += [_reason(flown.overruled[scene], scene)] if flown.overruled[scene] else []
     return [*found, _stragglers({scene: flown.table.loc[(scene, "5")] for scene in SCENES})]
 
 
