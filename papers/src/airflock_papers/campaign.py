@@ -198,6 +198,6 @@ if __name__ == "__main__":
     parser.add_argument("part", nargs="*", help="PAPER.PART, for instance kidger.tuning; all if none is named")
     parser.add_argument("--open", action="store_true", help="only claims that nobody has seen red so far")
     parser.add_argument("--threads", type=int, help="flights side by side; as many as cores if not given")
-    asked = parser.parse_args()
+    asked = parser.parse_intermixed_args()
     place = Path(str(resources.files("airflock_papers"))) / COMMITTED
     renew(asked.folder, Path("papers"), place, asked.part, asked.open, asked.threads)
