@@ -39,6 +39,9 @@ SEEDS = {
     ("vasarhelyi_2018", "real"): 10,
     ("vasarhelyi_2018", "beyond"): 100,
     ("zapotecatl_2016", "sequential"): 6,
+    ("kidger", "alone"): 10,
+    ("kidger", "conduct"): 10,
+    ("kidger", "tuning"): 20,
 }
 Key = tuple[str, str]  # paper and claim, or paper and part
 
