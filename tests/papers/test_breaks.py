@@ -203,8 +203,8 @@ ROWS = [
 def broken(flown: list, result: str = breaks.RED):
     """A flight of changes that is cut off at the second part, once."""
 
-    def fly(paper, *, only, seeds, threads, progress, ids, quick):
-        flown.append((only, seeds, quick, sorted(ids)))
+    def fly(paper, *, only, seeds, threads, progress, ids):
+        flown.append((only, seeds, sorted(ids)))
         progress("flights", 1, 2)
         if only == "last" and len(flown) == 2:
             raise KeyboardInterrupt
@@ -217,13 +217,11 @@ def test_a_campaign_goes_on_where_it_was_cut_off_and_leaves_out_what_is_red_as_i
     flown: list = []
     monkeypatch.setattr(campaign, "committed", lambda: ROWS)
     monkeypatch.setattr(campaign, "SEEDS", {("kidger", "last"): 7})
-    monkeypatch.setattr(campaign, "WHOLE", {("kidger", "last")})
     monkeypatch.setattr(breaks, "fly", broken(flown))
     with pytest.raises(KeyboardInterrupt):
         campaign.fly(tmp_path, print)
     rows = campaign.fly(tmp_path, print)
-    last = ("last", 7, False, ["last.a"])
-    assert flown == [("first", None, True, ["first.a"]), last, last]
+    assert flown == [("first", None, ["first.a"]), ("last", 7, ["last.a"]), ("last", 7, ["last.a"])]
     assert rows == [ROWS[0], ROWS[1]._replace(result=breaks.RED, ours="0.5", changed="nan"), ROWS[2]]
     kept = tmp_path / "kidger.first.breaks.json"
     assert campaign._kept(kept, json.loads(kept.read_text())["texts"], {"first.a"}) == ROWS[:1]

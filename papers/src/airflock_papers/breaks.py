@@ -50,23 +50,22 @@ def fly(
     threads: int | None = None,
     progress: Progress | None = None,
     ids: Collection[str] | None = None,
-    quick: bool = True,
 ) -> list[Break]:
     """Make the change of each claim of a paper that names one, and judge it again.
 
     A change is flown where a claim that names it holds without it: what is red already cannot turn red.
 
     only : one part; seeds : flights per number, else those of the quick form; threads : flights side by side
-    ids : of the claims whose changes are made, else all; quick : whether the small form flies, else that of the page
+    ids : of the claims whose changes are made, else all
     progress : called with (title, flights done, flights in all), else a bar
 
     Raises AirflockError if the paper, or the part of it, has no claim with a change.
     """
     if progress is None:
         with progress_bar() as bar:
-            return fly(paper, only=only, seeds=seeds, threads=threads, progress=bar, ids=ids, quick=quick)
+            return fly(paper, only=only, seeds=seeds, threads=threads, progress=bar, ids=ids)
     statements = [s for s in load(paper.package).values() if ids is None or s.id in ids]
-    return of(paper, statements, only, Flights(quick, seeds, threads, progress))
+    return of(paper, statements, only, Flights(True, seeds, threads, progress))
 
 
 def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights: Flights) -> list[Break]:
