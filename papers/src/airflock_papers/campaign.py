@@ -41,7 +41,7 @@ SEEDS = {
     ("zapotecatl_2016", "sequential"): 6,
     ("kidger", "alone"): 10,
     ("kidger", "conduct"): 10,
-    ("kidger", "tuning"): 20,
+    ("kidger", "tuning"): 40,
 }
 Key = tuple[str, str]  # paper and claim, or paper and part
 
