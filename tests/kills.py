@@ -249,6 +249,21 @@ def dying_workers(chance, died):
             thread.join()
 
 
+def under_deaths(what, folder, kills, seed, life):
+    """Lives under dying workers until so many have died: life(number, address) raises where one ends differently."""
+    kept = folder / "done.json"
+    done = json.loads(kept.read_text()) if kept.exists() else {"kills": 0, "lives": 0}
+    folder.mkdir(parents=True, exist_ok=True)
+    while done["kills"] < kills:
+        died = []
+        with dying_workers(random.Random(f"{seed} {done['lives']}"), died) as address:
+            life(done["lives"], address)
+        done = {"kills": done["kills"] + len(died), "lives": done["lives"] + 1}
+        kept.write_text(json.dumps(done))
+        sys.stderr.write(f"{what}: {done['kills']} of {kills} kills\n")
+    sys.stdout.write(f"{what}: {done['kills']} workers killed in {done['lives']} lives: all ends identical\n")
+
+
 def workers(folder, kills, seed):
     """Kill workers of dask under studies until so many have died."""
     from airflock.evolve.run import run
@@ -264,37 +279,35 @@ def workers(folder, kills, seed):
         away = sum(((parameters[k] - v) / space["model"][k[6:]]["high"]) ** 2 for k, v in best.items())
         return {"fitness": 1.0 - away + 0.01 * chance.Random(own).gauss(0.0, 1.0)}, "", 0.0, "worker"
 
-    shutil.rmtree(folder, ignore_errors=True)
-    study, chance = toys.study(population=10, generations=10, seeds=2), random.Random(seed)
-    open_folder(folder / "here", study, resume=False)
-    run(study, folder / "here", Here(lambda p, s: task(p, s)[0], 2))
-    died, studies = [], 0
-    while len(died) < kills:
-        place = folder / f"there{studies}"
-        open_folder(place, study, resume=False)
-        with dying_workers(chance, died) as address:
-            run(study, place, Cluster([task], address))
-        assert rows(place) == rows(folder / "here"), f"study {studies} ended differently after {len(died)} kills"
-        studies += 1
-        sys.stderr.write(f"workers: {len(died)} of {kills} kills\n")
-    sys.stdout.write(f"workers: {len(died)} workers killed under {studies} studies: all ends identical\n")
+    study = toys.study(population=10, generations=10, seeds=2)
+
+    def ended(name, executor):
+        shutil.rmtree(folder / name, ignore_errors=True)
+        open_folder(folder / name, study, resume=False)
+        run(study, folder / name, executor)
+        return rows(folder / name)
+
+    wanted = ended("here", Here(lambda p, s: task(p, s)[0], 2))
+
+    def life(number, address):
+        assert ended(f"there{number}", Cluster([task], address)) == wanted, f"study {number} ended differently"
+
+    under_deaths("workers", folder, kills, seed, life)
 
 
-def sweeps(_, kills, seed):
+def sweeps(folder, kills, seed):
     """Kill workers of dask under sweeps of real flights until so many have died."""
     import airflock
 
     over = {"radio.delay": [0.0, 0.5, 1.0], "agents": [10, 20]}
     what = airflock.load("vasarhelyi_2018/4ms", {"duration": 300.0})
     wanted = airflock.sweep(what, over, seeds=range(60))
-    chance, died, done = random.Random(seed), [], 0
-    while len(died) < kills:
-        with dying_workers(chance, died) as address:
-            found = airflock.sweep(what, over, seeds=range(60), scheduler=address)
-        assert found.equals(wanted), f"sweep {done} ended differently after {len(died)} kills"
-        done += 1
-        sys.stderr.write(f"sweep: {len(died)} of {kills} kills\n")
-    sys.stdout.write(f"sweep: {len(died)} workers killed under {done} sweeps: all tables identical\n")
+
+    def life(number, address):
+        found = airflock.sweep(what, over, seeds=range(60), scheduler=address)
+        assert found.equals(wanted), f"sweep {number} ended differently"
+
+    under_deaths("sweep", folder, kills, seed, life)
 
 
 def certificates(folder, kills, seed):
@@ -306,13 +319,14 @@ def certificates(folder, kills, seed):
     from airflock.limits.limit import read_all
     from airflock.scenarios.files import load
 
-    shutil.rmtree(folder, ignore_errors=True)
     scenario = load("vasarhelyi_2018/real_4ms", {"agents": 10, "duration": 300.0})
     limits = read_all(["r_min<3 at 5%", "phi_vel>=2 in 90%"], scenario)
     campaign = Campaign(scenario, limits, flights=1000)
     task = CampaignTask(scenario, limits, 32)
 
-    def ended(place, executor):
+    def ended(name, executor):
+        place = folder / name
+        shutil.rmtree(place, ignore_errors=True)
         open_folder(place, campaign, resume=False, kind=FOLDER)
         try:
             run(campaign, place, executor, 600.0, kept=False).save(place / "certificate.toml")
@@ -320,16 +334,12 @@ def certificates(folder, kills, seed):
             executor.close()
         return of_certificate(place)
 
-    wanted = ended(folder / "here", Here(lambda p, s: task(p, s)[0], 1))
-    chance, died, done = random.Random(seed), [], 0
-    while len(died) < kills:
-        with dying_workers(chance, died) as address:
-            found = ended(folder / f"there{done}", Cluster([task], address))
-        assert found == wanted, f"campaign {done} ended differently after {len(died)} kills"
-        done += 1
-        sys.stderr.write(f"certificates: {len(died)} of {kills} kills\n")
-    sys.stdout.write(f"certificates: {len(died)} workers killed under {done} campaigns of {campaign.flights} flights: "
-                     "all ends identical\n")  # fmt: skip
+    wanted = ended("here", Here(lambda p, s: task(p, s)[0], 1))
+
+    def life(number, address):
+        assert ended(f"there{number}", Cluster([task], address)) == wanted, f"campaign {number} ended differently"
+
+    under_deaths("certificates", folder, kills, seed, life)
 
 
 CLUSTERS = {"workers": workers, "sweep": sweeps, "certificates": certificates}

@@ -148,11 +148,12 @@ def test_who_meets_whom_by_cells_is_mutual(number, count):
 def test_who_is_seen_has_nobody_on_the_way(number, count, axes, radius):
     offsets = np.random.default_rng(number).normal(size=(count, axes))
     expected = set()
+    distances = np.linalg.norm(offsets, axis=1)
     for j, d in enumerate(offsets):
         s = np.linspace(0.0, 1.0, 2001)[:, None, None]
         way = s * d  # (place, 1, axis)
         gaps = np.linalg.norm(way - offsets, axis=2).min(axis=0)
-        nearer = np.linalg.norm(offsets, axis=1) < np.linalg.norm(d)
+        nearer = distances < distances[j]  # nobody is nearer than itself, not even by rounding
         ahead = offsets @ d > 0.0
         doubtful = nearer & ahead & (np.abs(gaps - radius) < 2e-3)
         if doubtful.any():

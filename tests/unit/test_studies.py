@@ -269,6 +269,13 @@ def test_kills_at_random_moments_change_nothing(tmp_path, seed, request):
     assert "all ends identical" in ended.stdout
 
 
+def test_a_study_that_is_made_takes_no_keys_beside_itself(tmp_path):
+    made = load_study("vasarhelyi_2018/6ms")
+    with pytest.raises(StudyError, match=r"^settings, limit, population: a Study that is made says this itself"):
+        airflock.evolve(made, tmp_path / "s", settings={"agents": 4}, limit="r_min<3 at 1%", population=8)
+    assert not (tmp_path / "s").exists()
+
+
 def test_public_door_evolves_a_short_flight_with_a_fitness_of_ones_own(tmp_path):
     """Real flights, from the call to a scenario that flies: faster is better, and the faster speed is found."""
     space = {"model": {"v_flock": {"low": 1.0, "high": 5.0}}}

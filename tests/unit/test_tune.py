@@ -1,6 +1,7 @@
 """Tuning: what it starts from, how it shares time, and that it continues where it was left, with tiny real flights."""
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -10,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
+from airflock.certify.asked import campaign_of
 from airflock.certify.seeds import identity
+from airflock.cli.certify import time_of
 from airflock.errors import RecordingError, ScenarioError, StudyError
 from airflock.evolve.race import ROUNDS
 from airflock.evolve.store import Store
@@ -18,6 +21,7 @@ from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
+from airflock.tune.reach import out_of_reach
 from airflock.tune.run import tune, usual_limits
 from airflock.tune.start import start_of
 
@@ -63,6 +67,17 @@ def test_a_plan_fits_into_its_budget_or_says_what_would(budget, rate):
     flown = POPULATION * q["seeds"] * q["generations"] + raced + (finalists + 1) * q["final_seeds"]
     assert flown <= SEARCH * budget * rate * 1.05 + 16 and TRIED * plan.seeds <= HARDEN * budget * rate + 1e-6
     assert plan.seconds == CERTIFY * budget and pytest.approx(1.0) == SEARCH + HARDEN + CERTIFY
+
+
+@given(st.floats(1e3, 1e5), st.floats(1.0, 500.0), st.integers(1, 30_000))
+def test_a_limit_that_the_budget_cannot_show_is_told_beforehand_with_a_budget_that_can(budget, rate, of_100_000):
+    """Nothing happened in n flights: its bound at the first look, which half of alpha pays, is that of (1 - p)^n."""
+    asked = campaign_of(start_of(make(MINE, "mine"))[0], [f"r_min<3 at {of_100_000}e-5/flight"], 0.95)
+    plan = plan_of(budget, rate)
+    lines = out_of_reach(asked, plan)
+    assert bool(lines) == ((1.0 - of_100_000 * 1e-5) ** int(plan.seconds * rate) > 0.025)
+    for line in lines:
+        assert out_of_reach(asked, plan_of(time_of(re.search(r"--budget (\S+),", line)[1]), rate)) == []
 
 
 @pytest.fixture(scope="module")

@@ -153,9 +153,7 @@ class _Counting:
 
     def _first(self, verdict: Verdict) -> int:
         """Flights without an event that would show a limit; 0 where an upper bound is there already."""
-        if verdict.probability is None or verdict.high < 1.0:
-            return 0
-        return needed(verdict.probability, self.campaign.alpha * share(1))
+        return 0 if verdict.high < 1.0 else least(self.campaign, verdict.limit)
 
     def fly(self) -> None:
         """Fly the next few flights that the store does not hold."""
@@ -193,6 +191,12 @@ def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | No
     if verdict.probability is None:  # `run` gives every campaign without a rate a number of flights
         return None
     return next(islice(schedule(verdict.probability, campaign.alpha), len(verdict.looks), None))
+
+
+def least(campaign: Campaign, limit: Limit) -> int:
+    """Flights without an event that would show a limit; 0 for one that is only to be bounded."""
+    probability = campaign.probability(limit)
+    return 0 if probability is None else needed(probability, campaign.alpha * share(1))
 
 
 def smallest(flights: float, alpha: float) -> float:

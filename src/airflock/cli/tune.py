@@ -88,11 +88,16 @@ def tune(
 
 @contextmanager
 def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
-    """A line that moves: the stage, and how far the search is."""
+    """A line that moves: the stage, and how far the search is; above it, what stays to be read."""
     import sys
 
-    if quiet or not sys.stderr.isatty():
+    from airflock.tune.run import STAGES
+
+    if quiet:
         yield None, None
+        return
+    if not sys.stderr.isatty():
+        yield None, lambda text: None if text in STAGES else typer.echo(text, err=True)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -108,7 +113,10 @@ def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
             )
 
         def note(text: str) -> None:
-            bar.update(task, description=text, total=None)
+            if text in STAGES:
+                bar.update(task, description=text, total=None)
+            else:
+                bar.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
         yield watch, note
 

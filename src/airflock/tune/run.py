@@ -34,12 +34,14 @@ from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import USUAL, Plan, plan_of
+from airflock.tune.reach import out_of_reach
 from airflock.tune.start import has_walls, start_of
 
 PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
     "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
 )  # fmt: skip
 MOST_SEEDS = 1_000_000  # of each step of hardening
+STAGES = "search", "hardening", "certificate", "report"
 PILOT = 4  # flights per core that tell how long one takes
 Note = Callable[[str], None]
 
@@ -133,7 +135,8 @@ def tune(
     threads : int, optional
         Flights side by side; by default one per core.
     watch, note : callable, optional
-        Told of flights of the search; told in a few words what begins.
+        Told of flights of the search; told which of STAGES begins, and before them in a line of each limit that the
+        budget leaves too little time to show.
     trust : bool
         Whether code that files name may run.
 
@@ -165,20 +168,23 @@ def tune(
     searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
-    _say(note, "search")
+    short = out_of_reach(asked, plan)
+    for line in short:
+        _say(note, line)
+    _say(note, STAGES[0])
     result = _evolved(folder, start, plan, searched, threads, watch)
-    notes = [*notes, *usual_space(start)[1]]
+    notes = [*notes, *usual_space(start)[1], *short]
     if result.dead:
         raise StudyError(f"{mine.name}: {result.dead}")
-    _say(note, "hardening")
+    _say(note, STAGES[1])
     tuned, steps, why = _hardened(folder, result, plan, searched, threads, trust)
-    _say(note, "certificate")
+    _say(note, STAGES[2])
     certificate = _certified(folder, tuned, limits, confidence, plan, threads, note)
     found = Tuned(
         folder, tuned, start, tuple(notes), result, tuple(steps), why, certificate, time.monotonic() - began,
         {} if logs is None else logs.told,
     )  # fmt: skip
-    _say(note, "report")
+    _say(note, STAGES[3])
     from airflock.tune.report import save
 
     save(found)
