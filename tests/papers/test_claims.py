@@ -167,3 +167,15 @@ def test_the_front_page_tells_the_fraction_that_is_committed(name: str) -> None:
     good, bad = paper.count("reproduced"), paper.count("not reproduced")
     assert (told is None) == (good + bad == 0)
     assert told is None or (int(told[1]), int(told[2])) == (good, good + bad)
+
+
+def test_the_readme_counts_the_sentences_that_the_pages_count() -> None:
+    """Reproduced, and judged by a bound: what is only qualitative, or not testable, is left out of both."""
+    text = (ROOT.parent / "README.md").read_text(encoding="utf-8")
+    told = {name: (int(a), int(b)) for a, b, name in re.findall(r"(\d+) of (\d+): \[papers/(\w+)\]", text)}
+    assert set(told) == {"vasarhelyi_2018", "zapotecatl_2016", "kidger", "dimock_2003"}
+    for name, counts in told.items():
+        _, claims = read_claims(ROOT / name / "claims.toml")
+        verdicts = [claim.verdict for claim in claims if claim.kind == "paper"]
+        good = verdicts.count("reproduced")
+        assert counts == (good, good + verdicts.count("not reproduced")), name

@@ -8,7 +8,7 @@ import pytest
 from airflock.engine import fly
 from airflock.metrics import fitness_dimock
 from airflock.scenarios.files import load
-from airflock_papers.dimock_2003 import ga, robust, robust_claims, static
+from airflock_papers.dimock_2003 import ga, ga_claims, robust, robust_claims, static
 from airflock_papers.dimock_2003.flights import Flight, in_row
 from airflock_papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 
@@ -147,3 +147,12 @@ def test_few_collisions_of_many_are_fewer_by_the_exact_test():
     safe = [Flight({"n_coll": 0.0}, None) for _ in range(100)]
     assert robust_claims.less(safe, flights) == pytest.approx(math.comb(192, 100) / math.comb(200, 100), rel=0.1)
     assert robust_claims.less(flights, flights) > 0.5
+
+
+@pytest.mark.parametrize("collisions", [(0.0, 1.0), (1.0, 1.0)])
+def test_winners_that_all_collide_with_the_full_gradient_are_not_measured(collisions):
+    runs = [ga.Run(ga.READINGS["mean"], seed, best=[10.0]) for seed in (1, 2)]
+    for run, met in zip(runs, collisions, strict=True):
+        run.flights["full gradient"] = Flight({"power": 11.0, "n_coll": met}, np.zeros((1, 3, 5)))
+    found = ga_claims._full(runs)
+    assert [each.value.runs for each in found] == ([1] if 0.0 in collisions else [])

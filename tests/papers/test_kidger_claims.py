@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -12,7 +13,7 @@ from airflock.engine import score_flights
 from airflock.errors import AirflockError
 from airflock.evolve.study import load_study
 from airflock_papers.claims import read_claims
-from airflock_papers.kidger import PAPER, conduct
+from airflock_papers.kidger import PAPER, conduct, schemes
 
 FOLDER = Path(__file__).parents[2] / "papers" / "kidger"
 SEEDS = range(20)
@@ -50,6 +51,20 @@ def test_the_report_shows_every_claim_and_figure(committed):
     assert all(f"| {name} |" in text for name in committed[1])
     for name in ("city", "forest", "space", "rays", "flocked", "tuning_open_air", "tuning_city"):
         assert (FOLDER / "figures" / f"{name}.png").is_file() and f"figures/{name}.png" in text
+
+
+@pytest.mark.parametrize("events", [[], [schemes.Overruled(1.0, 90.0, 1.0), schemes.Overruled(0.0, 0.0, 0.0)]])
+def test_what_overruled_avoidance_is_told_where_somebody_collided(events):
+    """Of no collision at all there is no share to tell: nothing is measured, in place of a division by 0."""
+    columns = [*schemes.COLUMNS, "goals", "time_to_flock"]
+    flown = pd.MultiIndex.from_product([schemes.SCENES, schemes.SCHEMES, range(2)])
+    by_n = pd.MultiIndex.from_product([schemes.SCENES, range(1, 7), range(2)])
+    tables = [pd.DataFrame(1.0, index, columns) for index in (flown, by_n)]
+    found = {
+        each.id: each for each in schemes.measured(schemes.Flown(tables[0], {"city": events, "forest": []}, tables[1]))
+    }
+    assert "schemes.forest.reason" not in found and ("schemes.city.reason" in found) == bool(events)
+    assert not events or found["schemes.city.reason"].value.ours == 0.5
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -6,7 +6,7 @@ seeds, as they are and changed: the bound has to hold before and fail after.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -23,14 +23,14 @@ RED = "turned red"
 GREEN = "still holds"  # a claim that its own change does not break
 UNSHOWN = "does not hold with so few flights"  # so that its turning red would say nothing
 UNMEASURED = "is not measured in the small form"  # it asks for more than a quick flight gives
-RESULTS = (RED, GREEN, UNSHOWN, UNMEASURED)
+ALREADY = "is red as it is"  # its page does not count it as reproduced, so that there is nothing to break
+RESULTS = (RED, GREEN, ALREADY, UNSHOWN, UNMEASURED)
 
 
 class Break(NamedTuple):
     """One claim under its change.
 
-    id, part : of the claim; change : what was set, in words; result : turned red, still holds, does not hold with so
-    few flights, or is not measured in the small form
+    id, part : of the claim; change : what was set, in words; result : one of RESULTS
     ours, changed : the measured value as it is, and under the change; nan if it is not measured
     """
 
@@ -49,18 +49,23 @@ def fly(
     seeds: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
+    ids: Collection[str] | None = None,
 ) -> list[Break]:
     """Make the change of each claim of a paper that names one, and judge it again.
 
+    A change is flown where a claim that names it holds without it: what is red already cannot turn red.
+
     only : one part; seeds : flights per number, else those of the quick form; threads : flights side by side
+    ids : of the claims whose changes are made, else all
     progress : called with (title, flights done, flights in all), else a bar
 
     Raises AirflockError if the paper, or the part of it, has no claim with a change.
     """
     if progress is None:
         with progress_bar() as bar:
-            return fly(paper, only=only, seeds=seeds, threads=threads, progress=bar)
-    return of(paper, load(paper.package).values(), only, Flights(True, seeds, threads, progress))
+            return fly(paper, only=only, seeds=seeds, threads=threads, progress=bar, ids=ids)
+    statements = [s for s in load(paper.package).values() if ids is None or s.id in ids]
+    return of(paper, statements, only, Flights(True, seeds, threads, progress))
 
 
 def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights: Flights) -> list[Break]:
@@ -77,11 +82,13 @@ def of(paper: Paper, statements: Iterable[Statement], only: str | None, flights:
     for part, members in chosen.items():
         plain = _measured(paper, part, flights, {})
         for changes in _different([statement.breaks for statement in members]):
+            named = [statement for statement in members if statement.breaks == changes]
+            after: dict[str, Measured] = {}
             if changes == EXCHANGED:
                 after = {key: replace(each, value=_mirrored(each.value)) for key, each in plain.items()}
-            else:
+            elif any(_holds(statement, plain.get(statement.id)) for statement in named):
                 after = _measured(paper, part, flights, changes)
-            found += [_broken(s, part, plain.get(s.id), after.get(s.id)) for s in members if s.breaks == changes]
+            found += [_broken(s, part, plain.get(s.id), after.get(s.id)) for s in named]
     return found
 
 
@@ -115,13 +122,19 @@ def _different(found: list[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 def _broken(statement: Statement, part: str, plain: Measured | None, after: Measured | None) -> Break:
     """How a statement is judged as it is and under its change."""
-    if plain is None or after is None:
-        ours, changed = (each.value.ours if each else math.nan for each in (plain, after))
-        return Break(statement.id, part, in_words(statement.breaks), UNMEASURED, ours, changed)
-    alone = {statement.id: statement}
-    held, holds = (judge(alone, [each])[0].verdict == GOOD[statement.kind] for each in (plain, after))
-    result = UNSHOWN if not held else GREEN if holds else RED
-    return Break(statement.id, part, in_words(statement.breaks), result, plain.value.ours, after.value.ours)
+    ours, changed = (each.value.ours if each else math.nan for each in (plain, after))
+    if plain and not _holds(statement, plain):
+        result = UNSHOWN
+    elif plain and after:
+        result = GREEN if _holds(statement, after) else RED
+    else:
+        result = UNMEASURED
+    return Break(statement.id, part, in_words(statement.breaks), result, ours, changed)
+
+
+def _holds(statement: Statement, measured: Measured | None) -> bool:
+    """Whether the bound of a statement holds for what was measured; not if nothing was."""
+    return measured is not None and judge({statement.id: statement}, [measured])[0].verdict == GOOD[statement.kind]
 
 
 def _mirrored(value: Estimate) -> Estimate:

@@ -1,26 +1,33 @@
 """Campaign: the change of every claim made and flown, part by part; what came of it stands committed beside this file.
 
 A part that is done is kept in a folder with a hash of all texts that decide a flight, so that a campaign that was cut
-off goes on where it stopped. `python -m airflock_papers.campaign FOLDER` flies everything and commits what it finds;
-`airflock paper all --breaks` compares.
+off goes on where it stopped. In a clone, `python -m airflock_papers.campaign FOLDER` flies everything and commits what
+it finds after each part; with `--open` only claims that nobody has seen red so far, with names of parts
+(`kidger.tuning`) only these. `airflock paper all --breaks` compares.
 """
 
+import argparse
 import json
-from collections.abc import Callable, Iterable, Sequence
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
 from airflock.doors import TextError, json_object, read_text
+from airflock.errors import AirflockError
 from airflock_papers import PAPERS, breaks
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
+from airflock_papers.claims import VERDICTS, read_claims
 from airflock_papers.quick import teller
-from airflock_papers.statements import load
+from airflock_papers.statements import Statement, load
 from airflock_papers.texts import texts
 
 COMMITTED = "breaks.csv"
 UNMADE = "not made yet"  # in the table: a change that nobody has flown so far
+OPEN = (UNMADE, breaks.UNSHOWN, breaks.UNMEASURED)  # results of claims that nobody has seen red
 # flights per number where those of the quick form are too few to show that a claim holds beforehand
 SEEDS = {
     ("vasarhelyi_2018", "s2"): 40,
@@ -32,7 +39,11 @@ SEEDS = {
     ("vasarhelyi_2018", "real"): 10,
     ("vasarhelyi_2018", "beyond"): 100,
     ("zapotecatl_2016", "sequential"): 6,
+    ("kidger", "alone"): 10,
+    ("kidger", "conduct"): 10,
+    ("kidger", "tuning"): 40,
 }
+Key = tuple[str, str]  # paper and claim, or paper and part
 
 
 class Row(NamedTuple):
@@ -43,46 +54,55 @@ class Row(NamedTuple):
     id: str
     change: str
     result: str
-    ours: str
-    changed: str
+    ours: str = ""
+    changed: str = ""
 
 
-def parts() -> list[tuple[str, str]]:
-    """Papers and parts whose claims name a change, in the order in which they fly."""
-    found = []
-    for name in PAPERS:
-        statements = load(find(name).package).values()
-        found += [(name, part) for part in dict.fromkeys(breaks.part_of(s) for s in statements if s.breaks)]
-    return found
+def parts(rows: Iterable[Row]) -> list[Key]:
+    """Papers and parts of some rows, in their order."""
+    return list(dict.fromkeys((row.paper, row.part) for row in rows))
 
 
-def fly(
-    folder: Path, say: Callable[[str], None], threads: int | None = None, only: Sequence[tuple[str, str]] | None = None
-) -> list[Row]:
-    """What came of every change; what is done is kept in the folder, with a log of the progress."""
+def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) -> list[Row]:
+    """What came of every change, those of claims that are red as they are left out.
+
+    What is done is kept in the folder, with a log of the progress.
+    """
+    rows = committed()
+    for found in in_parts(folder, say, [row for row in rows if row.result != breaks.ALREADY], threads):
+        rows = replaced(rows, found)
+    return rows
+
+
+def in_parts(
+    folder: Path, say: Callable[[str], None], wanted: Sequence[Row], threads: int | None = None
+) -> Iterable[list[Row]]:
+    """What came of the changes of some rows, part by part, as soon as one is flown."""
     folder.mkdir(parents=True, exist_ok=True)
-    now = texts()
-    found: list[Row] = []
-    todo = list(only or parts())
+    todo = parts(wanted)
     for number, (name, part) in enumerate(todo, 1):
         path = folder / f"{name}.{part}.breaks.json"
-        rows = _kept(path, now)
+        ids = {row.id for row in wanted if (row.paper, row.part) == (name, part)}
+        rows = _kept(path, texts(), ids)
         if rows is None:
             tell = teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}")
-            flown = breaks.fly(find(name), only=part, seeds=SEEDS.get((name, part)), threads=threads, progress=tell)
+            flown = breaks.fly(
+                find(name), only=part, seeds=SEEDS.get((name, part)), threads=threads, progress=tell, ids=ids
+            )
             rows = [Row(name, part, b.id, b.change, b.result, f"{b.ours:.4g}", f"{b.changed:.4g}") for b in flown]
-            atomic.write(path, json.dumps({"texts": now, "rows": rows}))
-        found += rows
-    return found
+            atomic.write(path, json.dumps({"texts": texts(), "rows": rows}))
+        yield rows
 
 
-def _kept(path: Path, now: str) -> list[Row] | None:
-    """Rows of a part that was flown with these texts; of a file that is not there, or is damaged, none."""
+def _kept(path: Path, now: str, ids: Collection[str]) -> list[Row] | None:
+    """Rows of a part that was flown with these texts; of a file that lacks some, is not there, or is damaged, none."""
     try:
         document = json_object(read_text(path))
-        return [Row(*map(str, row)) for row in document["rows"]] if document.get("texts") == now else None
+        rows = [Row(*map(str, row)) for row in document["rows"]] if document.get("texts") == now else []
     except (OSError, TextError, LookupError, TypeError, ValueError):
         return None
+    found = [row for row in rows if row.id in ids]
+    return found if {row.id for row in found} == set(ids) else None
 
 
 def committed() -> list[Row]:
@@ -91,6 +111,52 @@ def committed() -> list[Row]:
     Raises AirflockError if there is nothing.
     """
     return [Row(**row) for row in tables.read(COMMITTED, "python -m airflock_papers.campaign")]
+
+
+def replaced(rows: Iterable[Row], found: Iterable[Row]) -> list[Row]:
+    """Rows, with those that were found in place of older ones."""
+    new = {(row.paper, row.id): row for row in found}
+    return [new.get((row.paper, row.id), row) for row in rows]
+
+
+def as_stated(rows: Iterable[Row], statements: Mapping[str, Iterable[Statement]]) -> list[Row]:
+    """One row for each claim with a change, by papers, parts and statements; new ones are not made yet."""
+    old = {(row.paper, row.id): row for row in rows}
+    found = []
+    for name, every in statements.items():
+        for s in (s for s in every if s.breaks):
+            plain = Row(name, breaks.part_of(s), s.id, breaks.in_words(s.breaks), UNMADE)
+            before = old.get((name, s.id), plain)
+            found.append(before if before[:4] == plain[:4] else plain)
+    order = {key: place for place, key in enumerate(parts(found))}
+    return sorted(found, key=lambda row: order[row.paper, row.part])
+
+
+def as_judged(rows: Iterable[Row], verdicts: Mapping[Key, str]) -> list[Row]:
+    """Rows, of which those of claims that their page does not count as reproduced have nothing to break.
+
+    verdicts : of the committed pages, by paper and claim
+    """
+    _, fails, _ = VERDICTS["paper"]
+    found = []
+    for row in rows:
+        red = verdicts.get((row.paper, row.id)) == fails
+        if red and row.result in OPEN:
+            row = row._replace(result=breaks.ALREADY)
+        elif row.result == breaks.ALREADY and not red:
+            row = row._replace(result=UNMADE)
+        found.append(row)
+    return found
+
+
+def verdicts(papers: Path) -> dict[Key, str]:
+    """Verdicts of the committed pages, by paper and claim; papers: the folder of the pages."""
+    return {
+        (name, claim.id): claim.verdict
+        for name in PAPERS
+        for path in sorted((papers / name).glob("*.toml"))
+        for claim in read_claims(path)[1]
+    }
 
 
 def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Row]:
@@ -102,5 +168,39 @@ def worse(before: Iterable[Row], after: Iterable[Row]) -> list[Row]:
     ]  # fmt: skip
 
 
+def renew(
+    folder: Path,
+    papers: Path,
+    path: Path,
+    chosen: Collection[str] = (),
+    only_open: bool = False,
+    threads: int | None = None,
+) -> None:
+    """Fly changes and commit what comes of them after each part; the rows of other claims stay.
+
+    folder : where what is done is kept; papers : the folder of the pages; path : of the table
+    chosen : parts, as `kidger.tuning`, in their order, else all; threads : flights side by side
+    """
+    pages = verdicts(papers)
+    rows = as_judged(as_stated(committed(), {name: load(find(name).package).values() for name in PAPERS}), pages)
+    tables.write(Row._fields, rows, path)
+    unknown = sorted(set(chosen) - {".".join(key) for key in parts(rows)})
+    if unknown:
+        raise AirflockError(f"{unknown[0]}: no such part; known: {', '.join('.'.join(key) for key in parts(rows))}")
+    wanted = [row for row in rows if row.result in OPEN or (row.result != breaks.ALREADY and not only_open)]
+    wanted = [row for row in wanted if not chosen or f"{row.paper}.{row.part}" in chosen]
+    wanted.sort(key=lambda row: list(chosen).index(f"{row.paper}.{row.part}") if chosen else 0)
+    for found in in_parts(folder, lambda line: print(line, file=sys.stderr), wanted, threads):  # noqa: T201
+        rows = as_judged(replaced(rows, found), pages)
+        tables.write(Row._fields, rows, path)
+
+
 if __name__ == "__main__":
-    tables.renew("Make the change of every claim and commit what comes of it.", COMMITTED, Row._fields, fly)
+    parser = argparse.ArgumentParser(description="Make the change of every claim and commit what comes of it.")
+    parser.add_argument("folder", type=Path, help="where what is done is kept")
+    parser.add_argument("part", nargs="*", help="PAPER.PART, for instance kidger.tuning; all if none is named")
+    parser.add_argument("--open", action="store_true", help="only claims that nobody has seen red so far")
+    parser.add_argument("--threads", type=int, help="flights side by side; as many as cores if not given")
+    asked = parser.parse_intermixed_args()
+    place = Path(str(resources.files("airflock_papers"))) / COMMITTED
+    renew(asked.folder, Path("papers"), place, asked.part, asked.open, asked.threads)

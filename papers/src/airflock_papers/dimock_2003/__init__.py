@@ -33,7 +33,8 @@ def fly(wanted: Sequence[str], flights: Flights) -> Flown:
         found["brittle"] = robust.published(birds, flights.count(240, 24))
         measured += robust_claims.brittle(found["brittle"])
     if "ga" in wanted or "robust" in wanted:
-        found["ga"] = ga.evolve(birds, quick, flights.changes.get("search.generations"))
+        few = ga.FEW if quick and "ga" not in wanted else None  # robust takes the winner only
+        found["ga"] = ga.evolve(birds, quick, flights.changes.get("search.generations", few))
         measured += ga_claims.measured(found["ga"]) if "ga" in wanted else []
     if "robust" in wanted:
         found["robust"] = robust.compare(birds, found["ga"].winners, flights.count(240, 12), quick)

@@ -48,7 +48,7 @@ def measured(found: Evolution) -> list[Measured]:
             )
             for name, runs in found.runs.items()
         ),
-        _full(every),
+        *_full(every),
         _cmaes(found),
     ]
 
@@ -157,11 +157,13 @@ def _course(flight: Flight) -> float:
     return float(last / first)
 
 
-def _full(every: Sequence[Run]) -> Measured:
+def _full(every: Sequence[Run]) -> list[Measured]:
+    """Winners flown again with the full gradient; nothing if they all collide."""
     alive = [run for run in every if not run.flights["full gradient"].collided]
     gaps = [abs(run.flights["full gradient"].power - run.best[-1]) / FT_LBF for run in alive]
     note = f"{len(every) - len(alive)} of {len(every)} collide"
-    return Measured("ga.full", "power", "winners with the full gradient, change", _spread(gaps), note)
+    at = "winners with the full gradient, change"
+    return [Measured("ga.full", "power", at, _spread(gaps), note)] if gaps else []
 
 
 def _cmaes(found: Evolution) -> Measured:

@@ -45,13 +45,13 @@ STATEMENTS = (
 
 def fly(flights: Flights) -> pd.DataFrame:
     """Order parameters by (place, parameter, value, seed)."""
-    short = {"duration": 15.0 if flights.quick else DURATION, "metrics.r_cluster": 40.0}
+    minute = {"duration": DURATION, "metrics.r_cluster": 40.0}
     scenarios: dict[tuple[str, str, float], Scenario] = {}
     for place, keys in PLACES.items():
         for name, values in (RADII | SCALES).items():
             wanted = {v for key, a, b, _ in STATEMENTS if key == name for v in (a, b)}
             chosen = sorted(wanted) if flights.quick else values
-            scenarios |= {(place, name, v): load("kidger/city", {f"model.{name}": v, **keys, **short}) for v in chosen}
+            scenarios |= {(place, name, v): load("kidger/city", {f"model.{name}": v, **keys, **minute}) for v in chosen}
     judged_by = {(name, value) for name, a, b, _ in STATEMENTS for value in (a, b)}
     many, few = flights.count(SEEDS, 4), flights.count(CURVE, 4)
     seeds = {key: many if key[1:] in judged_by else few for key in scenarios}
