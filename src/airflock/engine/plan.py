@@ -100,6 +100,11 @@ class Plan(Facts):
         return tuple(kind for kind in self.faults if any(rule in kind.rules for rule in rules))
 
     @property
+    def struck(self) -> bool:
+        """Whether a motion step asks which lanes suffer from a fault: all move at once, and there are such faults."""
+        return bool(self.suffers("motion")) and not self.sequential
+
+    @property
     def believes(self) -> bool:
         """Whether what agents measure of themselves is not the truth: it has rows of its own."""
         return self.noisy or bool(self.suffers("sense"))
