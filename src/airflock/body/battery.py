@@ -14,18 +14,18 @@ from typing import Any
 from airflock.core.parameters import choice, quantity
 
 
-def kind() -> Any:
+def battery_kind() -> Any:
     """Parameter `battery` of a body."""
     said = "energy that never ends, or does"
     return choice("endless", ("endless", "lithium"), source="our choice", meaning=said)
 
 
-def energy(default: float, source: str) -> Any:
+def battery_energy(default: float, source: str) -> Any:
     """Parameter `capacity`, J."""
     return quantity(default, "J", low=1.0, high=1e9, source=source, meaning="energy of the battery")
 
 
-def last_share() -> Any:
+def battery_end() -> Any:
     """Parameter `weak`."""
     return quantity(
         0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",

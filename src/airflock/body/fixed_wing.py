@@ -23,10 +23,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import energy, kind, last_share, left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, left
 from airflock.core.maths import arc_cosine, clamp, norm
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"
@@ -58,9 +58,9 @@ class Parameters(Record):
         0.5, "1", low=0.01, high=1.0, source="our choice: propeller and motor", meaning="share of energy that is thrust"
     )
     gravity: float = quantity(9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight / mass")
-    battery: str = kind()
-    capacity: float = energy(540e3, "our choice: 150 Wh")
-    weak: float = last_share()
+    battery: str = battery_kind()
+    capacity: float = battery_energy(540e3, "our choice: 150 Wh")
+    weak: float = battery_end()
 
 
 class Memory(NamedTuple):

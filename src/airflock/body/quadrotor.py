@@ -19,10 +19,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import energy, hovering, kind, last_share, left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, hovering, left
 from airflock.core.maths import norm, shorten
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"  # positions move by the velocity after the step
@@ -74,12 +74,12 @@ class Parameters(Record):
     gravity: float = quantity(
         9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight per mass"
     )
-    battery: str = kind()
-    capacity: float = energy(150e3, "our choice: 42 Wh, 17 min of hovering")
+    battery: str = battery_kind()
+    capacity: float = battery_energy(150e3, "our choice: 42 Wh, 17 min of hovering")
     hover_power: float = quantity(
         150.0, "W", low=0.0, high=1e6, source=OURS, meaning="power of hovering, in air of density rho_0"
     )
-    weak: float = last_share()
+    weak: float = battery_end()
 
 
 class Memory(NamedTuple):
