@@ -83,7 +83,7 @@ def held_up(monkeypatch, length, seed, minded=True):
     """Figures of one drone before the flat side of one that hovers, where pull and push of its law balance."""
     start, towards = ranks(1), np.array([-0.7, 1.0, 0.0]) / np.hypot(0.7, 1.0)
     point = start + length * towards
-    flown = master.Master(scenario_of(1), start, point, seed, comes_and_goes=False)
+    flown = master.Master(scenario_of(1, {"model.p_wall": 4.0}), start, point, seed, comes_and_goes=False)
     flown.hulls.append(start[0] + (0.0, 1.35, 0.0))
     if not minded:
         monkeypatch.setattr(flown, "_mind", lambda: None)
