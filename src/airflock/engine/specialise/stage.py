@@ -227,7 +227,7 @@ class _Statements(Expressions):
         first, end = within
         bound, lane, zero = ast.Name(over.bound, LOAD), ast.Name(target.id, LOAD), ast.Constant(0)
         if not self.build.ranges:
-            inside = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
+            inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
             test: ast.expr = ast.BoolOp(ast.And(), inside)
             test = ast.UnaryOp(ast.Not(), test) if over.outside else test
             return _loop(target, [bound], [ast.If(test, done, [])])
