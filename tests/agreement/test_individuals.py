@@ -597,3 +597,18 @@ def test_a_fault_that_has_waited_for_its_compiler_begins_when_it_is_taken_over(m
     at_once.fault("motor", [2], share=0.0).fault("radio_silent", [1]).advance(0.5)
     assert flight.faults == at_once.faults and len(flight.faults) == 2
     assert np.array_equal(flight.state, at_once.state)
+
+
+@pytest.mark.parametrize("agents", [[0], [31], [31, 32], [39], [3, 38]])
+def test_whoever_suffers_nobody_else_is_flown_otherwise(agents):
+    """Loops take the lanes with faults by themselves (blocks of 32). Who is in range is found at 1.2 s anew."""
+    flock = {"agents": 40, "duration": 3.0, "start.radius": 60.0}
+    plain = flown([], **flock).frames
+    sound = flown([{"kind": "motor", "at": 1.03, "lasts": 0.8, "agents": agents, "share": 1.0}], **flock).frames
+    dead = flown([{"kind": "motor", "at": 1.03, "agents": agents, "share": 0.0}], **flock).frames
+    others = [i for i in range(40) if i not in agents]
+    np.testing.assert_allclose(sound, plain, rtol=0.0, atol=1e-9)
+    assert np.array_equal(dead[:7, :4, others], plain[:7, :4, others])  # up to 1.2 s, by 0.2 s
+    assert (np.abs(dead[8:, :2, agents] - plain[8:, :2, agents]).max(axis=(0, 1)) > 0.0).all()
+    stays = dead[7:, 2:4, agents]
+    assert np.array_equal(stays, np.repeat(stays[:1], len(stays), axis=0))

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.display import fly_show, points_of, show
+from airflock.body.falling import GRAVITY, fall
+from airflock.display import fly_show, master, points_of
+from airflock.display.assignment import assign
+from airflock.display.detours import BESIDE, CLEAR, beside, in_the_way, longer
 from airflock.display.show import ranks, recording_of, scenario_of
 from airflock.engine import Flight
 from airflock.recordings.scores import measure
@@ -13,7 +16,7 @@ from airflock.world.goals import glide
 
 @pytest.fixture
 def interpreted(monkeypatch):
-    monkeypatch.setattr(show, "Flight", lambda *given, **more: Flight(*given, **more, device="python"))
+    monkeypatch.setattr(master, "Flight", lambda *given, **more: Flight(*given, **more, device="python"))
 
 
 def opened(drones, seed, **keys):
@@ -74,3 +77,72 @@ def test_to_new_points_all_set_out_from_where_they_are(seed):
     known = [[glide(begun[a, k], there[k, a], at, lasts) for k in stay] for a in range(3)]
     goals = flight._state.rows(["goal_x", "goal_y", "goal_z"])[:, stay]
     np.testing.assert_allclose(goals, known, rtol=1e-12)
+
+
+def held_up(monkeypatch, length, seed, minded=True):
+    """Figures of one drone before the flat side of one that hovers, where pull and push of its law balance."""
+    start, towards = ranks(1), np.array([-0.7, 1.0, 0.0]) / np.hypot(0.7, 1.0)
+    point = start + length * towards
+    flown = master.Master(scenario_of(1, {"model.p_wall": 4.0}), start, point, seed, comes_and_goes=False)
+    flown.hulls.append(start[0] + (0.0, 1.35, 0.0))
+    if not minded:
+        monkeypatch.setattr(flown, "_mind", lambda: None)
+    flown._tell()
+    flown.form(point, [])
+    return flown.closed()[0]
+
+
+@pytest.mark.parametrize("length", [5.0, 7.0, 9.0])
+def test_a_drone_that_is_held_up_behind_a_hovering_one_gets_there(interpreted, monkeypatch, seed, length):
+    """Left to its law it stays before it for good."""
+    left, sent = held_up(monkeypatch, length, seed, minded=False), held_up(monkeypatch, length, seed)
+    assert np.isnan(left.time) and left.worst > 0.9 * length and left.detours == 0
+    assert sent.time < 20.0 and sent.worst < 1.0 and 1 <= sent.detours <= 2 and sent.hulls == 0
+
+
+def test_no_two_drones_have_the_same_point_while_some_are_sent_around(interpreted, seed):
+    rng = np.random.default_rng(seed)
+    points = ranks(9) + (0.0, 12.0, 3.0)
+    flown = master.Master(scenario_of(9), ranks(9), points, seed, comes_and_goes=False)
+    flown.hulls = [ranks(9)[4] + (0.0, 6.0, 1.0), points[4] + (0.0, -4.0, 0.0)]
+    for _ in range(20):
+        places = flown.flight.state[:3].T + rng.normal(0.0, 2.0, (9, 3))
+        flown.progress.look(places, points)
+        flown._send_out(rng.choice(9, 3, replace=False), places)
+        assert sorted(flown.target) == list(range(9))
+        assert len(np.unique(np.round(flown._aims(), 6), axis=0)) == 9  # nor the same place to fly to first
+
+
+def test_ways_around_a_hovering_drone_are_free_of_it_and_level_with_it_or_above(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(200):
+        hull, towards = rng.uniform(-9.0, 9.0, 3), rng.normal(0.0, 1.0, 3)
+        towards /= np.linalg.norm(towards)
+        place, point = hull - rng.uniform(CLEAR, 9.0) * towards, hull + rng.uniform(3.0, 40.0) * towards
+        assert in_the_way(place[None], point[None], hull[None]).all()
+        first = beside(place, point, hull[None], np.zeros((0, 3)), np.zeros((0, 3)))
+        assert np.linalg.norm(first - hull) == pytest.approx(BESIDE)
+        ways = in_the_way(np.array([place, first]), np.array([first, point]), hull[None])
+        assert not ways[0] or np.linalg.norm(place - hull) < 2.0
+        assert not ways[1]
+        assert first[2] >= hull[2] - BESIDE * abs(towards[2]) - 1e-9
+
+
+def test_points_are_given_in_a_chain_of_ways_where_one_hovers_before_the_shorter_one():
+    """36 m² of straight ways against 50 m² around; through whom hovers the first are 144 m²."""
+    drones, points = np.array([[-3.0, 0.0, 9.0], [0.0, 4.0, 9.0]]), np.array([[0.0, 4.0, 9.0], [3.0, 0.0, 9.0]])
+    more, free = longer(drones, points, np.array([[0.0, 0.0, 9.0]])), np.zeros(2, bool)
+    assert more.tolist() == [[0.0, 2.0 * BESIDE], [0.0, 0.0]]
+    assert assign(drones, points, free).tolist() == [1, 0]
+    assert assign(drones, points, free, more).tolist() == [0, 1]
+
+
+def test_a_fall_is_that_of_closed_form_in_steps_of_any_length(seed):
+    rng = np.random.default_rng(seed)
+    start, time = rng.normal(0.0, 5.0, 6), 3.0
+    for count in (1, 7, 300):
+        state = tuple(start)
+        for _ in range(count):
+            state = fall(*state, time / count)
+        np.testing.assert_allclose(state[:3], start[:3] + time * start[3:] - (0, 0, 0.5 * GRAVITY * time**2), rtol=1e-9)
+        np.testing.assert_allclose(state[3:], start[3:] - (0, 0, GRAVITY * time), rtol=1e-9)

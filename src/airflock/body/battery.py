@@ -9,6 +9,28 @@ falls linearly with the energy that was drawn, and is zero once the battery is e
 """
 
 import math
+from typing import Any
+
+from airflock.core.parameters import choice, quantity
+
+
+def battery_kind() -> Any:
+    """Parameter `battery` of a body."""
+    said = "energy that never ends, or does"
+    return choice("endless", ("endless", "lithium"), source="our choice", meaning=said)
+
+
+def battery_energy(default: float, source: str) -> Any:
+    """Parameter `capacity`, J."""
+    return quantity(default, "J", low=1.0, high=1e9, source=source, meaning="energy of the battery")
+
+
+def battery_end() -> Any:
+    """Parameter `weak`."""
+    return quantity(
+        0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
+        meaning="share of the largest thrust that is left just before the battery is empty",
+    )  # fmt: skip
 
 
 def hovering(thrust, density, b):

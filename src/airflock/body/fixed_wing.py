@@ -23,10 +23,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, left
 from airflock.core.maths import arc_cosine, clamp, norm
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"
@@ -58,14 +58,9 @@ class Parameters(Record):
         0.5, "1", low=0.01, high=1.0, source="our choice: propeller and motor", meaning="share of energy that is thrust"
     )
     gravity: float = quantity(9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight / mass")
-    battery: str = choice("endless", ("endless", "lithium"), source=OURS, meaning="energy that never ends, or does")
-    capacity: float = quantity(
-        540e3, "J", low=1.0, high=1e9, source="our choice: 150 Wh", meaning="energy of the battery"
-    )
-    weak: float = quantity(
-        0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
-        meaning="share of the largest thrust that is left just before the battery is empty",
-    )  # fmt: skip
+    battery: str = battery_kind()
+    capacity: float = battery_energy(540e3, "our choice: 150 Wh")
+    weak: float = battery_end()
 
 
 class Memory(NamedTuple):

@@ -19,10 +19,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from airflock.body.battery import hovering, left
+from airflock.body.battery import battery_end, battery_energy, battery_kind, hovering, left
 from airflock.core.maths import norm, shorten
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import quantity
 
 ACCEPTS = "velocity"
 INTEGRATION = "new"  # positions move by the velocity after the step
@@ -74,17 +74,12 @@ class Parameters(Record):
     gravity: float = quantity(
         9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight per mass"
     )
-    battery: str = choice("endless", ("endless", "lithium"), source=OURS, meaning="energy that never ends, or does")
-    capacity: float = quantity(
-        150e3, "J", low=1.0, high=1e9, source="our choice: 42 Wh, 17 min of hovering", meaning="energy of the battery"
-    )
+    battery: str = battery_kind()
+    capacity: float = battery_energy(150e3, "our choice: 42 Wh, 17 min of hovering")
     hover_power: float = quantity(
         150.0, "W", low=0.0, high=1e6, source=OURS, meaning="power of hovering, in air of density rho_0"
     )
-    weak: float = quantity(
-        0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
-        meaning="share of thrust_max that is left just before the battery is empty",
-    )  # fmt: skip
+    weak: float = battery_end()
 
 
 class Memory(NamedTuple):

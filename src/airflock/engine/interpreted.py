@@ -88,6 +88,7 @@ PLAIN: Mapping[str, Any] = {
     "math": math,
     "real": float,
     "integer": int,
+    "u64": int,
     **{constant.spelled: float(constant) for constant in words.CONSTANTS},
     "least": words.least,
     "most": words.most,

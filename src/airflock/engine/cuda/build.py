@@ -53,6 +53,7 @@ class CudaBuilder(Builder):
 
     abreast = False
     apart = False
+    ranges = False
     by_pairs = True
 
     def __init__(self, plan: Plan, shape: Shape):

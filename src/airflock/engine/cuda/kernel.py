@@ -55,6 +55,8 @@ def _time(build: CudaBuilder) -> list[str]:
         lines += ["slot_in = integer(((delay + decide_every - 1) // decide_every) % slots)"]
     lines += ["begun = integer(0)"] * bool(plan.faults)
     step = ["time = real(step) * row_c.dt", *begin_faults(build)]
+    if plan.struck:  # once anything has begun all are asked: a thread asks for its own agent at no one's cost
+        step += ["hurt_first = integer(0)", "hurt_end = integer(n) if begun > 0 else integer(0)"]
     if plan.absence:  # an instant of one of several agents, or of none, is not counted
         step += ["counted = integer(1) if n >= least(integer(2), born) else integer(0)"]
     for event in ORDER:

@@ -24,6 +24,7 @@ class Builder:
     clusters : lines that find the clusters of a metric, where a device does it otherwise than one agent after another
     abreast  : whether two agents may go through the others of a pair rule together
     apart    : whether the rows that a stage reads can be arguments of a function
+    ranges   : whether a loop over some of the lanes is one from the first of them to the last
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
     """
@@ -32,6 +33,7 @@ class Builder:
     slots = False
     abreast = True
     apart = True
+    ranges = True
     by_pairs = False
 
     def __init__(self, plan: Plan):

@@ -5,10 +5,10 @@ import ast
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call, argument
+from airflock.engine.stages import faults, start
 from airflock.engine.stages import gusts as air
 from airflock.engine.stages import move as motion
 from airflock.engine.stages import noise as outer
-from airflock.engine.stages import start
 from airflock.scenarios.wings import FORMATIONS
 
 NOISE, GUSTS = "step, m, row, whole, work, words", "step, row, whole, gust"  # what these stages are called with
@@ -37,6 +37,10 @@ def move(build: Builder) -> None:
     They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
     """
     plan = build.plan
+    struck = plan.struck and build.ranges
+    if struck:
+        found = specialise(build, faults.struck)
+        build.function("struck(time, m, row, work)", found.lines, f"return {found.answer}")
     made = specialise(build, motion.move, noise=Call(f"noise({NOISE})"), gusts=Call(f"gusts({GUSTS})"))
     parts: dict[str, tuple[str, list[str]]] = {}
     if build.wants(plan.body.move, "move", "gx", "gy", "gz"):
@@ -50,4 +54,5 @@ def move(build: Builder) -> None:
             build.function(f"{name}({arguments})", lines)
         else:
             once = in_place(once, name, lines)
-    build.stage("move", "step, n, m, row, whole, work, words, gust", once, made.body, made.answer)
+    lanes = ", hurt_first, hurt_end" * struck
+    build.stage("move", f"step, n, m, row, whole, work, words, gust{lanes}", once, made.body, made.answer)

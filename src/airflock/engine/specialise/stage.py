@@ -14,6 +14,7 @@ from airflock.engine.specialise.expressions import LOCALS, STAGES, Expressions
 from airflock.engine.specialise.text import Specialised
 from airflock.engine.specialise.values import (
     LOAD,
+    STORE,
     Bundle,
     Components,
     Loop,
@@ -214,11 +215,30 @@ class _Statements(Expressions):
             done = self.by_law(over, node, scope)
             if over.agents and self.build.in_turn:
                 return done
-            over = ast.Call(ast.Name("range", LOAD), [ast.Name(over.bound, LOAD)], [])
-            return [ast.For(self.target(node.target, scope), over, done, [], lineno=0)]
+            if over.within is not None:
+                return [self.cut(over, over.within, self.target(node.target, scope), done)]  # type: ignore[arg-type]
+            return [_loop(self.target(node.target, scope), [ast.Name(over.bound, LOAD)], done)]
         if not residual(over):
             raise scope.fault(node, f"{ast.unparse(node.iter)} is not looped over")
         return [ast.For(self.target(node.target, scope), over, self.block(node.body, scope), [], lineno=0)]
+
+    def cut(self, over: Loop, within: tuple[ast.expr, ast.expr], target: ast.Name, done: list[ast.stmt]) -> ast.stmt:
+        """A loop over some of the lanes; the others are two ranges, for which there is one text."""
+        first, end = within
+        bound, lane, zero = ast.Name(over.bound, LOAD), ast.Name(target.id, LOAD), ast.Constant(0)
+        if not self.build.ranges:
+            inside: list[ast.expr] = [ast.Compare(first, [ast.LtE()], [lane]), ast.Compare(lane, [ast.Lt()], [end])]
+            test: ast.expr = ast.BoolOp(ast.And(), inside)
+            test = ast.UnaryOp(ast.Not(), test) if over.outside else test
+            return _loop(target, [bound], [ast.If(test, done, [])])
+        ends = [first, end]
+        if over.outside:
+            part = ast.Name("part", LOAD)
+            ends = [ast.IfExp(part, end, zero), ast.IfExp(part, bound, first)]
+        # a lane that cannot be negative is not asked whether it counts from a row's end: else no loop is a vector's
+        ends = [ast.Call(ast.Name("u64", LOAD), [each], []) for each in ends]
+        inner = _loop(target, ends, done)
+        return _loop(ast.Name("part", STORE), [ast.Constant(2)], [inner]) if over.outside else inner
 
     def by_law(self, over: Loop, node: ast.For, scope: Scope) -> list[ast.stmt]:
         """What a loop does for an agent; where laws differ, for an agent of this one."""
@@ -277,6 +297,11 @@ class _Statements(Expressions):
         if kind is None:
             return self.value(node, scope)
         return Components(self.owners.spelled(_name(target), scope.text), kind)
+
+
+def _loop(target: ast.expr, ends: list[ast.expr], body: list[ast.stmt]) -> ast.stmt:
+    """A loop over a range."""
+    return ast.For(target, ast.Call(ast.Name("range", LOAD), ends, []), body, [], lineno=0)
 
 
 def _ends(statements: list[ast.stmt]) -> bool:

@@ -12,12 +12,37 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.state import Axes, Flock
 from airflock.engine.stages.words import HALF, LIMIT, ONE, ZERO, X, Y, Z, ask, choose, least, most, real
 
+BLOCK = 32  # lanes that loops take at a time (`passes.driver.SPAN`)
+
 
 def lasts(i: int, kind: Fault, time: Any, flock: Flock, numbers: Any) -> Any:
     """Whether agent i suffers from a kind of fault at a time (s); half a step is as good as none."""
     return (time - flock.fault(kind.name, "onset")[i] > -HALF * numbers.c.dt) & (
         time - flock.fault(kind.name, "onset")[i] < flock.fault(kind.name, "lasts")[i] - HALF * numbers.c.dt
     )
+
+
+def struck(lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, m: int, *, plan: Plan) -> tuple[int, int]:
+    """Lanes among which all lie who suffer from a fault of motion at a time (s) or later: the first, and the end.
+
+    They are whole blocks, as loops take lanes, so that nobody who is in none is flown otherwise. There may be more of
+    them than need be: who suffers no longer by a step, whatever the rounding, or lies between two who do.
+    """
+    lowest = LIMIT
+    highest = ZERO
+    for i in lanes:
+        until = ZERO
+        for kind in plan.suffers("motion"):
+            until = most(until, flock.fault(kind.name, "onset")[i] + flock.fault(kind.name, "lasts")[i])
+        on = until > time - numbers.c.dt
+        lowest = least(lowest, choose(on, real(i), LIMIT))
+        highest = most(highest, choose(on, real(i) + ONE, ZERO))
+    first = 0
+    end = 0
+    if highest > HALF:
+        first = int(lowest) // BLOCK * BLOCK
+        end = min((int(highest) + BLOCK - 1) // BLOCK * BLOCK, m)
+    return first, end
 
 
 def about(i: int, kind: Fault, time: Any, flock: Flock, *, plan: Plan) -> Any:

@@ -131,6 +131,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
     calm = held[CALM] > HALF
     fastest = ZERO
     following = last
+    hurt_first = 0
+    hurt_end = 0
     for step in range(first, last):
         time = real(step) * numbers.c.dt
         if plan.sequential or (step != first) | (half & 1 == 0):
@@ -162,6 +164,8 @@ def advance(  # noqa: C901 - tests of the plan leave one way through
                 take(name, time, values, sums, stages=stages, sampled=sampled)
             record(step, first, flock, frames, whole, n, plan=plan)
         if step < whole.steps:
+            if plan.struck and (step == first or step % whole.decide_every == 0):  # between, nobody changes places
+                hurt_first, hurt_end = ask(stages["struck"], time=time)
             fastest = ask(stages["turns" if plan.sequential else "move"], step=step, time=time, late=late)
             travelled += 2.0 * math.sqrt(fastest) * numbers.c.dt
     held[TRAVELLED] = travelled

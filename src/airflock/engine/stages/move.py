@@ -7,7 +7,23 @@ from airflock.core.fault import Fault
 from airflock.engine.plan import Plan
 from airflock.engine.stages.faults import hinder, lasts
 from airflock.engine.stages.state import Flock, column_of, numbers_of
-from airflock.engine.stages.words import SIDES, ZERO, X, Y, Z, aliases, ask, choose, fields, integer, most, real, wants
+from airflock.engine.stages.words import (
+    SIDES,
+    ZERO,
+    X,
+    Y,
+    Z,
+    aliases,
+    ask,
+    between,
+    beyond,
+    choose,
+    fields,
+    integer,
+    most,
+    real,
+    wants,
+)
 
 
 def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
@@ -16,18 +32,17 @@ def felt(i: int, a: int, flock: Flock, *, plan: Plan) -> Any:
 
 
 def respond(
-    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any, *, plan: Plan
-) -> None:
-    """Velocities by the rule of the body and, where anybody suffers from any, by those of its faults."""
-    if plan.suffers("motion"):
-        until = ZERO
-        for i in lanes:
-            for kind in plan.suffers("motion"):
-                until = most(until, flock.fault(kind.name, "onset")[i] + flock.fault(kind.name, "lasts")[i])
-        if until > time - numbers.c.dt:  # a step more than needed, whatever the rounding
-            accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=plan.suffers("motion"))
-        else:
-            accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
+    lanes: Iterable[int], flock: Flock, numbers: Any, time: Any, g: Any, wx: Any, wy: Any, wz: Any,
+    hurt_first: int, hurt_end: int, *, plan: Plan,
+) -> None:  # fmt: skip
+    """Velocities by the rule of the body and, among those of whom anybody suffers from any, by those of its faults."""
+    faults = plan.suffers("motion")
+    if faults and plan.sequential:
+        accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=faults)
+    elif faults:
+        sound, hurt = beyond(lanes, hurt_first, hurt_end), between(lanes, hurt_first, hurt_end)
+        accelerate(sound, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
+        accelerate(hurt, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=faults)
     else:
         accelerate(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan, faults=())
 
@@ -61,11 +76,12 @@ def accelerate(
 
 def move(
     agents: Iterable[int], lanes: Iterable[int], flock: Flock, numbers: Any, step: int, n: int,
-    noise: Callable[[], None], gusts: Callable[[], Any], *, plan: Plan,
+    noise: Callable[[], None], gusts: Callable[[], Any], hurt_first: int, hurt_end: int, *, plan: Plan,
 ) -> Any:  # fmt: skip
     """Velocities by the body, positions by the velocity before or after; returns the largest squared speed.
 
-    noise, gusts : the stages of these names, for this step
+    noise, gusts         : the stages of these names, for this step
+    hurt_first, hurt_end : lanes of those among whom somebody suffers from a fault of motion (`stages.faults.struck`)
     """
     x, v = flock.position, flock.velocity
     g = aliases()
@@ -80,7 +96,7 @@ def move(
     if plan.windy:
         wx, wy, wz = gusts()
     if plan.integration != "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan)
     fastest = ZERO
     for i in lanes:  # whole vectors, of which some lanes have no agent
         speed2 = sum(v[a][i] * v[a][i] for a in range(plan.dimensions))
@@ -89,7 +105,7 @@ def move(
         for i in lanes:
             x[a][i] += v[a][i] * numbers.c.dt
     if plan.integration == "old":
-        respond(lanes, flock, numbers, time, g, wx, wy, wz, plan=plan)
+        respond(lanes, flock, numbers, time, g, wx, wy, wz, hurt_first, hurt_end, plan=plan)
     if plan.edge:
         for i in agents:
             for a in range(plan.dimensions):
