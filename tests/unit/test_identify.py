@@ -169,6 +169,27 @@ def test_the_highest_of_two_hills_of_a_radio_is_found_though_the_other_is_wider(
     assert not others  # the lower one is not nearly as likely
 
 
+def test_a_higher_hill_between_two_lengths_that_are_tried_is_found_and_both_are_told():
+    widths = np.array([0.4, 1.0, 0.003, 0.02])
+    low = hill(np.array([29.2, 41.8, 0.98, 0.69]), widths)
+    high = hill(np.array([29.3, 51.3, 0.98, 0.46]), widths * (1.0, 1.4, 1.0, 1.0))
+    found = hills.lowest(lambda z: min(low(z) + 1.2, high(z)), 268.0)
+    fars = [hills.unpacked(z)[1] for z in found]
+    assert fars == pytest.approx([51.3, 41.8], rel=0.01)
+
+
+def test_intervals_follow_a_bent_ridge_to_its_ends():
+    # far by itself is known to 6 m, far squared times the share there to 1 %
+    def loss(z):
+        near, far, high, low = hills.unpacked(z)
+        rest = ((near - 25.0) / 1.0) ** 2 + ((high - 0.9) / 0.01) ** 2
+        return 0.5 * (rest + ((far - 60.0) / 6.0) ** 2 + (np.log(far * far * low / 1080.0) / 0.01) ** 2)
+
+    found = hills.intervals(loss, hills.packed(25.0, 60.0, 0.9, 0.3))
+    assert found["far"] == pytest.approx((60.0 - 11.76, 60.0 + 11.76), abs=0.4)
+    assert found["received_far"] == pytest.approx((1080.0 / 71.76**2, 1080.0 / 48.24**2), rel=0.03)
+
+
 def test_intervals_are_those_of_the_profile():
     numbers, widths = np.array([25.0, 60.0, 0.9, 0.3]), np.array([1.0, 2.0, 0.01, 0.03])
     top = hills.placed(60.0, [np.log(25.0 / 35.0), np.log(0.9 / 0.1), np.log((0.3 / 0.9) / (1.0 - 0.3 / 0.9))])

@@ -1,11 +1,14 @@
 """Search of infer: on laws of one line, whose highest hill is known, it is found, and what cannot be told is left."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from airflock.infer import noise as noises
+from airflock.infer import select
 from airflock.infer.candidates import Number
 from airflock.infer.fit import (
     FINE,
@@ -24,7 +27,7 @@ from airflock.infer.fit import (
 from airflock.infer.flights import Noise
 from airflock.infer.likelihood import Model
 from airflock.infer.ridges import ridges
-from airflock.infer.search import drawn, groups, hills, profile, race, usual
+from airflock.infer.search import distinct, drawn, groups, hills, profile, race, usual
 from airflock.infer.told import simplify, telling
 
 STEPS, NOISE = 400, 0.05
@@ -113,6 +116,44 @@ def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_ane
     assert profile(model, beside, [0], quietly).loss > best.loss + 20.0
     assert groups(model, beside, [0]) == [[0, 1]]
     assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
+
+
+def test_each_hill_is_climbed_once():
+    places = [np.array(u) for u in ((0.5, 0.5, 0.0), (0.52, 0.5, 0.9), (0.7, 0.5, 0.0), (0.71, 0.45, 0.0))]
+    assert [u.tolist() for u in distinct(places, (0, 1))] == [[0.5, 0.5, 0.0], [0.7, 0.5, 0.0]]
+
+
+@dataclass(frozen=True)
+class Several:
+    """A law of one line with some of its numbers."""
+
+    numbers: tuple[Any, ...]
+    scenario: Any
+
+
+def test_a_number_that_was_given_up_and_explains_something_at_the_fit_is_fitted_after_all(monkeypatch):
+    truth = {"a": 0.7, "mass": 0.5, "dead": 0.5, "bend": 0.9}
+
+    def law(x, a, mass, dead, bend):
+        return x * (a - mass) + 0.0 * dead + bend * x**2
+
+    def lines(several, tracks=(), scale=None):
+        names = [number.key.partition(".")[2] for number in several.numbers]
+        rule = lambda x, *u: law(x, **{**dict.fromkeys(truth, 0.5), **dict(zip(names, u, strict=True))})  # noqa: E731
+        model = Line(rule, names, [truth[name] for name in names])
+        model.seen = law(model.input, **truth)
+        model.law, model.own_speed, model.tracks, model.scale = several, True, (), None
+        return model
+
+    monkeypatch.setattr(select, "Model", lines)
+    monkeypatch.setattr(select, "sample", lambda model: [0])
+    numbers = Line(law, tuple(truth), tuple(truth.values())).numbers
+    whole = Several(tuple(numbers), None)
+    model = lines(Several(whole.numbers[:1], None))
+    found = climb(model, model.start(), [0])
+    fuller, better = select.regained(whole, model, found, quietly)
+    assert [number.key for number in fuller.law.numbers] == ["model.a", "model.bend"]
+    assert better.place == pytest.approx([0.7, 0.9], abs=0.03) and better.loss < found.loss - 10.0
 
 
 def test_what_is_usual_stays_until_the_rest_is_found():

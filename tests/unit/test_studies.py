@@ -197,6 +197,7 @@ def test_files_that_are_no_store_and_full_disks_are_one_line(tmp_path):
         ({"objective": {"own": "mine.py"}}, {}, "objective.own = 'mine.py': no such Python file"),
         ({}, {"population": 1}, "search.population = 1 lies outside [2, 1e+06]"),
         ({}, {"population": 10.5}, "search.population = 10.5 is not a whole number"),
+        ({}, {"late_seeds": 2.5}, "search.late_seeds = 2.5 is not a whole number"),
         ({}, {"algorithm": "cma"}, "search.algorithm = 'cma' is none of cmaes, ga"),
         ({}, {"algorithm": "nsga2"}, "is for several objectives, but there is one"),
         ({"objective": {"maximise": ["a", "b"]}}, {}, "takes one objective, but there are 2"),

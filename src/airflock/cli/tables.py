@@ -47,7 +47,10 @@ def score_table(
     published: Mapping[str, tuple[float, float | None]],
     about: Mapping[str, tuple[str, str]],
 ) -> None:
-    """Print order parameters beside what a paper reports; about: unit and meaning by name."""
+    """Print order parameters beside what a paper reports; about: unit and meaning by name.
+
+    What no flight has (a clearance where nothing stands) is named in one line below, not told as a number.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -62,7 +65,8 @@ def score_table(
         table.add_column("published", justify="right", style="cyan")
     table.add_column("unit")
     table.add_column("meaning", style="dim")
-    for key in found["mean"]:
+    untold = [key for key, mean in found["mean"].items() if _untold(key, mean) and key not in published]
+    for key in [key for key in found["mean"] if key not in untold]:
         unit, meaning = about.get(key, ("", ""))
         missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
         mean = number(found["mean"][key], missing)
@@ -76,6 +80,14 @@ def score_table(
             cells += ["" if entry is None else f"{number(entry[0])}{spread}"]
         table.add_row(*cells, unit, meaning)
     Console().print(table)
+    if untold:
+        Console().print(f"not told, as there is nothing to measure: {', '.join(untold)}", style="dim", soft_wrap=True)
+
+
+def _untold(key: str, mean: Any) -> bool:
+    """Whether no flight has such a number; an event that never happened is told as `never`."""
+    values = mean if isinstance(mean, (list, tuple)) else [mean]
+    return not key.startswith("time_to_") and bool(values) and all(math.isnan(value) for value in values)
 
 
 def emit_json(value: Any) -> None:

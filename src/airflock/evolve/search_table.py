@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from airflock.core.parameters import Parameters as Record
-from airflock.core.parameters import choice, quantity
+from airflock.core.parameters import Quantity, choice, declarations, quantity
 from airflock.evolve.fitness import Objective
 from airflock.evolve.optimisers import ALGORITHMS, SEVERAL
 from airflock.evolve.space import Space
@@ -137,25 +137,17 @@ class Search(Record):
     )
 
 
+BROKEN = ("growth", "spread", "reserve")  # numbers that need not be whole
+WHOLE = tuple(n for n, declared, _ in declarations(Search()) if isinstance(declared, Quantity) and n not in BROKEN)
+
+
 def search_faults(
     search: Search, objectives: Sequence[Objective], space: Space | None, over_scenarios: str, *, limits: bool = False
 ) -> list[str]:
     """What of a search cannot be, one line each; `space` as far as it could be read; limits: whether it has some."""
     faults = [
         f"search.{name} = {value:g} is not a whole number"
-        for name in (
-            "population",
-            "generations",
-            "seeds",
-            "restarts",
-            "seed",
-            "top",
-            "pool",
-            "final_seeds",
-            "averages",
-            "windows",
-            "again",
-        )
+        for name in WHOLE
         if (value := getattr(search, name)) != int(value)
     ]
     if search.algorithm in SEVERAL and len(objectives) < 2:

@@ -114,6 +114,7 @@ class _Comparison:
         self.reference, self.straight = select.straight(followed, scale)
         self.plain = select.hold_out(self.reference, self.straight, lambda: say("going straight on"))
         self.spans = select.sample(self.reference)
+        self.laws: dict[str, Candidate] = {}
 
     def frames(self) -> tuple[int, int]:
         """Frames on which laws are fitted, of all."""
@@ -123,6 +124,7 @@ class _Comparison:
     def of(self, candidates: Sequence[Candidate]) -> tuple[list[Law], dict[str, Model]]:
         """Laws from best to worst, and the model of each by its name."""
         gains = self.straight.place[self.reference.named :]
+        self.laws = {each.name: each for each in candidates}
         laws, models = [], {}
         for each in candidates:
             say = _teller(self.say, each.name)
@@ -134,7 +136,7 @@ class _Comparison:
     def deeper(self, best: Law, model: Model) -> tuple[Model, Law]:
         """The best law after more searching, and without numbers that the others make up for; judged anew."""
         say = _teller(self.say, f"{best.name}, simplified")
-        model, fit = select.simpler(model, best.fit, say)
+        model, fit = select.simpler(self.laws[best.name], model, best.fit, say)
         return model, self.judged(best.name, model, fit, say)
 
     def judged(self, name: str, model: Model, fit: Fit, say: Callable[[], None]) -> Law:

@@ -27,7 +27,8 @@ ALIKE = 0.5  # overlap of where two numbers act, from which they are
 GROUPS = 3  # of them, those told worst first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
 NEARLY = 3.0  # loss above the fit on few frames, up to which a hill is climbed on all
-REGROUPED = ((8, 6), (3, 10))  # how many climb, by how many steps: the group alone, then all numbers
+REGROUPED = ((16, 10), (4, 12))  # how many climb, by how many steps: the group alone, then all numbers
+SAME = 0.1  # of a range: places whose numbers of a group are all nearer than this are of one hill
 
 
 def usual(model: Model) -> list[int]:
@@ -123,15 +124,27 @@ def hills(model: Model, fit: Fit, few: Sequence[int], spans: Sequence[int], say:
     for group in groups(model, fit, few):
         places = np.tile(fit.place, (2**REDRAWN, 1))
         places[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
-        for (count, steps), free in zip(REGROUPED, (group, fit.free), strict=True):
-            places = np.array(sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[:count])
-            places = np.array([climb(model, u, free, few, steps, slopes=(WIDE,)).place for u in places])
+        (several, short), (one_by_one, long) = REGROUPED
+        best = sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[:several]
+        ends = sorted((climb(model, u, group, few, short, slopes=(WIDE, FINE)) for u in best), key=lambda end: end.loss)
+        # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
+        others = distinct([fit.place, *(end.place for end in ends)], group)[1 : 1 + one_by_one]
+        places = np.array([climb(model, u, fit.free, few, long, slopes=(WIDE, FINE)).place for u in others])
         highest = loss_at(model, fit.place, fit.free, few) + NEARLY
         likely = [u for u in places if loss_at(model, u, fit.free, few) < highest]
         found = [climb(model, u, fit.free, spans, REGROUPED[1][1], slopes=(WIDE, FINE)) for u in likely]
         fit = min([fit, *found], key=lambda each: each.loss)
         say()
     return fit
+
+
+def distinct(places: Sequence[Array], group: Sequence[int]) -> list[Array]:
+    """Places that differ from all before them in some number of a group."""
+    found: list[Array] = []
+    for u in places:
+        if all(np.abs(u - other)[list(group)].max() > SAME for other in found):
+            found.append(u)
+    return found
 
 
 def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import CLIMBS, WIDE, Fit, climb, settle
+from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, hills, profile, race, scan
 from airflock.infer.told import simplify, telling
@@ -19,6 +19,8 @@ FOLDS = 4  # parts of the tracks that are held out in turn
 ENOUGH = 24_000  # individual steps, and
 FRAMES = (400, 2400)  # least and largest number of frames, on which is fitted
 LONG = 20  # steps of a climb to the end
+ELSEWHERE = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of a number that was given up, beside its default, from which is climbed
+REGAIN = 8  # steps of such a climb
 AGAIN = 3  # steps of a climb without the part that is held out
 WILD = (1e-3, 20.0)  # share of held-out differences that are wild, and how many times their standard deviation is
 WITHIN = 1.959964  # standard deviations that hold 95 %
@@ -65,8 +67,37 @@ def fit(
     return model, found
 
 
-def simpler(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
-    """The fit after a search along each number, without numbers that the others make up for."""
+def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit with those numbers that were given up before the search, but explain something beside the fit.
+
+    Whether the others make up for a number is asked before the search (`telling`), at places that explain little. At
+    the fit the answer may differ. law : with all its numbers
+    """
+    assert model.law is not None
+    few, kept = model.few(), {number.key for number in model.law.numbers}
+    best = climb(model, found.place, found.free, few, slopes=(WIDE,))
+    for number in [number for number in law.numbers if number.key not in kept]:
+        several = tuple(other for other in law.numbers if other.key in {*kept, number.key})
+        fuller = Model(replace(law, numbers=several), model.tracks, model.scale)
+        k = several.index(number)
+        places = [np.insert(best.place, k, x) for x in (number.place(number.default), *ELSEWHERE)]
+        places.sort(key=lambda u, fuller=fuller: loss_at(fuller, u, free(fuller), few))  # type: ignore[misc]
+        tried = [climb(fuller, u, free(fuller), few, REGAIN, slopes=(WIDE,)) for u in places[:2]]
+        say()
+        with_it = min(tried, key=lambda each: each.loss)
+        if with_it.loss < best.loss - WORSE:
+            model, best, kept = fuller, with_it, {*kept, number.key}
+    if len(model.numbers) == len(found.place):
+        return model, found
+    return model, polish(model, best.place, LONG)
+
+
+def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit after a search along each number, with all numbers that explain something and no others.
+
+    law : with all its numbers
+    """
+    model, found = regained(law, model, found, say)
     other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
     found = hills(model, min(found, other, key=lambda each: each.loss), model.few(), sample(model), say)
