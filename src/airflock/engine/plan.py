@@ -104,6 +104,8 @@ class Plan(Facts):
     def bounded(self) -> bool:
         """Whether a place may lie outside: there is an arena, or something stands in the world."""
         return self.excursion is not beyond_nothing or bool(self.obstacles) or self.scene
+
+    @property
     def struck(self) -> bool:
         """Whether a motion step asks which lanes suffer from a fault: all move at once, and there are such faults."""
         return bool(self.suffers("motion")) and not self.sequential
