@@ -46,6 +46,7 @@ MODULES = {
 NAMES = {
     "CALLED": ("compiler", "CALLED"),
     "INNER": ("compiler", "INNER"),
+    "KNOWN": ("sparing", "KNOWN"),
     "SPARED": ("sparing", "SPARED"),
     "implementations": ("sparing", "implementations"),
     "Flown": ("cpu", "Flown"),

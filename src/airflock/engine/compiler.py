@@ -20,7 +20,7 @@ from numba.core.runtime import rtsys  # type: ignore[attr-defined]
 from numba.core.typed_passes import NativeLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
-from airflock.engine.sparing import sparing
+from airflock.engine.sparing import KNOWN, sparing
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array
@@ -54,6 +54,9 @@ class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
             super().add_linking_library(library)
 
     def _optimize_functions(self, module: Any) -> None:
+        if not KNOWN:
+            super()._optimize_functions(module)
+            return
         module.data_layout = self._codegen._data_layout
         written = [found for found in module.functions if not found.is_declaration]
         super()._optimize_functions(SimpleNamespace(functions=written))

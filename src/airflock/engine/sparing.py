@@ -2,6 +2,7 @@
 
 What Numba asks again for every statement is asked once, and what nobody reads is not computed. For that, parts of Numba
 are exchanged under its lock and put back before it is released: whatever else a process compiles meets Numba as it is.
+A version of Numba that nobody has tried compiles as it likes, which takes longer.
 """
 
 import gc
@@ -10,9 +11,12 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
+import numba
 from numba.core import base, event, interpreter, ssa, transforms, types
 from numba.core.postproc import PostProcessor, VariableLifetime
 
+TRIED = (0, 62), (0, 68)  # first and last version of Numba of which all this was tried
+KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
 
 _signatures: dict[Hashable, Any] = {}
@@ -25,7 +29,7 @@ def sparing() -> Iterator[None]:
     """Around the passes over one function, below Numba's lock; may be entered again for another one that it calls."""
     with ExitStack() as changed:
         changed.enter_context(seldom_collected())
-        for owner, name, spare in SPARED:
+        for owner, name, spare in SPARED if KNOWN else ():
             changed.enter_context(_exchanged(owner, name, spare))
         yield
 
@@ -35,7 +39,7 @@ def implementations() -> None:
 
     Numba imports it to learn that it is there; what needs it looks again when it is called. Below Numba's lock.
     """
-    if "numba.np.arraymath" in sys.modules:
+    if not KNOWN or "numba.np.arraymath" in sys.modules:
         return
     from numba.np import linalg
 
