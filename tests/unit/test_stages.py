@@ -165,7 +165,7 @@ class World:
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step, n,
             lambda: noise.noise(flock, whole, step, n, plan=plan),
-            lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), plan=plan,
+            lambda: gusts.gusts(numbers, whole, step, state["gust"], plan=plan), 0, 0, plan=plan,  # nobody suffers
         )  # fmt: skip
         return state
 
