@@ -178,10 +178,14 @@ def renew(
 ) -> None:
     """Fly changes and commit what comes of them after each part; the rows of other claims stay.
 
+    Raises AirflockError outside a clone, or for an unknown part.
+
     folder : where what is done is kept; papers : the folder of the pages; path : of the table
     chosen : parts, as `kidger.tuning`, in their order, else all; threads : flights side by side
     """
     pages = verdicts(papers)
+    if not pages:  # else every claim that is red as it is would be entered as not made yet
+        raise AirflockError(f"{papers}: holds no pages with verdicts; call this in a clone of Airflock")
     rows = as_judged(as_stated(committed(), {name: load(find(name).package).values() for name in PAPERS}), pages)
     tables.write(Row._fields, rows, path)
     unknown = sorted(set(chosen) - {".".join(key) for key in parts(rows)})
@@ -203,4 +207,7 @@ if __name__ == "__main__":
     parser.add_argument("--threads", type=int, help="flights side by side; as many as cores if not given")
     asked = parser.parse_intermixed_args()
     place = Path(str(resources.files("airflock_papers"))) / COMMITTED
-    renew(asked.folder, Path("papers"), place, asked.part, asked.open, asked.threads)
+    try:
+        renew(asked.folder, Path("papers"), place, asked.part, asked.open, asked.threads)
+    except AirflockError as fault:
+        parser.error(str(fault))

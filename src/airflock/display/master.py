@@ -91,19 +91,9 @@ class Master:
         while self.flight.time < until and not self._stands():
             self._fly(self._under_way() + CHECK if self._assign() else CHECK)
         far = self._distances()
-        self.formed.append(
-            Formed(
-                self.placed,
-                float(far.mean()),
-                float(far.max()),
-                len(far),
-                0,
-                self.struck,
-                0,
-                self.reassigned,
-                self.detours,
-            )  # fmt: skip
-        )
+        # collisions and contacts are known when the flight is closed
+        told = float(far.mean()), float(far.max()), len(far), 0, self.struck, 0, self.reassigned, self.detours
+        self.formed.append(Formed(self.placed, *told))
 
     def closed(self) -> list[Formed]:
         """End the flight with its last sample; the figures of all shapes, with the collisions of their windows."""

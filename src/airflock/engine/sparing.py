@@ -15,7 +15,7 @@ import numba
 from numba.core import base, event, interpreter, ssa, transforms, types
 from numba.core.postproc import PostProcessor, VariableLifetime
 
-TRIED = (0, 62), (0, 68)  # first and last version of Numba of which all this was tried
+TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
 KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
 
