@@ -10,6 +10,8 @@ import ast
 import copy
 import hashlib
 
+from airflock.rules.nodes import walk
+
 TURNS = ("snapshot", "perceive", "receive", "neighbours", "boundaries", "decide", "move", "overrule")
 STAGES = (
     *TURNS, *(f"{name}_of" for name in TURNS), "begin", "excursion", "tune", "meet", "aim_", "glide_", "appear_",
@@ -21,7 +23,7 @@ STAGES = (
 def functions(text, rows):
     """Function definitions of a driver's text by name, normalised; of other statements, those that bind a name."""
     found = {}
-    tree = _Rows(rows).visit(ast.parse(text))
+    tree = _by_name(ast.parse(text), rows)
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
             found[node.name] = node
@@ -38,14 +40,14 @@ def functions(text, rows):
             kept = sorted(a for a in arguments if a in _read(node.body))
             read_by[name] = [arguments.index(a) for a in kept]
             node.args.args = [ast.arg(a) for a in kept]
-        for call in ast.walk(node):
+        for call in walk(node):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") in read_by:
                 call.args = [call.args[k] for k in read_by[call.func.id]]
         node.body = _alive(node.body)
         lift = _Lift()
         node = lift.visit(node)
         node.body = [lift.found[key] for key in sorted(lift.found)] + node.body
-        own = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        own = {n.id for n in walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         found[name] = _Locals(own - {a.arg for a in node.args.args}).visit(node)
     return found
 
@@ -55,7 +57,7 @@ def reached(found, first="fly"):
     done, new = set(), {first}
     while new:
         done |= new
-        new = {n.id for x in new for n in ast.walk(found[x]) if isinstance(n, ast.Name)} & found.keys() - done
+        new = {n.id for x in new for n in walk(found[x]) if isinstance(n, ast.Name)} & found.keys() - done
     return {name: found[name] for name in done}
 
 
@@ -75,20 +77,16 @@ def digests(text, rows):
     return {name: hashlib.sha256(shown(found[name]).encode()).hexdigest()[:12] for name in STAGES if name in found}
 
 
-class _Rows(ast.NodeTransformer):
-    """Rows by name."""
-
-    def __init__(self, rows):
-        self.rows = {number: name for name, number in reversed(rows.items())}
-
-    def visit_Subscript(self, node):
-        self.generic_visit(node)
-        if isinstance(node.value, ast.Name) and node.value.id == "work":
+def _by_name(tree, rows):
+    """The tree with rows by name."""
+    names = {number: name for name, number in reversed(rows.items())}
+    for node in walk(tree):
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "work":
             if isinstance(node.slice, ast.Constant):
-                node.slice = ast.Constant(self.rows[node.slice.value])
+                node.slice = ast.Constant(names[node.slice.value])
             elif isinstance(node.slice, ast.Tuple) and isinstance(node.slice.elts[0], ast.Constant):
-                node.slice.elts[0] = ast.Constant(self.rows[node.slice.elts[0].value])
-        return node
+                node.slice.elts[0] = ast.Constant(names[node.slice.elts[0].value])
+    return tree
 
 
 def _with_parts(statements, parts):
@@ -110,28 +108,21 @@ def _with_parts(statements, parts):
 
 def _without_constants(statements):
     """Statements with a named constant in place of each local that is bound to nothing but that constant."""
-    nodes = [node for statement in statements for node in ast.walk(statement)]
+    nodes = [node for statement in statements for node in walk(statement)]
     stored = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
     found = {}
     for node in nodes:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
             found.setdefault(node.targets[0].id, []).append(getattr(node.value, "id", ""))
     alone = {name: to[0] for name, to in found.items() if to[0].isupper() and to == [to[0]] * stored.count(name)}
-    return [_Constants(alone).visit(statement) for statement in statements]
-
-
-class _Constants(ast.NodeTransformer):
-    def __init__(self, found):
-        self.found = found
-
-    def visit_Name(self, node):
-        if isinstance(node.ctx, ast.Load):
-            node.id = self.found.get(node.id, node.id)
-        return node
+    for node in nodes:
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            node.id = alone.get(node.id, node.id)
+    return statements
 
 
 def _read(statements):
-    return {n.id for s in statements for n in ast.walk(s) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    return {n.id for s in statements for n in walk(s) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
 
 
 def _alive(statements):
@@ -143,7 +134,14 @@ def _alive(statements):
             return statements
 
 
-class _Dead(ast.NodeTransformer):
+class _Statements(ast.NodeTransformer):
+    """Goes through statements, and into no expression."""
+
+    def generic_visit(self, node):
+        return node if isinstance(node, (ast.expr, ast.expr_context)) else super().generic_visit(node)
+
+
+class _Dead(_Statements):
     def __init__(self, read):
         self.read, self.dropped = read, False
 
@@ -166,7 +164,7 @@ class _Dead(ast.NodeTransformer):
     visit_If = visit_For
 
 
-class _Lift(ast.NodeTransformer):
+class _Lift(_Statements):
     """Takes pure bindings out, wherever they stand."""
 
     def __init__(self):

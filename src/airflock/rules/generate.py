@@ -19,6 +19,7 @@ from airflock.core import random as random_streams
 from airflock.errors import RuleError
 from airflock.rules import law
 from airflock.rules.integers import free, tree_of
+from airflock.rules.nodes import walk
 from airflock.rules.unrolled import Unrolled
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
@@ -131,7 +132,7 @@ class Source:
         _end_at_return(rewritten)
         # A loop inside a rule must be inlined before LLVM sees it: compiled on its own it is unrolled and vectorised
         # across its few scalars, and the loop over agents around it no longer is (philox: 4 times slower).
-        loops = any(isinstance(item, (ast.For, ast.While)) for item in ast.walk(node))
+        loops = any(isinstance(item, (ast.For, ast.While)) for item in walk(node))
         decorator = INLINED if loops and self.decorator and not self._apart else self.decorator
         if self._apart and (_depth(node) > 2 or "work" in {argument.arg for argument in node.args.args}):
             decorator = ALONE

@@ -13,6 +13,7 @@ from functools import cache, lru_cache
 from typing import Any
 
 from airflock.errors import RuleError
+from airflock.rules.nodes import walk
 
 BITWISE = (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor)
 KEEPING = {"min", "max", "abs"}  # integers of integers
@@ -45,7 +46,7 @@ def integers_of(rule: Callable[..., Any]) -> frozenset[str]:
     found -= set(rule.__code__.co_varnames)
     while True:
         known = len(found)
-        for item in ast.walk(node):
+        for item in walk(node):
             for used in _integer_places(item, rule):
                 found |= set(_terms(used))
             if isinstance(item, ast.For) and _called(item.iter) == "range":
@@ -145,5 +146,5 @@ def _gives_integer(rule: Callable[..., Any] | None) -> bool:
     if rule is None:
         return False
     node = tree_of(rule)
-    returned = [item.value for item in ast.walk(node) if isinstance(item, ast.Return) and item.value is not None]
+    returned = [item.value for item in walk(node) if isinstance(item, ast.Return) and item.value is not None]
     return bool(returned) and all(is_integer(value, integers_of(rule), rule) for value in returned)

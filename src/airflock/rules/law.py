@@ -7,6 +7,7 @@ from typing import Any
 
 from airflock.errors import RuleError
 from airflock.rules.integers import BITWISE, integers_of, is_integer, tree_of
+from airflock.rules.nodes import walk
 
 ALLOWED_CALLS = {"min", "max", "abs", "float", "int", "range", "len"}
 RESERVED = {"min": "least", "max": "most"}  # what a driver calls instead: no name for a variable beside it
@@ -31,7 +32,7 @@ def faults(rule: Callable[..., Any]) -> list[str]:
         complain(node, "has a decorator; a rule is a plain function")
     if TAKEN in code.co_varnames:
         complain(node, f"{TAKEN} is what the engine calls here; give the variable another name")
-    for item in ast.walk(node):
+    for item in walk(node):
         called = RESERVED.get(getattr(item.func, "id", "")) if isinstance(item, ast.Call) else None
         if called in code.co_varnames:
             complain(item, f"{called} is what the engine calls here; give the variable another name")

@@ -11,6 +11,7 @@ from typing import Any
 
 from airflock.core.vectors import names_of
 from airflock.errors import RuleError
+from airflock.rules.nodes import walk
 
 
 class Unrolled(ast.NodeTransformer):
@@ -76,7 +77,7 @@ class Unrolled(ast.NodeTransformer):
         if not isinstance(called, ast.Name) or called.id != "range" or not isinstance(node.target, ast.Name):
             return None
         index = node.target.id
-        picks = [item for item in ast.walk(node) if isinstance(item, ast.Subscript) and self.size(item.value)]
+        picks = [item for item in walk(node) if isinstance(item, ast.Subscript) and self.size(item.value)]
         if not any(_reads(item.slice, index) for item in picks) or _sets(node.body, index):
             return None
         ends = [self._whole(argument) for argument in node.iter.args]  # type: ignore[attr-defined]
@@ -115,14 +116,14 @@ class _Put(ast.NodeTransformer):
 
 
 def _reads(node: ast.AST, name: str) -> bool:
-    return any(isinstance(item, ast.Name) and item.id == name for item in ast.walk(node))
+    return any(isinstance(item, ast.Name) and item.id == name for item in walk(node))
 
 
 def _sets(statements: list[ast.stmt], name: str) -> bool:
-    named = (item for s in statements for item in ast.walk(s) if isinstance(item, ast.Name) and item.id == name)
+    named = (item for s in statements for item in walk(s) if isinstance(item, ast.Name) and item.id == name)
     return any(isinstance(item.ctx, ast.Store) for item in named)
 
 
 def _left(node: ast.For) -> bool:
     """Whether a loop may be left early, skip the rest of a turn, or do something at its end."""
-    return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in ast.walk(node))
+    return bool(node.orelse) or any(isinstance(item, (ast.Break, ast.Continue)) for item in walk(node))

@@ -17,6 +17,7 @@ from airflock.engine.cuda.shape import UNROLL
 from airflock.engine.replace import ReplacementError
 from airflock.engine.specialise.dead import read, written
 from airflock.engine.stages.words import START
+from airflock.rules.nodes import walk
 
 NEUTRAL = {how: start.spelled for how, start in START.items()}
 TOTAL = {"sum": "{a} += {b}", "min": "{a} = least({a}, {b})", "max": "{a} = most({a}, {b})"}
@@ -66,7 +67,7 @@ class _Totals:
         if context.alone and any(isinstance(s, ast.If) for s in loop.body):
             return [Everyone(context).visit(loop)] if shape.registers else [loop]
         totals = carried_totals(loop.body)
-        paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in ast.walk(loop))
+        paired = any(isinstance(s, ast.For) and _target(s) == "j" for s in walk(loop))
         body = _Pairs(context).walk(loop.body)
         body = [Registers(context).visit(s) for s in body]
         if not context.carried:
@@ -214,5 +215,5 @@ def _target(loop: ast.For) -> str:
 
 def used(statements: list[ast.stmt]) -> tuple[set[str], set[str]]:
     """Names that statements read, those among them that they add to, and names that they write."""
-    sums = [item.target for s in statements for item in ast.walk(s) if isinstance(item, ast.AugAssign)]
+    sums = [item.target for s in statements for item in walk(s) if isinstance(item, ast.AugAssign)]
     return read(statements) | written(sums), written(statements)

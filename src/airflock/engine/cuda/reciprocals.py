@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from copy import deepcopy
 
 from airflock.engine.specialise.dead import written
+from airflock.rules.nodes import walk
 
 PREFIX = "per_"
 
@@ -157,8 +158,8 @@ def with_reciprocals(
 
     records : names of the records of numbers that the stage reads
     """
-    roots = {name for s in body for item in ast.walk(s) if (name := root_name(item)) is not None}
-    roots -= {name for s in body for item in ast.walk(s) for name in stored_otherwise(item)}
+    roots = {name for s in body for item in walk(s) if (name := root_name(item)) is not None}
+    roots -= {name for s in body for item in walk(s) for name in stored_otherwise(item)}
 
     def known(expression: ast.expr) -> str | None:
         text = ast.unparse(expression)
@@ -194,7 +195,7 @@ def stored_otherwise(node: ast.AST) -> set[str]:
     if not isinstance(node, (ast.Assign, ast.AugAssign, ast.For)) or root_name(node) is not None:
         return set()
     targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-    return {item.id for target in targets for item in ast.walk(target) if isinstance(item, ast.Name)}
+    return {item.id for target in targets for item in walk(target) if isinstance(item, ast.Name)}
 
 
 def root_name(node: ast.AST) -> str | None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from airflock.engine.specialise.values import Text, kind_of
+from airflock.rules.nodes import walk
 
 TABLES = frozenset({"work", "row", "whole", "words", "store", "scene", "scratch"})  # what bindings of a driver read
 MARK = re.compile(r"@(\d+)")
@@ -41,7 +42,7 @@ class Owners:
         Raises what `fault` makes of a local of the stage that has a name which the driver itself binds.
         """
         parts: list[ast.AST] = [*statements, *([] if answer is None else [answer])]
-        names = [item for part in parts for item in ast.walk(part) if isinstance(item, ast.Name)]
+        names = [item for part in parts for item in walk(part) if isinstance(item, ast.Name)]
         bound = {item.id for item in names if kind_of(item) not in (None, "rule")} | TABLES
         clash = sorted(bound.intersection(item.id for item in names if isinstance(item.ctx, ast.Store)))
         if clash:
@@ -75,6 +76,7 @@ class _Order:
         self.shared = {*found.values()}
         self.clash: set[str] = set()
         self.left: list[Written] = []
+        self.names: dict[int, tuple[list[str], list[str]]] = {}  # of a node, by its identity
 
     def overwritten(self, statements: list[ast.stmt], answer: ast.expr | None) -> set[str]:
         """Locals of one name of which one would be read where another has been written; nothing if there are none."""
@@ -116,18 +118,24 @@ class _Order:
         self.left = outside
 
     def _read(self, node: ast.AST | None, written: Written) -> None:
-        for item in ast.walk(node) if node is not None else ():
-            if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Load) or _adds(item):
-                name = item.target.id if isinstance(item, ast.AugAssign) else item.id  # type: ignore[union-attr,attr-defined]
-                others = written.get(self.found.get(name, name), set()) - {name}
-                self.clash |= {*others, name} if others else set()
+        for name in () if node is None else self._names(node)[0]:
+            others = written.get(self.found.get(name, name), set()) - {name}
+            self.clash |= {*others, name} if others else set()
 
     def _write(self, node: ast.AST, written: Written) -> None:
-        for item in ast.walk(node):
-            if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store):
-                name = self.found.get(item.id, item.id)
-                if name in self.shared:
-                    written[name] = {item.id}
+        for name in self._names(node)[1]:
+            written[self.found.get(name, name)] = {name}
+
+    def _names(self, node: ast.AST) -> tuple[list[str], list[str]]:
+        """What a statement or an expression reads, and which shared names it writes; looked for once."""
+        if id(node) not in self.names:
+            items = walk(node)
+            named = [item for item in items if isinstance(item, ast.Name)]
+            reads = [item.id for item in named if isinstance(item.ctx, ast.Load)]
+            reads += [item.target.id for item in items if _adds(item)]  # type: ignore[attr-defined]
+            written = [item.id for item in named if isinstance(item.ctx, ast.Store)]
+            self.names[id(node)] = reads, [name for name in written if self.found.get(name, name) in self.shared]
+        return self.names[id(node)]
 
 
 def _adds(node: ast.AST) -> bool:
@@ -149,13 +157,13 @@ def shares(statements: list[ast.stmt], marked: Any, name: str) -> bool:
     if not isinstance(marked, ast.Name) or MARK.sub("", marked.id) != MARK.sub("", name):
         return False
     rest = [s for s in statements if ast.unparse(s) != f"{marked.id} = {name}"]
-    return all(item.id != name for s in rest for item in ast.walk(s) if isinstance(item, ast.Name))
+    return all(item.id != name for s in rest for item in walk(s) if isinstance(item, ast.Name))
 
 
 def renamed(statements: list[ast.stmt], old: str, new: str) -> list[ast.stmt]:
     """The statements with another name for a local, but those that would then do nothing."""
     for statement in statements:
-        for item in ast.walk(statement):
+        for item in walk(statement):
             if isinstance(item, ast.Name) and item.id == old:
                 item.id = new
     return [statement for statement in statements if ast.unparse(statement) != f"{new} = {new}"]

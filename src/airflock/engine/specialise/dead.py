@@ -3,6 +3,8 @@
 import ast
 from collections.abc import Iterable
 
+from airflock.rules.nodes import walk
+
 
 def read(nodes: Iterable[ast.AST]) -> set[str]:
     """Names that are read."""
@@ -15,7 +17,7 @@ def written(nodes: Iterable[ast.AST]) -> set[str]:
 
 
 def _names(nodes: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
-    found = (item for node in nodes for item in ast.walk(node) if isinstance(item, ast.Name))
+    found = (item for node in nodes for item in walk(node) if isinstance(item, ast.Name))
     return {item.id for item in found if isinstance(item.ctx, context)}
 
 

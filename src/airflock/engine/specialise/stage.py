@@ -29,6 +29,7 @@ from airflock.engine.specialise.values import (
 from airflock.engine.stages import words
 from airflock.engine.stages.state import SCENE, Flock, own_row
 from airflock.engine.stages.words import Itself, Named
+from airflock.rules.nodes import walk
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
 UNROLLED = (range, tuple, list, enumerate, zip)
@@ -48,7 +49,7 @@ def specialise(build: Builder, stage: Callable[..., Any], **known: object) -> Sp
     whole = without_dead([*once, *body], kept)
     first = {id(statement) for statement in once}
     parts = whole if answer is None else [*whole, answer]
-    names = [node for part in parts for node in ast.walk(part) if kind_of(node)]
+    names = [node for part in parts for node in walk(part) if kind_of(node)]
     for node in names:
         if kind_of(node) == "rule":
             node.id = build.source.name(node.item)  # type: ignore[attr-defined]
@@ -185,7 +186,7 @@ class _Statements(Expressions):
             done, answer = done + self.block(body, inner), (last.value, inner)
         else:
             done, answer = done + self.block([*body, last], inner), None
-        if any(isinstance(item, ast.Return) for statement in done for item in ast.walk(statement)):
+        if any(isinstance(item, ast.Return) for statement in done for item in walk(statement)):
             raise scope.fault(node, f"{called.__name__} returns from within")
         return done, answer
 

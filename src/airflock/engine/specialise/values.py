@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 from airflock.engine.stages.words import NOTHING, ZERO
+from airflock.rules.nodes import walk
 
 LOAD, STORE = ast.Load(), ast.Store()
 
@@ -128,11 +129,11 @@ def text_of(function: Callable[..., Any]) -> Text:
     """Syntax of a function of a module, read once."""
     code = function.__code__
     node = _module(code.co_filename)[code.co_name, code.co_firstlineno]
-    loops = [item for item in ast.walk(node) if isinstance(item, ast.comprehension)]
-    inner = {id(name) for loop in loops for name in ast.walk(loop.target)}
+    loops = [item for item in walk(node) if isinstance(item, ast.comprehension)]
+    inner = {id(name) for loop in loops for name in walk(loop.target)}
     bound = Counter(
         item.id
-        for item in ast.walk(node)
+        for item in walk(node)
         if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store) and id(item) not in inner
     )
     parameters = {a.arg for a in (*node.args.args, *node.args.kwonlyargs)}
