@@ -167,3 +167,21 @@ def test_same_sampling_gives_the_same_numbers_from_the_kernel_and_from_the_recor
 )
 def test_pictures_of_tracks_are_called_like_their_file(circling, attributes, name):
     assert name_of(circling.assign_attrs(attributes)) == name
+
+
+def test_where_nothing_stands_no_instant_has_a_clearance(circling):
+    assert over_time(circling)["clearance"].isna().all()
+    walled = over_time(circling, {"world.arena": "circle", "world.radius": 100.0})
+    assert walled["clearance"].tolist() == pytest.approx([80.0] * len(walled))
+
+
+def test_what_tracks_are_measured_with_is_told_unless_somebody_said_it(circling):
+    told = airflock.score(circling).attrs["assumed"]
+    for words in ("r_coll = 3 m", "r_cluster = 80 m", "r_comm = 80 m", "v_flock = 5 m/s (their mean speed)", "arena"):
+        assert words in told, words
+    known = {"metrics.r_coll": 0.1, "metrics.v_flock": 5.0, "world.arena": "circle", "world.radius": 100.0}
+    assert (
+        airflock.score(circling, settings=known).attrs["assumed"] == "metrics.r_cluster = 80 m, metrics.r_comm = 80 m"
+    )
+    flown = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", {"agents": 2, "duration": 1.0}))
+    assert airflock.score(flown).attrs["assumed"] == ""

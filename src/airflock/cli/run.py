@@ -147,13 +147,16 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
     from airflock.metrics.registry import reports
     from airflock.recordings.attributes import faults, told_faults
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import aero_settings, measure, scenario_of
+    from airflock.recordings.scores import aero_settings, assumed, measure, scenario_of
 
     rows, courses, befell = [], [], []
     about: dict[str, tuple[str, str]] = {}
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
         settings = aero_settings(recording, changed) if aero else changed
+        taken = assumed(recording, settings)
+        if taken:
+            tables.say(f"note: {path}: tells no scenario; measured with {taken}; --set says otherwise")
         values, course = measure(recording, settings)
         about |= reports(scenario_of(recording, settings).measures)
         rows.append(values)

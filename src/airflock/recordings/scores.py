@@ -12,6 +12,7 @@ import xarray as xr
 from airflock.aero import descent
 from airflock.body.registry import BODIES
 from airflock.core.contract import Model
+from airflock.core.maths import FAR
 from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
@@ -78,7 +79,8 @@ def score(
     Returns
     -------
     pandas.DataFrame
-        One row per flight, one column per order parameter; `attrs["units"]` and `attrs["meanings"]` say what they are.
+        One row per flight, one column per order parameter; `attrs["units"]` and `attrs["meanings"]` say what they are,
+        and `attrs["assumed"]` what tracks that tell no scenario were measured with.
 
     Raises
     ------
@@ -107,7 +109,9 @@ def score(
                 table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
             return table
         values, _ = measure(what, settings)
-        return _about(pd.DataFrame([values]), scenario_of(what, settings))
+        table = _about(pd.DataFrame([values]), scenario_of(what, settings))
+        table.attrs["assumed"] = assumed(what, settings)
+        return table
     scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
@@ -173,6 +177,7 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
+    course = course.mask(course >= 0.5 * FAR)  # a clearance where nothing stands, a time of what has not happened
     if frames.shape[2] == 1:  # no pair, no distance
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
@@ -188,6 +193,7 @@ def _on(own: Own) -> tuple[float, float, float]:
     return own.vx, own.vy, own.vz
 
 
+ARENAS = {"arena", "file", "corners"}  # keys that say where somebody flew
 # Stands where the law of a recording is not known: it is measured, not flown.
 UNKNOWN = Model(name="unknown", Parameters=_Nothing, command="velocity", decide=_on)
 
@@ -228,6 +234,19 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
         "world": {"dimensions": str(dims), "arena": "none"},
     }
     return make(document, "recording", settings, given=Given(law=UNKNOWN))
+
+
+def assumed(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> str:
+    """What tracks that tell no scenario are measured with, where no setting says it; empty where nothing is assumed."""
+    if scenario_document(recording) is not None:
+        return ""
+    scenario = scenario_of(recording, settings)
+    q, said = scenario.measured_by(), {key.rpartition(".")[2] for key in settings or {}}
+    lengths = [("r_coll", "m"), ("r_cluster", "m"), ("r_comm", "m"), ("v_flock", "m/s")]
+    told = [f"metrics.{key} = {getattr(q, key):.3g} {unit}" for key, unit in lengths if key not in said]
+    told += ["world.arena = none"] if scenario.world.arena == "none" and not said & ARENAS else []
+    about = " (their mean speed)" if "v_flock" not in said else ""
+    return ", ".join(told).replace(" m/s", f" m/s{about}")
 
 
 def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, Any]) -> Scenario:
