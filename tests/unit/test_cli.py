@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+import airflock
 from airflock.cli.main import app
 from processes import called, hear_interrupts
 
@@ -166,3 +167,25 @@ def test_interrupt_ends_with_one_line_and_status_2():
     assert running.returncode == 2
     *notes, last = stderr.strip().splitlines()
     assert last.startswith("airflock: interrupted") and all(line.startswith("note: ") for line in notes)
+
+
+def test_a_time_flown_may_carry_its_unit():
+    from airflock.cli.options import settings
+
+    assert settings(None, None, "600") == {"duration": 600.0}
+    assert airflock.load("vasarhelyi_2018/4ms", settings(None, 4, "2min")).flight.duration == 120.0
+    assert "unit is s" in called("run", "vasarhelyi_2018/4ms", "--duration", "2m").stderr
+
+
+@pytest.mark.parametrize(("name", "words"), [("mine.py", "--law"), ("flight.nc", "airflock score")])
+def test_what_is_no_scenario_says_what_takes_it(tmp_path, name, words):
+    path = tmp_path / name
+    path.write_text("x = 1\n")
+    for verb in (["run"], ["evolve", "--out", str(tmp_path / "study")]):
+        told = called(verb[0], str(path), *verb[1:]).stderr
+        assert words in told and told.count("\n") == 1, told
+
+
+def test_a_scenario_that_is_not_there_is_named_once(tmp_path):
+    told = called("evolve", "vasarhelyi_2018/4m", "--out", str(tmp_path / "study")).stderr
+    assert told.startswith("airflock: vasarhelyi_2018/4m: no such file")

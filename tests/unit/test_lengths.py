@@ -28,7 +28,8 @@ def tracks(seed, agents=12, frames=40):
 def test_what_depends_on_a_length_says_so(kind, seed):
     """Brute force: each length is changed, and whatever then differs is not told without it."""
     recording = tracks(seed)
-    settings = {"metrics.kind": kind, **{f"metrics.{key}": value for key, value in GIVEN.items()}}
+    settings = {"metrics.kind": kind, "world.arena": "square", "world.side": 200.0}
+    settings |= {f"metrics.{key}": value for key, value in GIVEN.items()}
     assert not_told(recording, settings) == {}
     here = measure(recording, settings)[0]
     for key, value in GIVEN.items():

@@ -22,7 +22,12 @@ Set = Annotated[
 Seeds = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of flights, with seeds 0, 1, 2, ...")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="Seed of the first flight.")]
 Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_default="the scenario's")]
-Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_default="the scenario's")]
+Duration = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME", help="Time flown, such as 10min; a plain number is in s.", show_default="the scenario's"
+    ),
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
 Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
@@ -40,7 +45,7 @@ SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help
 
 
 def settings(
-    pairs: list[str] | None, agents: int | None = None, duration: float | None = None, option: str = "--set"
+    pairs: list[str] | None, agents: int | None = None, duration: str | None = None, option: str = "--set"
 ) -> dict[str, Any]:
     """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
     found: dict[str, Any] = {}
@@ -59,7 +64,8 @@ def settings(
     if agents is not None:
         found["agents"] = agents
     if duration is not None:
-        found["duration"] = duration
+        given = value(duration, "--duration")
+        found["duration"] = float(given) if isinstance(given, int) else given
     return found
 
 

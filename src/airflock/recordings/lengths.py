@@ -1,7 +1,8 @@
 """Lengths: without one that fits, some order parameters of tracks say nothing; 3 m of a drone are not a fish's.
 
 A simulated recording brings its scenario. Tracks and logs bring none, so that what counts as near, as apart or as the
-speed that is wanted must be said; what depends on a number that nobody said is not told.
+speed that is wanted must be said; what depends on a number that nobody said is not told, nor is an excursion where
+nobody said out of what.
 """
 
 from collections.abc import Iterable, Mapping
@@ -57,11 +58,15 @@ def in_bodies(length: float) -> dict[str, float]:
     return {f"metrics.{key}": share * length for key, share in IN_BODIES.items()}
 
 
-def unsaid(names: Iterable[str], kind: str, settings: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Order parameters of a metric set that depend on keys which settings do not give, and these keys."""
+def unsaid(names: Iterable[str], kind: str, settings: Mapping[str, Any], *, arena: bool) -> dict[str, tuple[str, ...]]:
+    """Order parameters of a metric set that depend on keys which settings do not give, and these keys.
+
+    arena : whether settings give one, without which nobody is ever outside
+    """
     needs = {**NEEDS, "fitness": FITNESSES.get(kind, ())}
     missing = {name: tuple(key for key in needs.get(name, ()) if f"metrics.{key}" not in settings) for name in names}
-    return {name: keys for name, keys in missing.items() if keys}
+    outside = {"phi_wall": ("world.arena",)} if "phi_wall" in missing and not arena else {}
+    return {name: keys for name, keys in missing.items() if keys} | outside
 
 
 def told(found: Mapping[str, tuple[str, ...]]) -> str:
@@ -69,6 +74,6 @@ def told(found: Mapping[str, tuple[str, ...]]) -> str:
     keys = sorted({key for needed in found.values() for key in needed})
     lengths = " or ".join(filter(None, (
         "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
-        " ".join(f"--set metrics.{key}=..." for key in keys),
+        " ".join(f"--set {key if '.' in key else f'metrics.{key}'}=..." for key in keys),
     )))  # fmt: skip
     return f"not told, as tracks do not say what is near or fast: {', '.join(found)}; give {lengths}"

@@ -12,6 +12,7 @@ import xarray as xr
 from airflock.aero import descent
 from airflock.body.registry import BODIES
 from airflock.core.contract import Model
+from airflock.core.maths import FAR
 from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
@@ -139,12 +140,10 @@ def not_told(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -
     """
     if scenario_document(recording) is not None:
         return {}
-    found = scenario_of(recording, settings).measures
-    return unsaid(
-        (*reports(found), *(name for each in found.metrics for name in each.Sample._fields)),  # type: ignore[attr-defined]
-        found.name,
-        settings or {},
-    )
+    scenario = scenario_of(recording, settings)
+    sampled = (name for metric in scenario.measures.metrics for name in metric.Sample._fields)  # type: ignore[attr-defined]
+    names = (*reports(scenario.measures), *sampled)
+    return unsaid(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
 
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
@@ -206,6 +205,7 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
+    course = course.mask(course >= 0.5 * FAR)  # a clearance where nothing stands, a time of what has not happened
     if frames.shape[2] == 1:  # no pair, no distance
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
