@@ -2,9 +2,11 @@
 
 import re
 from dataclasses import replace
+from typing import NamedTuple
 
 import pytest
 
+from airflock.core.contract import metric
 from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from needed import needed
@@ -79,6 +81,15 @@ def test_ptx_of_one_big_flock():
                 assert "ld.global.nc.v4.f32" in text  # a candidate is two loads of four numbers
 
 
+class Centre(NamedTuple):
+    centre_x: float
+
+
+def renamed(mean):
+    found = mean
+    return Centre(found.x)
+
+
 def test_a_mean_that_no_rule_reads_is_not_exchanged_between_threads():
     """A shuffle counts as being read, so that no compiler drops the sum behind it."""
     from inside import kernel_text, shape_of
@@ -92,3 +103,4 @@ def test_a_mean_that_no_rule_reads_is_not_exchanged_between_threads():
     assert sums(["polarisation"]) == {"h"}
     assert sums(["rotation"]) == {"x", "v"}
     assert sums(["speed"]) == set()
+    assert sums([metric({"Sample": Centre, "sample": renamed}, "own")]) == {"x", "v", "h"}  # its text does not tell

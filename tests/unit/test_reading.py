@@ -71,11 +71,7 @@ def test_where_the_text_does_not_tell_nothing_is_said(rule):
 @pytest.mark.parametrize("rule", RULES)
 def test_whatever_a_shipped_rule_reads_of_a_mean_was_told(rule):
     mean = Noted()
-    rule(
-        *(
-            mean if name == "mean" else Noted() if name in RECORDS else 0.5
-            for name in inspect.signature(rule).parameters
-        )
-    )
+    given = {name: Noted() if name in RECORDS else 0.5 for name in inspect.signature(rule).parameters}
+    rule(**given | {"mean": mean})
     assert mean.noted
     assert mean.noted <= fields_read(rule, "mean") <= set(Mean._fields)
