@@ -92,6 +92,8 @@ def shill(seeds: int = 60, first: int = 1000) -> None:
     tell("circling flights", f"Table S4 {(turns > 0.8).sum()}, Table S1 {(turns_s1 > 0.8).sum()} of {seeds}")
     for name, those in (("Table S4 circles", turns > 0.8), ("it does not", turns <= 0.8)):
         gap = (s4 - s1)[those]
+        if gap.size < 2:
+            continue
         error = gap.std(ddof=1) / gap.size**0.5
         tell(name, f"{s4[those].mean():.2f} against {s1[those].mean():.2f}, {gap.mean():.3f} ± {error:.3f}")
 
