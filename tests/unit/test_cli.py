@@ -58,6 +58,8 @@ def test_first_seed_flies_the_same_flight_as_the_same_seed_among_many():
     ("arguments", "words"),
     [
         (["run", "vasarhelyi_2018/4m"], ["no such file or preset", "did you mean vasarhelyi_2018/4ms?"]),
+        (["run", "nope.toml"], ["nope.toml: no such file or preset; airflock presets lists the presets"]),
+        (["fleet", "vasarhelyi_2018/real_4ms", "--mode", "proceses"], ["--mode proceses", "did you mean processes?"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.p_repp=1"], ["model.p_repp", "did you mean model.p_rep?"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.r0_rep=-4"], ["model.r0_rep = -4 m", "[0, 1000] m"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.limit=capp"], ["model.limit", "did you mean cap?"]),
@@ -174,7 +176,7 @@ def test_a_time_flown_may_carry_its_unit():
 
     assert settings(None, None, "600") == {"duration": 600.0}
     assert airflock.load("vasarhelyi_2018/4ms", settings(None, 4, "2min")).flight.duration == 120.0
-    assert "unit is s" in called("run", "vasarhelyi_2018/4ms", "--duration", "2m").stderr
+    assert "--duration 2m: write a time" in called("run", "vasarhelyi_2018/4ms", "--duration", "2m").stderr
 
 
 @pytest.mark.parametrize(("name", "words"), [("mine.py", "--law"), ("flight.nc", "airflock score")])

@@ -1,5 +1,6 @@
 """Options that several verbs share, and what they turn into."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
@@ -64,9 +66,16 @@ def settings(
     if agents is not None:
         found["agents"] = agents
     if duration is not None:
-        given = value(duration, "--duration")
-        found["duration"] = float(given) if isinstance(given, int) else given
+        found["duration"] = time_of(duration, "--duration")
     return found
+
+
+def time_of(text: str, option: str = "--budget") -> float:
+    """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
+    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+    if found is None or not float(found[1]) > 0.0:
+        raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
+    return float(found[1]) * SECONDS[found[2] or "s"]
 
 
 def value(text: str, where: str) -> Any:

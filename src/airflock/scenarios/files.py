@@ -142,7 +142,9 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     known = presets()
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
-        hint = meant(name, known, "; airflock presets lists the presets", lead="; ", cutoff=0.4)
+        # whoever names a file means a preset only where the names are much alike
+        word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
+        hint = meant(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
     if path.suffix.lower() in NO_SCENARIO:
         raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
