@@ -35,6 +35,8 @@ def move(build: Builder) -> None:
     """Function move, with what the stages noise and gusts do once per step, where the body and the wind have them.
 
     They stand in its own lines, which compile to the same bits as ever; where agents move in turn they are functions.
+    Where rows of faults are read beside those of states, all are told to lie apart: else those that are written are
+    compared with every other at every step. Bodies with a memory keep their bits so (decision 0116).
     """
     plan = build.plan
     struck = plan.struck and build.ranges
@@ -55,4 +57,5 @@ def move(build: Builder) -> None:
         else:
             once = in_place(once, name, lines)
     lanes = ", hurt_first, hurt_end" * struck
-    build.stage("move", f"step, n, m, row, whole, work, words, gust{lanes}", once, made.body, made.answer)
+    many = bool(plan.suffers("motion")) and not plan.body.Memory
+    build.stage("move", f"step, n, m, row, whole, work, words, gust{lanes}", once, made.body, made.answer, apart=many)
