@@ -9,7 +9,7 @@ from airflock.errors import RecordingError
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import measure
 
-BY = {"metrics.kind": "zapotecatl", "metrics.max_e": 2.25}
+BY = {"metrics.kind": "zapotecatl", "metrics.max_e": 2.25, "metrics.r_b": 0.05}
 
 
 def recording(times=3, agents=1, fill=0.3):
