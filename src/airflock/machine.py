@@ -19,10 +19,17 @@ def processor() -> str:
 
 
 @cache
+def kind() -> str:
+    """Kind of the processor for which drivers are compiled, for instance znver4: flights of one seed have its bits."""
+    import llvmlite.binding as llvm
+
+    return str(llvm.get_host_cpu_name())
+
+
+@cache
 def toolchain() -> str:
     """Versions and processor that compiled code depends on."""
     import llvmlite
-    import llvmlite.binding as llvm
     import numba
     import numpy
 
@@ -32,7 +39,7 @@ def toolchain() -> str:
             numba.__version__,
             llvmlite.__version__,
             numpy.__version__,
-            llvm.get_host_cpu_name(),
+            kind(),
         )
     )
 

@@ -351,3 +351,11 @@ def test_an_interruption_ends_one_long_flight():
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_a_flight_says_which_it_is_and_how_far(scenario):
+    flight = airflock.open(scenario, 7).advance(0.5)
+    assert (
+        repr(flight)
+        == f"<Flight {scenario.name}, seed 7: 0.5 of {scenario.flight.duration:g} s, {scenario.agents} agents>"
+    )

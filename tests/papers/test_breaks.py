@@ -118,9 +118,16 @@ def test_a_table_of_statements_fills_names_in_their_changes_too() -> None:
 
 
 def test_only_verdicts_that_differ_are_told() -> None:
-    old = [quick.Verdict("p", "a", "x", "holds", 1.0), quick.Verdict("p", "a", "y", "holds", 1.0)]
-    new = [old[0]._replace(ours=2.0), quick.Verdict("p", "a", "z", "finding", 3.0)]
-    assert quick.changed(old, new) == [("p", "y", "holds", ""), ("p", "z", "", "finding")]
+    old = [quick.Verdict("p", "a", "x", "holds", 1.0, "zen"), quick.Verdict("p", "a", "y", "holds", 1.0, "zen")]
+    new = [old[0]._replace(ours=2.0), quick.Verdict("p", "a", "z", "finding", 3.0, "zen")]
+    assert quick.changed(old, new) == [("p", "y", "holds", "", ""), ("p", "z", "", "finding", "")]
+
+
+def test_flights_of_another_processor_are_other_flights() -> None:
+    old = [quick.Verdict("p", "a", name, "holds", 1.0, "zen") for name in "xy"]
+    new = [old[0]._replace(verdict="does not hold", processor="lake"), old[1]._replace(verdict="does not hold")]
+    here, there = (row.elsewhere for row in quick.changed(old, new))
+    assert (here, there) == ("zen", "")  # what the same kind of processor judges otherwise is a fault
 
 
 def test_a_part_that_was_flown_is_not_flown_again_unless_the_texts_changed(tmp_path, monkeypatch) -> None:

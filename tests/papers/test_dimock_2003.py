@@ -8,8 +8,8 @@ import pytest
 from airflock.engine import fly
 from airflock.metrics import fitness_dimock
 from airflock.scenarios.files import load
-from airflock_papers.dimock_2003 import ga, ga_claims, robust, robust_claims, static
-from airflock_papers.dimock_2003.flights import Flight, in_row
+from airflock_papers.dimock_2003 import flights, ga, ga_claims, robust, robust_claims, static
+from airflock_papers.dimock_2003.flights import Flight, Start, Task, in_row
 from airflock_papers.dimock_2003.units import BEST, FT_LBF, HORSEPOWER, gains
 
 
@@ -18,6 +18,14 @@ def test_the_published_gains_lie_on_the_chromosome():
     assert found[:3] == pytest.approx(BEST[:3], abs=0.005)
     assert found.r_a == pytest.approx(BEST.r_a, abs=0.005)
     assert abs(found.r_c - BEST.r_c) > 0.03  # on no k of the printed bounds
+
+
+def test_a_change_of_nothing_leaves_each_flight_its_own_gains_and_start():
+    tasks = [Task(BEST._replace(k_d=k_d), start) for k_d in (0.0, 3.0) for start in (Start(sx=5.0, sy=5.0), Start())]
+    plain, changed = (flights.Birds(1, changes=c).fly("", tasks, 1.0) for c in ({}, {"metrics.r_coll": 0.1524}))
+    for before, after in zip(plain, changed, strict=True):
+        np.testing.assert_array_equal(after.frames, before.frames)
+    assert len({flight.power for flight in plain}) == len(tasks)
 
 
 def test_units():

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+import airflock
 from airflock.cli.main import app
 from processes import called, hear_interrupts
 
@@ -57,6 +58,8 @@ def test_first_seed_flies_the_same_flight_as_the_same_seed_among_many():
     ("arguments", "words"),
     [
         (["run", "vasarhelyi_2018/4m"], ["no such file or preset", "did you mean vasarhelyi_2018/4ms?"]),
+        (["run", "nope.toml"], ["nope.toml: no such file or preset; airflock presets lists the presets"]),
+        (["fleet", "vasarhelyi_2018/real_4ms", "--mode", "proceses"], ["--mode proceses", "did you mean processes?"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.p_repp=1"], ["model.p_repp", "did you mean model.p_rep?"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.r0_rep=-4"], ["model.r0_rep = -4 m", "[0, 1000] m"]),
         (["run", "vasarhelyi_2018/4ms", "--set", "model.limit=capp"], ["model.limit", "did you mean cap?"]),
@@ -166,3 +169,25 @@ def test_interrupt_ends_with_one_line_and_status_2():
     assert running.returncode == 2
     *notes, last = stderr.strip().splitlines()
     assert last.startswith("airflock: interrupted") and all(line.startswith("note: ") for line in notes)
+
+
+def test_a_time_flown_may_carry_its_unit():
+    from airflock.cli.options import settings
+
+    assert settings(None, None, "600") == {"duration": 600.0}
+    assert airflock.load("vasarhelyi_2018/4ms", settings(None, 4, "2min")).flight.duration == 120.0
+    assert "--duration 2m: write a time" in called("run", "vasarhelyi_2018/4ms", "--duration", "2m").stderr
+
+
+@pytest.mark.parametrize(("name", "words"), [("mine.py", "--law"), ("flight.nc", "airflock score")])
+def test_what_is_no_scenario_says_what_takes_it(tmp_path, name, words):
+    path = tmp_path / name
+    path.write_text("x = 1\n")
+    for verb in (["run"], ["evolve", "--out", str(tmp_path / "study")]):
+        told = called(verb[0], str(path), *verb[1:]).stderr
+        assert words in told and told.count("\n") == 1, told
+
+
+def test_a_scenario_that_is_not_there_is_named_once(tmp_path):
+    told = called("evolve", "vasarhelyi_2018/4m", "--out", str(tmp_path / "study")).stderr
+    assert told.startswith("airflock: vasarhelyi_2018/4m: no such file")

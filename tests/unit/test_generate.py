@@ -77,6 +77,11 @@ def unknown(x):
     return x * wieght  # noqa: F821
 
 
+def tells(x):
+    hash(x)
+    return x
+
+
 def rebound(form, x):
     form = 1.0  # noqa: F841
     return x
@@ -103,7 +108,11 @@ def test_defaults_and_truths_reach_a_driver():
 
 @pytest.mark.parametrize(
     ("rule", "said"),
-    [(unknown, "uses wieght, which is neither"), (rebinds, "rule rebound sets form, a choice that it is handed")],
+    [
+        (unknown, "uses wieght, which is neither a number, a plain function nor a NamedTuple; it is not defined"),
+        (tells, "uses hash, which is neither a number, a plain function nor a NamedTuple; it does not compile; the"),
+        (rebinds, "rule rebound sets form, a choice that it is handed"),
+    ],
 )
 def test_what_no_driver_can_hold_is_one_line(rule, said):
     with pytest.raises(RuleError) as found:

@@ -349,3 +349,20 @@ def test_what_a_wrong_unit_of_time_says_to_write_is_right(tmp_path, header, time
     advice = re.search(r"write --map \"t:=(.+?)\"; or keep", str(fault.value))[1]
     found = airflock.load_tracks(tmp_path / "a.csv", map={"t": advice})
     assert float(found["time"][-1] - found["time"][0]) == pytest.approx(29.9, rel=1e-3)
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 30000.0 / 1001.0, 24.0])
+def test_frames_of_a_video_are_the_frames_of_the_recording(rate):
+    frames = np.arange(4000)
+    jitter = np.random.default_rng(5).normal(0.0, 1.0, (len(frames), 2))
+    table = pd.DataFrame({"frame": frames, "id": 0, "x": jitter[:, 0], "y": jitter[:, 1]})
+    found = airflock.load_tracks(table, fps=rate, unit="m", precision=64, accept=["jumps"])
+    assert found.sizes["time"] == len(frames)
+    assert found.attrs["fps"] == pytest.approx(rate, rel=1e-12)
+    assert np.array_equal(values(found)[:, :, 0], jitter)
+
+
+def test_times_in_whole_microseconds_keep_the_rate_of_the_camera():
+    t = np.round(np.arange(300) / 30.0, 6)
+    found = airflock.load_tracks(pd.DataFrame({"t": t, "id": 0, "x": t, "y": 0.0 * t}), unit="m")
+    assert found.attrs["fps"] == pytest.approx(30.0, rel=1e-12)

@@ -603,3 +603,8 @@ def test_a_picture_of_panels_needs_axes_of_a_grid():
     figure = style.Picture(4.0, 4.0)
     with pytest.raises(airflock.AirflockError, match="axes of a grid"):
         airflock.plot("vasarhelyi_2018/4ms", "rules", ax=figure.add_axes((0.1, 0.1, 0.8, 0.8)))
+
+
+def test_a_misspelled_kind_of_picture_is_guessed():
+    with pytest.raises(AirflockError, match="did you mean series"):
+        airflock.plot("vasarhelyi_2018/4ms", "seriez")

@@ -2,9 +2,11 @@
 
 import re
 from dataclasses import replace
+from typing import NamedTuple
 
 import pytest
 
+from airflock.core.contract import metric
 from airflock.engine import plan_of
 from airflock.scenarios.files import load, presets
 from needed import needed
@@ -77,3 +79,28 @@ def test_ptx_of_one_big_flock():
             assert doubles(text) == []
             if kernel == "advance":
                 assert "ld.global.nc.v4.f32" in text  # a candidate is two loads of four numbers
+
+
+class Centre(NamedTuple):
+    centre_x: float
+
+
+def renamed(mean):
+    found = mean
+    return Centre(found.x)
+
+
+def test_a_mean_that_no_rule_reads_is_not_exchanged_between_threads():
+    """A shuffle counts as being read, so that no compiler drops the sum behind it."""
+    from inside import kernel_text, shape_of
+
+    def sums(metrics):
+        found = load("vicsek_1995/ordered", metrics=metrics)
+        text = kernel_text(plan_of(found, precision=32), shape_of(found.agents, 1))
+        return {row for row in ("x", "v", "h") if f"s{row}_x = warp_sum(s{row}_x, tid)" in text}
+
+    assert sums(["milling"]) == {"x"}
+    assert sums(["polarisation"]) == {"h"}
+    assert sums(["rotation"]) == {"x", "v"}
+    assert sums(["speed"]) == set()
+    assert sums([metric({"Sample": Centre, "sample": renamed}, "own")]) == {"x", "v", "h"}  # its text does not tell

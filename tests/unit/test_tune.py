@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import airflock
 from airflock.certify.asked import campaign_of
 from airflock.certify.seeds import identity
-from airflock.cli.certify import time_of
+from airflock.cli.options import time_of
 from airflock.errors import RecordingError, ScenarioError, StudyError
 from airflock.evolve.race import ROUNDS
 from airflock.evolve.store import Store

@@ -26,7 +26,7 @@ from airflock.plots.picture import KINDS
         ("run x --seeds abc", "run: --seeds abc is not a number; give [1, 1000000]"),
         ("run x --seeds 1.5", "run: --seeds 1.5 is not a whole number; give [1, 1000000]"),
         ("run x --first-seed -1", "run: --first-seed -1 lies outside [0, inf]"),
-        ("run x --duration soon", "run: --duration soon is not a number"),
+        ("run x --duration soon", "--duration soon: write a time above 0 such as 90s, 10min or 2h"),
         ("run x --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
         ("run x --seeds", "--seeds needs a value"),
         ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),

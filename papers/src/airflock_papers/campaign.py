@@ -37,7 +37,6 @@ SEEDS = {
     ("vasarhelyi_2018", "pressure"): 20,
     ("vasarhelyi_2018", "tuning"): 40,
     ("vasarhelyi_2018", "real"): 10,
-    ("vasarhelyi_2018", "beyond"): 100,
     ("zapotecatl_2016", "sequential"): 6,
     ("kidger", "alone"): 10,
     ("kidger", "conduct"): 10,

@@ -2,6 +2,9 @@
 
 A part that is done is kept in a folder with a hash of all texts that decide a flight, so that a run that was cut off
 goes on where it stopped. `python -m airflock_papers.quick` flies everything and commits what it finds.
+
+Vectors of other lengths add in another order. So another kind of processor flies other flights of the same seeds, which
+soon differ whole, and a verdict of few flights may be another by chance: each row names the kind that flew it.
 """
 
 import json
@@ -12,6 +15,7 @@ from typing import NamedTuple
 
 from airflock import atomic
 from airflock.doors import TextError, json_object, read_text
+from airflock.machine import kind
 from airflock_papers import PAPERS
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find
@@ -23,22 +27,27 @@ EVERY = 10.0  # s between two lines of progress
 
 
 class Verdict(NamedTuple):
-    """Verdict on one claim in the small form."""
+    """Verdict on one claim in the small form, and the kind of processor that flew it."""
 
     paper: str
     part: str
     id: str
     verdict: str
     ours: float
+    processor: str
 
 
 class Changed(NamedTuple):
-    """A claim whose verdict is no longer the committed one; an empty verdict where it is not on one of the lists."""
+    """A claim whose verdict is not the committed one; an empty verdict where it is not on one of the lists.
+
+    elsewhere : the kind of processor on which the committed one was flown, if it is another: not judged
+    """
 
     paper: str
     id: str
     committed: str
     found: str
+    elsewhere: str = ""
 
 
 def parts() -> list[tuple[str, str]]:
@@ -53,7 +62,7 @@ def parts() -> list[tuple[str, str]]:
 def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) -> list[Verdict]:
     """Verdicts of every part; what is done is kept in the folder, with a log of the progress."""
     folder.mkdir(parents=True, exist_ok=True)
-    now = texts()
+    now = f"{texts()} on {kind()}"
     found: list[Verdict] = []
     todo = parts()
     for number, (name, part) in enumerate(todo, 1):
@@ -62,7 +71,7 @@ def fly(folder: Path, say: Callable[[str], None], threads: int | None = None) ->
         if kept is None:
             kept = _flown(name, part, threads, teller(folder / "log.txt", say, f"{number}/{len(todo)} {name} {part}"))
             atomic.write(path, json.dumps({"texts": now, "verdicts": kept}))
-        found += [Verdict(name, part, *row) for row in kept]
+        found += [Verdict(name, part, *row, kind()) for row in kept]
     return found
 
 
@@ -115,10 +124,15 @@ def committed() -> list[Verdict]:
 
 def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed]:
     """Claims whose verdicts differ, in their order."""
-    old = {(row.paper, row.id): row.verdict for row in before}
-    new = {(row.paper, row.id): row.verdict for row in after}
-    keys = list(old) + [key for key in new if key not in old]
-    return [Changed(*key, old.get(key, ""), new.get(key, "")) for key in keys if old.get(key, "") != new.get(key, "")]
+    old, new = ({(row.paper, row.id): row for row in rows} for rows in (before, after))
+    found = []
+    for key in (*old, *(key for key in new if key not in old)):
+        one, other = old.get(key), new.get(key)
+        if one is None or other is None:
+            found.append(Changed(*key, one.verdict if one else "", other.verdict if other else ""))
+        elif one.verdict != other.verdict:
+            found.append(Changed(*key, one.verdict, other.verdict, one.processor * (one.processor != other.processor)))
+    return found
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """Verb certify: show by counting that an event is rare, or say what is missing."""
 
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,10 +9,6 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.endings import PICTURES, SCENARIOS
-from airflock.errors import ScenarioError
-
-LENGTHS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
 
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")
@@ -115,7 +110,7 @@ def certify(
     with options.gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
     with options.gathering(faults):
-        seconds = time_of(budget)
+        seconds = options.time_of(budget)
     with options.gathering(faults):
         found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
@@ -182,14 +177,6 @@ def _end(made: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
         show(made)
     if not made.shown:
         raise typer.Exit(1)
-
-
-def time_of(text: str) -> float:
-    """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
-    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
-    if found is None or not float(found[1]) > 0.0:
-        raise ScenarioError([f"--budget {text}: write a time above 0 such as 90s, 10min or 2h"])
-    return float(found[1]) * LENGTHS[found[2] or "s"]
 
 
 @contextmanager

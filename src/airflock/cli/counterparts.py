@@ -39,7 +39,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         "airflock.score(recording)", "score",
         {
             "files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero",
-            "groups": "groups",
+            "groups": "groups", "body_length": "body_length",
         },
     ),
     "sweep": Counterpart(

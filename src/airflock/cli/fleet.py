@@ -10,6 +10,7 @@ import typer
 
 from airflock.cli import options, tables
 from airflock.endings import RECORDINGS
+from airflock.spelling import meant
 
 VEHICLES = ("px4", "ardupilot")
 FLOWN = ("multirotor", "quadrotor")
@@ -99,12 +100,11 @@ def fleet(
         period = found.sensors.period or found.flight.dt
         found = compare.sampled(found, period)
         broken = read_faults(faults, tuple(range(1, found.agents + 1))) if faults else ()
-    if vehicle not in VEHICLES:
-        wrong.append(f"--vehicle {vehicle} is none of {', '.join(VEHICLES)}")
-    if body not in (None, *FLOWN):
-        wrong.append(f"--body {body} is none of {', '.join(FLOWN)}")
-    if mode not in realtime.MODES:
-        wrong.append(f"--mode {mode} is none of {', '.join(realtime.MODES)}")
+    for option, word, known in (
+        ("--vehicle", vehicle, VEHICLES), ("--body", body, FLOWN), ("--mode", mode, realtime.MODES),
+    ):  # fmt: skip
+        if word is not None and word not in known:
+            wrong.append(f"{option} {word} is none of {', '.join(known)}{meant(word, known, lead='; ')}")
     if card_file is not None and mode == realtime.MODES[0]:
         wrong.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
     if against not in (None, "simulator"):
@@ -197,7 +197,8 @@ def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, 
         told: dict[str, Any] = {"fleet": about, "runs": runs, "comparison": [line._asdict() for line in lines]}
         tables.emit_json(told | ({"departure": departed._asdict()} if departed else {}))
         return
-    title = f"{found.name}: fleet of {found.agents} {card.autopilot.name}, {found.flight.duration:g} s, {seeds} seeds"
+    flown = f"{found.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
+    title = f"{found.name}: fleet of {found.agents} {card.autopilot.name}, {flown}"
     tables.score_table(title, rows, {}, reports(found.measures))
     for run in runs:
         _tell_load(run.get("load"))

@@ -177,4 +177,5 @@ def export(
 
     options.writable((out, ENDINGS))
     write(load_recording(recording), out, layout=layout.value)
-    tables.say(f"saved {out}")
+    ned = "; x is north, as in PX4: airflock import --axes ned reads it" if layout is Layout.PX4 else ""
+    tables.say(f"saved {out}{ned}")

@@ -1,5 +1,6 @@
 """Options that several verbs share, and what they turn into."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
 from airflock.errors import AirflockError, ScenarioError
 
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
@@ -22,7 +24,12 @@ Set = Annotated[
 Seeds = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of flights, with seeds 0, 1, 2, ...")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="Seed of the first flight.")]
 Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_default="the scenario's")]
-Duration = Annotated[float | None, typer.Option(help="Time flown, s.", show_default="the scenario's")]
+Duration = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME", help="Time flown, such as 10min; a plain number is in s.", show_default="the scenario's"
+    ),
+]
 Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
 Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
@@ -40,7 +47,7 @@ SaveFile = Annotated[Path | None, typer.Option("--save", metavar="FILE.nc", help
 
 
 def settings(
-    pairs: list[str] | None, agents: int | None = None, duration: float | None = None, option: str = "--set"
+    pairs: list[str] | None, agents: int | None = None, duration: str | None = None, option: str = "--set"
 ) -> dict[str, Any]:
     """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
     found: dict[str, Any] = {}
@@ -59,8 +66,16 @@ def settings(
     if agents is not None:
         found["agents"] = agents
     if duration is not None:
-        found["duration"] = duration
+        found["duration"] = time_of(duration, "--duration")
     return found
+
+
+def time_of(text: str, option: str = "--budget") -> float:
+    """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
+    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+    if found is None or not float(found[1]) > 0.0:
+        raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
+    return float(found[1]) * SECONDS[found[2] or "s"]
 
 
 def value(text: str, where: str) -> Any:

@@ -105,15 +105,25 @@ def score(
         bool, typer.Option("--aero", help="Measure the power that the geometry saves; --set wing.span=... and so on.")
     ] = False,
     groups: Annotated[bool, typer.Option("--groups", help="Each group of the scenario, and each two of them.")] = False,
+    body_length: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Of tracks: length of a body, by which it is judged who is near."),
+    ] = None,
 ) -> None:
     """Measure recordings, simulated or flown, with the same order parameters.
 
-    Example: airflock score flight.nc --set metrics.r_coll=2.0 --series course.csv
+    Tracks bring no scenario: what depends on a length (collisions, clusters) is told where it is given.
+
+    Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """
     from airflock.recordings.opened import Opening
 
     options.writable((series, TABLES))
     changed = options.settings(changes)
+    if body_length is not None:
+        from airflock.recordings.lengths import in_bodies
+
+        changed = in_bodies(body_length) | changed
     with options.compiling_told(), Opening(files[0]) as first:  # another process opens it while this one imports
         if groups:
             _groups([first, *files[1:]], files, changed, as_json)
@@ -147,9 +157,10 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
     from airflock.metrics.registry import reports
     from airflock.recordings.attributes import faults, told_faults
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import aero_settings, measure, scenario_of
+    from airflock.recordings.lengths import told as told_unsaid
+    from airflock.recordings.scores import aero_settings, measure, not_told, scenario_of
 
-    rows, courses, befell = [], [], []
+    rows, courses, befell, untold = [], [], [], []
     about: dict[str, tuple[str, str]] = {}
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
@@ -159,6 +170,7 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
         rows.append(values)
         courses.append(course.assign(file=str(path)))
         befell.append(faults(recording))
+        untold.append(not_told(recording, settings))
     if series is not None:
         import io
 
@@ -171,7 +183,10 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
         atomic.write(series, text.getvalue())
         tables.say(f"saved {series}")
     if as_json:
-        told = [{"faults": found} if found else {} for found in befell]
+        told: list[dict[str, Any]] = [
+            {name: found for name, found in (("faults", hurt), ("not_told", needed)) if found}
+            for hurt, needed in zip(befell, untold, strict=True)
+        ]
         runs = [{"file": str(path), **row, **more} for path, row, more in zip(files, rows, told, strict=True)]
         tables.emit_json({"runs": runs, **tables.statistics(rows)})
         return
@@ -179,3 +194,6 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
     for path, found in zip(files, befell, strict=True):
         if found:
             tables.say(f"{path}: {told_faults(found)}")
+    for path, needed in zip(files, untold, strict=True):
+        if needed:
+            tables.say(f"{path}: {told_unsaid(needed)}")

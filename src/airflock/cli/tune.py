@@ -54,14 +54,13 @@ def tune(
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
-    from airflock.cli.certify import time_of
     from airflock.scenarios.files import load
     from airflock.tune.run import tune
 
     faults: list[str] = []
     seconds, found = 1.0, None
     with options.gathering(faults):
-        seconds = time_of(budget)
+        seconds = options.time_of(budget)
     if like is None and (len(scenario) > 1 or heard is not None):
         faults.append(f"{', '.join(scenario)}: one scenario is tuned; of logs, give --like PRESET")
     elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():

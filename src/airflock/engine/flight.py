@@ -67,6 +67,12 @@ class Flight(Acting):
         while self._planned and self._planned[0].step == 0 and self._planned[0].kind == "branch":
             self._course.to_world(self._planned.pop(0).data.get("world"))  # before the start is drawn
 
+    def __repr__(self) -> str:
+        """Which flight it is, and how far it is."""
+        scenario = self.scenario
+        flown = f"{self.time:g} of {scenario.flight.duration:g} s"
+        return f"<Flight {scenario.name}, seed {self.seed}: {flown}, {scenario.agents} agents>"
+
     @property
     def ready(self) -> bool:
         """Whether it flies at once; otherwise its driver is compiled first."""

@@ -172,6 +172,11 @@ def load_study(
         return make_study(document, where, settings=settings, search=search, folder=path.parent, trust=trust)
 
 
+def _once(where: str, fault: str) -> str:
+    """A fault that begins with the name it is of, but not twice."""
+    return fault if fault.startswith(f"{where}: ") else f"{where}: {fault}"
+
+
 def make_study(
     document: Mapping[str, Any],
     where: str = "study",
@@ -195,7 +200,8 @@ def make_study(
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
         if more or not scenarios:
-            raise ScenarioError([f"{where}: {fault}" for fault in [*faults, *more]])
+            named = [*(f"{where}: {fault}" for fault in faults), *(_once(where, fault) for fault in more)]
+            raise ScenarioError(named)
     else:
         scenarios = (scenario,) if isinstance(scenario, Scenario) else tuple(scenario)
         labels = distinct([each.name for each in scenarios])

@@ -24,6 +24,7 @@ from airflock.recordings.flights import simulate
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 KINDS = (
     "trajectories", "exposure", "series", "rules", "transfer", "scene", "space", "rays", "flocked", "wash", "reception",
@@ -86,7 +87,7 @@ def plot(
     True
     """
     if kind not in KINDS:
-        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}")
+        raise AirflockError(f"kind = {kind!r} is none of {', '.join(KINDS)}{meant(kind, KINDS, lead='; ')}")
     if kind in OF_A_SCENARIO:
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)

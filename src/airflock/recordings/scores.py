@@ -12,6 +12,7 @@ import xarray as xr
 from airflock.aero import descent
 from airflock.body.registry import BODIES
 from airflock.core.contract import Model
+from airflock.core.maths import FAR
 from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
@@ -24,6 +25,7 @@ from airflock.metrics.registry import POWER, SETS, reports
 from airflock.radios.registry import RADIOS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
+from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.scenarios.families import Given
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
@@ -47,6 +49,7 @@ def score(
     scheduler: str | None = None,
     aero: bool = False,
     groups: bool = False,
+    body_length: float | None = None,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
@@ -74,11 +77,15 @@ def score(
         For a recording, measure the power that its geometry saves.
     groups : bool
         For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
+    body_length : float, optional
+        For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.lengths`.
 
     Returns
     -------
     pandas.DataFrame
         One row per flight, one column per order parameter; `attrs["units"]` and `attrs["meanings"]` say what they are.
+        Of tracks, which bring no scenario, what depends on a length that nobody gave is no column; `attrs["not_told"]`
+        names it, with the keys that it needs.
 
     Raises
     ------
@@ -98,6 +105,7 @@ def score(
     ([0, 1, 2], 'm/s')
     """
     if isinstance(what, xr.Dataset):
+        settings = in_bodies(body_length) | dict(settings or {}) if body_length is not None else settings
         settings = aero_settings(what, settings) if aero else settings
         if groups:
             from airflock.recordings.groups import BETWEEN, group_scores
@@ -107,11 +115,35 @@ def score(
                 table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
             return table
         values, _ = measure(what, settings)
-        return _about(pd.DataFrame([values]), scenario_of(what, settings))
+        table = _about(pd.DataFrame([values]), scenario_of(what, settings))
+        return _with_attributes(table, not_told=not_told(what, settings))
     scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
+
+
+def _with_attributes(table: pd.DataFrame, **attributes: Any) -> pd.DataFrame:
+    table.attrs.update(attributes)
+    return table
+
+
+def not_told(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, tuple[str, ...]]:
+    """Order parameters that a recording without a scenario does not have for want of a length, with the keys missing.
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> not_told(airflock.simulate(short))
+    {}
+    """
+    if scenario_document(recording) is not None:
+        return {}
+    scenario = scenario_of(recording, settings)
+    sampled = (name for metric in scenario.measures.metrics for name in metric.Sample._fields)  # type: ignore[attr-defined]
+    names = (*reports(scenario.measures), *sampled)
+    return unsaid(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
 
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
@@ -163,7 +195,7 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
     metrics.collision_period. Where a number is missing (nan) the individual is not there: an instant counts with those
     who are, means over time are means over instants at which at least two are, and the value `present` tells the share
-    of individuals and instants that is there.
+    of individuals and instants that is there. What tracks do not have for want of a length (`not_told`) is left out.
     """
     frames, period, present = frames_of(recording)
     scenario = scenario_of(recording, settings)
@@ -173,10 +205,14 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     values, series = measure_frames(scenario.alike(), frames, period, precision=precision, every=every, present=present)
     times = pd.Index(recording["time"].values.astype(float), name="time")
     course = pd.DataFrame(series, index=times)
+    course = course.mask(course >= 0.5 * FAR)  # a clearance where nothing stands, a time of what has not happened
     if frames.shape[2] == 1:  # no pair, no distance
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
-    return scores | ({} if present.all() else {"present": float(present.mean())}), course
+    scores |= {} if present.all() else {"present": float(present.mean())}
+    untold = not_told(recording, settings)
+    kept = {name: value for name, value in scores.items() if name not in untold}
+    return kept, course[[name for name in course if name not in untold]]
 
 
 class _Nothing(Parameters):

@@ -284,9 +284,10 @@ class _Rewrite(Unrolled):
             return ast.Name(self.source.name(value), node.ctx)
         if isinstance(value, types.ModuleType) or (self.source.lenient and hasattr(builtins, node.id)):
             return node
+        why = "it does not compile; the device python flies it" if hasattr(builtins, node.id) else "it is not defined"
         raise RuleError(
             f"{self.rule.__code__.co_filename}: rule {self.rule.__name__} uses {node.id}, which is neither a number, "
-            "a plain function nor a NamedTuple" + ("; it is not defined" if value is None else "")
+            "a plain function nor a NamedTuple" + (f"; {why}" if value is None else "")
         )
 
 

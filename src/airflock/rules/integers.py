@@ -78,7 +78,7 @@ def is_integer(node: ast.expr, integers: set[str] | frozenset[str], rule: Callab
         name = _called(node)
         if name in KEEPING:
             return all(is_integer(argument, integers, rule) for argument in node.args)
-        return name in MAKING or _gives_integer(_function(name, rule))
+        return name in MAKING or _gives_integer(plain_function(name, rule))
     return False
 
 
@@ -91,7 +91,7 @@ def _integer_places(item: ast.AST, rule: Callable[..., Any]) -> Iterator[ast.exp
     elif isinstance(item, ast.BinOp) and isinstance(item.op, ast.FloorDiv) and isinstance(item.right, ast.Constant):
         yield from [item.left] if type(item.right.value) is int else []
     elif isinstance(item, ast.Call):
-        called = _function(_called(item), rule)
+        called = plain_function(_called(item), rule)
         if _called(item) == "range":
             yield from item.args
         elif called is not None:
@@ -134,7 +134,7 @@ def free(name: str, rule: Callable[..., Any]) -> Any:
     return rule.__globals__.get(name, closure[name].cell_contents if name in closure else None)
 
 
-def _function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
+def plain_function(name: str, rule: Callable[..., Any]) -> Callable[..., Any] | None:
     """The plain function that a rule calls by this name; None for itself."""
     found = free(name, rule)
     return found if isinstance(found, types.FunctionType) and found is not rule else None

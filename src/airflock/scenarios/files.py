@@ -20,6 +20,11 @@ from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
 
+NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
+    ".py": "code, not a scenario; a law flies a scenario: airflock run PRESET --law FILE.py (in Python: law=)",
+    ".nc": "a recording, not a scenario; airflock score measures it (in Python: airflock.load_recording)",
+}
+
 
 def presets() -> dict[str, Path]:
     """Name and file of every preset that comes with the package.
@@ -137,8 +142,12 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     known = presets()
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
-        hint = meant(name, known, "; airflock presets lists the presets", lead="; ", cutoff=0.4)
+        # whoever names a file means a preset only where the names are much alike
+        word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
+        hint = meant(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])
+    if path.suffix.lower() in NO_SCENARIO:
+        raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
     with from_outside(name):
         document = read_toml(path)
     if tells_of_study(document) and not {"model", "extends"} & set(document):

@@ -1,7 +1,7 @@
 """Flights of five birds: many controllers and starts, side by side on all cores."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -81,9 +81,10 @@ class Birds:
         """
         named = {key if "." in key else f"model.{key}": value for key, value in readings.items()}
         chosen = tuple(sorted(({"model.gradient": "cells_frozen"} | named).items()))
-        bases = {flat: _base(chosen, duration, noise, flat) for flat in {task.start.flat for task in tasks}}
+        flats = {task.start.flat for task in tasks}
+        bases = {flat: with_changes(_base(chosen, duration, noise, flat), self.changes) for flat in flats}
         for base in bases.values():
-            compile_for(with_changes(base, self.changes))  # once, before threads ask for it
+            compile_for(base)  # once, before threads ask for it
         count = 0
 
         def done() -> None:
@@ -106,17 +107,19 @@ def _base(readings: tuple[tuple[str, Any], ...], duration: float, noise: float, 
     return load("dimock_2003/published", {"duration": duration, **jostled, **settled, **plane, **dict(readings)})
 
 
-def _flown(base: Scenario, task: Task, changes: Mapping[str, Any], scatter: bool) -> Flight:
+def _flown(base: Scenario, task: Task, changed: Collection[str], scatter: bool) -> Flight:
+    """One flight of a base that has its changes; what they set (keys) is not of the task."""
     s = task.start
-    box = s.kind == "box"
-    begin = replace(
-        base.start, kind=s.kind, spacing_x=s.sx * FOOT, spacing_y=s.sy * FOOT, spacing_z=s.sz * FOOT,
-        jitter=s.jitter * FOOT, side=s.sx * FOOT if box else base.start.side,
-        separation=s.sy * FOOT if box else None,
-    )  # fmt: skip
-    scenario = replace(base, parameters=replace(base.parameters, **task.gains.si()), start=begin)
+    begin: dict[str, Any] = {
+        "kind": s.kind, "spacing_x": s.sx * FOOT, "spacing_y": s.sy * FOOT, "spacing_z": s.sz * FOOT,
+        "jitter": s.jitter * FOOT, "side": s.sx * FOOT if s.kind == "box" else base.start.side,
+        "separation": s.sy * FOOT if s.kind == "box" else None,
+    }  # fmt: skip
+    begin = {name: value for name, value in begin.items() if f"start.{name}" not in changed}
+    gains = {name: value for name, value in task.gains.si().items() if f"model.{name}" not in changed}
+    scenario = replace(base, parameters=replace(base.parameters, **gains), start=replace(base.start, **begin))
     try:
-        found = fly(with_changes(scenario, changes) if changes else scenario, task.seed, record=True)
+        found = fly(scenario, task.seed, record=True)
     except FlightError:
         if not scatter:
             raise

@@ -43,7 +43,7 @@ MODULES = {
 PAPER = Paper(
     "Vásárhelyi et al. 2018, Optimized flocking of autonomous drones in confined environments",
     __name__,
-    ("s2", "fig1", "fig2", "fig34", "pressure", "tuning", "real"),
+    ("s2", "fig1", "fig2", "fig34", "pressure", "tuning", "real", "beyond"),
     by_modules(MODULES),
-    long=("beyond", "s1", "optima", "gains", "searches", "rounding"),
+    long=("s1", "optima", "gains", "searches", "rounding"),
 )

@@ -27,11 +27,13 @@ class Builder:
     ranges   : whether a loop over some of the lanes is one from the first of them to the last
     by_pairs : whether each pair of agents draws its random words by itself, not four receivers at once
     slots    : whether loops over agents run over slots, of which each holds agent order[i]
+    drops    : whether the compiler drops a sum over agents that nobody reads
     """
 
     clusters: Callable[[Metric], list[str]] | None = None
     slots = False
     abreast = True
+    drops = True
     apart = True
     ranges = True
     by_pairs = False

@@ -3,6 +3,7 @@
 from typing import Any
 
 from airflock.core.contract import Metric
+from airflock.core.vocabulary import Mean
 from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
@@ -16,8 +17,10 @@ from airflock.engine.stages.links import clusters_by_cells
 from airflock.engine.stages.measure import Measured
 from airflock.engine.stages.near import PARTS, SURE, pairs_by_cells
 from airflock.engine.stages.words import fields, wants
+from airflock.rules.reading import fields_read
 
 CLOCKS = ("sample", "collision")
+AVERAGED = {"x": {"x", "y", "z"}, "v": {"vx", "vy", "vz"}, "h": {"hx", "hy", "hz"}}  # fields of a mean
 BY_CELLS = "n, row, whole, work, cells"  # what a search by cells is called with
 
 
@@ -41,6 +44,7 @@ def measure(build: Builder, clock: str) -> None:
     clustered = {one.metric.name: clusters(build, one.metric, parts) for one in metrics}
     made = specialise(
         build, measuring.measure, metrics=metrics, nearest=clock == "collision", over=looked, abreast=build.abreast,
+        summed="xvh" if build.drops else averaged(metrics),
         excursion=excursion(build) if outside else None,
         survey={one.metric.name: Call(f"survey_{one.metric.name}()") for one in metrics},
         clustered=clustered,
@@ -50,6 +54,18 @@ def measure(build: Builder, clock: str) -> None:
         lines = in_place(lines, name, part)
     cells = near or any(linked(build, one.metric) for one in metrics)
     build.function(f"measure_{clock}({arguments(build, cells)})", lines, f"return {made.answer}")
+
+
+def averaged(metrics: tuple[Measured, ...]) -> str:
+    """Of what rules read a mean over the flock: position x, velocity v, heading h."""
+    found: set[str] = set()
+    for one in metrics:
+        for rule in (one.metric.agent, one.metric.member, one.metric.cluster, one.metric.sample):
+            if wants(rule, "mean"):
+                assert rule is not None
+                asked = fields_read(rule, "mean")
+                found |= set(Mean._fields) if asked is None else asked
+    return "".join(what for what, names in AVERAGED.items() if found & names)
 
 
 def pairs(build: Builder, clock: str, metrics: tuple[Measured, ...]) -> Call:

@@ -53,8 +53,11 @@ def means(total: Any, n: int, *, plan: Plan) -> Any:
     return [total[a] / real(n) if a < plan.dimensions else ZERO for a in (X, Y, Z)]
 
 
-def headings(flock: Flock, n: int, *, plan: Plan) -> Any:
-    """Speed and heading of each agent; returns the means of the flock."""
+def headings(flock: Flock, n: int, *, plan: Plan, summed: str) -> Any:
+    """Speed and heading of each agent; returns the means of the flock.
+
+    summed : of what a mean is taken: position x, velocity v, heading h
+    """
     axes, x, v, h = range(plan.dimensions), flock.position, flock.velocity, flock.heading
     for i in range(n):
         flock.speed[i] = norm(v[X][i], v[Y][i], v[Z][i])
@@ -69,7 +72,12 @@ def headings(flock: Flock, n: int, *, plan: Plan) -> Any:
         for total, row in ((sx, x), (sv, v), (sh, h)):
             for a in axes:
                 total[a] = total[a] + row[a][i]
-    return Mean(*means(sx, n, plan=plan), *means(sv, n, plan=plan), *means(sh, n, plan=plan), real(n))  # type: ignore[call-arg]
+    return Mean(  # type: ignore[call-arg]
+        *(means(sx, n, plan=plan) if "x" in summed else (ZERO, ZERO, ZERO)),
+        *(means(sv, n, plan=plan) if "v" in summed else (ZERO, ZERO, ZERO)),
+        *(means(sh, n, plan=plan) if "h" in summed else (ZERO, ZERO, ZERO)),
+        real(n),
+    )
 
 
 def names_of(record: Any) -> tuple[str, ...]:
@@ -227,7 +235,7 @@ def measure(
     excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
     clustered: Mapping[str, Callable[..., Any]],
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[[], Any] | None,
-    abreast: bool,
+    abreast: bool, summed: str,
 ) -> Any:  # fmt: skip
     """Write what metrics sample at one instant into `values`; returns the least distance of a pair, m.
 
@@ -237,10 +245,11 @@ def measure(
     clustered      : finds its clusters
     nearest        : whether the least distance is asked for
     abreast        : whether two agents may go through the others of a pair rule together
+    summed         : of what the flock's mean is taken: position x, velocity v, heading h
     over           : what goes through pairs by cells; None: all pairs
     """
     x = flock.position
-    mean = headings(flock, n, plan=plan)
+    mean = headings(flock, n, plan=plan, summed=summed)
     if over is not None:  # noqa: SIM108 - a helper of several lines stands where it is assigned
         least2 = over()
     else:

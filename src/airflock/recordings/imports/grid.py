@@ -13,6 +13,8 @@ from airflock.recordings.layout import DIMENSIONS, UNITS
 
 MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap
+NTSC = 1.001  # colour television is slower than its nominal rate by this factor (SMPTE 170M)
+SAME_RATE = 2e-5  # relative: times in whole microseconds, at 30 Hz, are 1e-5 off
 
 
 def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: float | None) -> tuple[Any, float]:
@@ -20,7 +22,7 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
     usual = [period_of(track) for track in tracks if len(track.time) > 1]
     period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
     if not rate:
-        period = float(f"{period:.4g}")
+        period = _round(period)
     first = min(track.time[0] for track in tracks) if begin is None else begin
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
@@ -31,6 +33,16 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
             f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
         )
     return first + np.arange(count) * period, period
+
+
+def _round(period: float) -> float:
+    """A period (s) as it was meant: that of a rate of four digits, as of 30 or 29.97 Hz; else four digits of itself.
+
+    Frames of a video are met then, rather than drifted past: with 0.03333 s one is lost in each 10,000 of 30 Hz.
+    """
+    rates = [float(f"{slower / period:.4g}") / slower for slower in (1.0, NTSC)]
+    rate = min(rates, key=lambda rate: abs(rate * period - 1.0))
+    return 1.0 / rate if abs(rate * period - 1.0) < SAME_RATE else float(f"{period:.4g}")
 
 
 def recording(

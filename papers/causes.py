@@ -1,0 +1,146 @@
+"""Fly again what shows why four sentences are not reproduced: `python papers/causes.py NAME [SEEDS]`.
+
+Names: diagonal (fig4.diagonal), shill (model.shill_terms.6ms), collisions (minimum.f_collision), fitness
+(controller.fitness). One line a set of flights; the figures stand as reasons in the pages' statements.
+"""
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import airflock
+from airflock.recordings.scores import over_time
+from airflock.scenarios.files import load
+from airflock_papers import zapotecatl_2016
+from airflock_papers.dimock_2003.controller import STARTS
+from airflock_papers.dimock_2003.flights import Birds, Task
+from airflock_papers.dimock_2003.units import BEST, FT_LBF
+from airflock_papers.vasarhelyi_2018 import outdoor, real
+
+REPULSION = {4: {"model.r0_rep": 15.0, "model.p_rep": 0.3}, 6: {"model.r0_rep": 35.0, "model.p_rep": 0.1}}
+# preset, settings, distance of drones that start along the diagonal, m
+DIAGONAL: dict[str, tuple[str, dict[str, Any], float]] = {
+    "column of 4 m/s": ("real_4ms", {}, 12.0),
+    "column of 6 m/s": ("real_6ms", {}, 20.0),
+    "column of 6 m/s at 4 m/s": ("real_6ms", {"model.v_flock": 4.0, "model.v_max": 6.0}, 20.0),
+    "column of 6 m/s, repulsion of 4": ("real_6ms", REPULSION[4], 12.0),
+    "column of 6 m/s, v_frict of 4": ("real_6ms", {"model.v_frict": 1.0}, 20.0),
+    "column of 6 m/s, arena of 4": ("real_6ms", {"world.side": 200.0}, 20.0),
+    "column of 4 m/s, repulsion of 6": ("real_4ms", REPULSION[6], 20.0),
+    "column of 4 m/s, delay of 0.2 s": ("real_4ms", {"radio.delay": 0.2}, 12.0),
+    "column of 4 m/s, range of 200 m": ("real_4ms", {"radio.range": 200.0}, 12.0),
+    "column of 4 m/s, satellite navigation": ("real_gnss", {}, 12.0),
+    "column of 4 m/s, cap of Eq. 11": ("real_4ms", {"model.limit": "cap"}, 12.0),
+    "column of 4 m/s, no errors": ("real_4ms", {"sensors.noise": 0.0, "body.noise": 0.0}, 12.0),
+    "column of 4 m/s, tau of 2 s": ("real_4ms", {"body.tau": 2.0}, 12.0),
+    "column of 4 m/s, wind of 3 m/s": ("real_4ms", {"wind.east": 3.0}, 12.0),
+    "column of 4 m/s, at 6 m/s": ("real_4ms", {"model.v_flock": 6.0, "model.v_max": 8.0}, 12.0),
+}
+READINGS: tuple[dict[str, Any], ...] = (
+    {},
+    *({"dt": dt} for dt in (0.05, 0.01)),
+    *({"wing.segments": n} for n in ("1", "5")),
+    {"wing.core": 0.0762},
+    {"model.gradient": "cells_frozen"},
+    *({"model.cohesion": form} for form in ("C0", "C2", "C3", "C5", "C6", "C7")),
+    *({"model.centroid": form} for form in ("others", "weights")),
+    *({"model.avoidance": form} for form in ("present", "pairwise", "barrier")),
+)
+
+
+def along_the_diagonal(speed: float, apart: float, seed: int) -> NDArray[np.float64]:
+    """Positions and velocities (x, y, vx, vy; m, m/s) of 30 drones in rows that fly to a corner."""
+    i = np.arange(30)
+    grid = apart * np.array([i % 6 - 2.5, i // 6 - 2.0])
+    grid = grid + np.random.default_rng(seed).normal(0.0, 0.5, grid.shape)
+    return np.concatenate([grid, np.full((2, 30), speed / 2**0.5)])
+
+
+def diagonal(seeds: int = 20, first: int = 2000) -> None:
+    """Patterns and distances of nearest neighbours (m), from random places and along the diagonal."""
+    low, high = outdoor.MIDDLE
+    for name, (preset, settings, apart) in DIAGONAL.items():
+        scenario = load(f"vasarhelyi_2018/{preset}", settings)
+        for start in ("random places", "along the diagonal"):
+            counts: Counter[str] = Counter()
+            near = []
+            for seed in range(first, first + seeds):
+                begin = (
+                    along_the_diagonal(scenario.parameters.v_flock, apart, seed) if start != "random places" else None
+                )
+                course = over_time(airflock.simulate(scenario, seed, start=begin))
+                course = course[(course.index >= low) & (course.index <= high)]
+                counts[outdoor.pattern(course)] += 1
+                near.append(float(course["r_min_mean"].mean()))
+            tell(f"{name}, {start}", f"{dict(counts)}, nearest {np.mean(near):.1f} m")
+
+
+def shill(seeds: int = 60, first: int = 1000) -> None:
+    """Wall terms (m/s) of Table S4 and with the shill agents of Table S1, by whether the flock circles."""
+    sides = real.sides(6)
+    rows = []
+    for seed in range(first, first + seeds):
+        flown = {name: airflock.simulate(scenario, seed) for name, scenario in sides.items()}
+        rows.append(
+            [real.wall_term(flown[n], sides[n]) for n in ("s4", "s1")] + [turning(flown[n]) for n in ("s4", "s1")]
+        )
+    s4, s1, turns, turns_s1 = np.array(rows).T
+    tell("circling flights", f"Table S4 {(turns > 0.8).sum()}, Table S1 {(turns_s1 > 0.8).sum()} of {seeds}")
+    for name, those in (("Table S4 circles", turns > 0.8), ("it does not", turns <= 0.8)):
+        gap = (s4 - s1)[those]
+        if gap.size < 2:
+            continue
+        error = gap.std(ddof=1) / gap.size**0.5
+        tell(name, f"{s4[those].mean():.2f} against {s1[those].mean():.2f}, {gap.mean():.3f} ± {error:.3f}")
+
+
+def turning(recording: Any) -> float:
+    """How much of the flock's turning about the centre goes one way round: 1 circles, 0 there and back."""
+    place, velocity = (recording[name].values[::5, :, 0, :].mean(axis=2) for name in ("position", "velocity"))
+    moment = place[:, 0] * velocity[:, 1] - place[:, 1] * velocity[:, 0]
+    return float(abs(moment.mean()) / abs(moment).mean())
+
+
+def collisions(seeds: int = 40, first: int = 5000) -> None:
+    """Frequency of collision at r_s = r_a = 50 cm, as counted and with a nearer contact, and of boids at once."""
+    sets: dict[str, tuple[str, dict[str, Any]]] = {
+        "as the page": ("sequential", {}),
+        "r_b of 4.5 cm": ("sequential", {"metrics.r_b": 0.045}),
+        "all boids at once": ("synchronous", {}),
+    }
+    for name, (update, settings) in sets.items():
+        made = zapotecatl_2016.configurations(
+            "zapotecatl_2016/best", update=update, **{"metrics.count": "program", **settings}
+        )
+        x = np.sort(airflock.score(made[50, 50], range(first, first + seeds))["f_collision"].to_numpy())
+        worst = x[-(seeds // 10) :].sum() / x.sum()
+        tell(name, f"mean {x.mean():.5f}, median {np.median(x):.5f}, the worst tenth has {worst:.2f} of the sum")
+
+
+def fitness(seeds: int = 1, first: int = 0) -> None:
+    """Power of the published gains, ft lbf/s, over the 28 starts (nothing is random), by reading."""
+    for keys in READINGS:
+        readings: Mapping[str, Any] = {"gradient": "cells"} | {k.removeprefix("model."): v for k, v in keys.items()}
+        flown = Birds(changes={"dt": readings["dt"]} if "dt" in readings else {}).fly(
+            "", [Task(BEST, start) for start in STARTS], **{k: v for k, v in readings.items() if k != "dt"}
+        )
+        power = sorted(each.power / FT_LBF for each in flown if not each.collided)
+        name = ", ".join(f"{key} = {value}" for key, value in keys.items()) or "as the page"
+        tell(name, f"least {power[0]:.2f}, median {np.median(power):.2f}" if power else "all collide")
+
+
+def tell(name: str, found: str) -> None:
+    """One line."""
+    print(f"{name}: {found}", flush=True)  # noqa: T201
+
+
+CAUSES: dict[str, Callable[..., None]] = {each.__name__: each for each in (diagonal, shill, collisions, fitness)}
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2 or sys.argv[1] not in CAUSES:
+        sys.exit(f"usage: python papers/causes.py {'|'.join(CAUSES)} [SEEDS]")
+    CAUSES[sys.argv[1]](*map(int, sys.argv[2:3]))

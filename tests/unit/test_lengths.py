@@ -1,0 +1,72 @@
+"""Tracks do not say what is near: what depends on such a length is told where somebody gives it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import airflock
+from airflock.metrics.registry import SETS
+from airflock.recordings.lengths import IN_BODIES, in_bodies
+from airflock.recordings.scores import measure, not_told
+from processes import called
+
+GIVEN = {
+    "r_coll": 1.0, "r_cluster": 3.0, "r_comm": 2.0, "r_b": 0.8, "r_flock": 5.0, "max_e": 20.0, "v_flock": 3.0,
+    "v_tol": 1.0, "r_body": 0.5, "r_tol": 2.0, "r_safe": 1.0,
+}  # fmt: skip
+
+
+def tracks(seed, agents=12, frames=40):
+    """A dozen individuals that wander in a cube of 12 m."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(20.0, 32.0, (1, 3, agents)) + np.cumsum(rng.normal(0.0, 0.3, (frames, 3, agents)), axis=0)
+    rows = [(0.1 * t, i, *x[t, :, i]) for t in range(frames) for i in range(agents)]
+    return airflock.load_tracks(pd.DataFrame(rows, columns=["time", "id", "x", "y", "z"]), unit="m")
+
+
+@pytest.mark.parametrize("kind", SETS)
+def test_what_depends_on_a_length_says_so(kind, seed):
+    """Brute force: each length is changed, and whatever then differs is not told without it."""
+    recording = tracks(seed)
+    settings = {"metrics.kind": kind, "world.arena": "square", "world.side": 200.0}
+    settings |= {f"metrics.{key}": value for key, value in GIVEN.items()}
+    assert not_told(recording, settings) == {}
+    here = measure(recording, settings)[0]
+    for key, value in GIVEN.items():
+        fewer = {name: given for name, given in settings.items() if name != f"metrics.{key}"}
+        if key == "max_e" and "quality" in here:  # without it an error says what to give
+            continue
+        refused = not_told(recording, fewer)
+        for factor in (0.3, 3.0):
+            there = measure(recording, {**settings, f"metrics.{key}": factor * value})[0]
+            changed = {name for name in here if str(here[name]) != str(there[name])} - {"phi_lap", "phi_lap_abs"}
+            assert changed <= set(refused) or key == "v_tol", (key, changed)
+        assert not set(measure(recording, fewer)[0]) & set(refused)
+
+
+def test_a_body_is_a_length(seed):
+    recording = tracks(seed)
+    bare, scored = airflock.score(recording), airflock.score(recording, body_length=2.0)
+    assert {"phi_vel", "polarisation", "r_min_mean"} <= set(bare) and "n_coll" not in bare and "fitness" not in bare
+    assert bare.attrs["not_told"]["phi_corr"] == ("r_cluster",)
+    by_hand = airflock.score(recording, settings={"metrics.r_coll": 1.0, "metrics.r_cluster": 10.0})
+    assert scored["n_coll"][0] == by_hand["n_coll"][0] and scored["phi_corr"][0] == by_hand["phi_corr"][0]
+    assert (scored[list(bare)].iloc[0].dropna() == bare.iloc[0].dropna()).all()  # the others are what they were
+    assert in_bodies(2.0)["metrics.r_coll"] == 1.0 and IN_BODIES["r_coll"] == 0.5
+    own = airflock.score(recording, settings={"metrics.r_cluster": 4.0}, body_length=2.0)  # who knows better is heard
+    assert own["n_min"][0] == airflock.score(recording, settings={"metrics.r_cluster": 4.0})["n_min"][0]
+
+
+def test_a_simulated_flight_brings_its_lengths():
+    flight = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0}))
+    assert not_told(flight) == {} and {"n_coll", "phi_corr", "fitness"} <= set(measure(flight)[0])
+
+
+def test_the_command_says_what_to_give(tmp_path, seed):
+    file = airflock.save(tracks(seed), tmp_path / "tracks.nc")
+    found = called("score", file)
+    assert found.returncode == 0 and "n_coll" not in found.stdout
+    assert "n_coll" in found.stderr and "--body-length" in found.stderr and "metrics.r_coll" in found.stderr
+    assert "n_coll" in called("score", file, "--body-length", "0.5").stdout
+    wrong = called("score", file, "--body-length", "-1")
+    assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1 and "body_length = -1 m" in wrong.stderr
