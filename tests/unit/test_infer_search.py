@@ -25,43 +25,10 @@ from airflock.infer.fit import (
     spread,
 )
 from airflock.infer.flights import Noise
-from airflock.infer.likelihood import Model
 from airflock.infer.ridges import ridges
-from airflock.infer.search import distinct, drawn, groups, hills, profile, race, usual
+from airflock.infer.search import drawn, profile, race, usual
 from airflock.infer.told import simplify, telling
-
-STEPS, NOISE = 400, 0.05
-
-
-class Line(Model):
-    """A law of one line: what is seen is a function of the numbers' places and of a known input, with noise."""
-
-    def __init__(self, law, names, truth, defaults=None, usual_numbers=()):
-        defaults = defaults or dict.fromkeys(names, 0.5)
-        self.numbers = [Number(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name]) for name in names]
-        self.named, self.usual, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
-        flags = {name: defaults[name] for name in usual_numbers}
-        self.law = SimpleNamespace(scenario=SimpleNamespace(model=SimpleNamespace(usual=flags)))
-        generator = np.random.default_rng(4)
-        self.input = generator.uniform(0.0, 1.0, STEPS)
-        self.rule, self.noise = law, generator.normal(0.0, NOISE, (STEPS, 2))
-        self.seen = law(self.input, *truth)
-
-    def differences(self, u, spans=None):
-        u = [n.default if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
-        e = self.noise.copy()
-        e[:, 0] += self.seen - self.rule(self.input, *u)
-        return e, np.zeros(STEPS, np.int64)
-
-    def few(self, frames=0):
-        return [0]
-
-    def start(self):
-        return np.array([n.default for n in self.numbers])
-
-
-def quietly():
-    pass
+from line_laws import STEPS, Line, quietly
 
 
 def test_a_radius_within_which_nobody_is_is_told_and_a_mass_beside_a_force_is_not():
@@ -99,28 +66,6 @@ def test_a_valley_is_crossed_where_the_others_follow():
     best = climb(model, np.array(truth), [0, 1])
     assert wrong.loss > best.loss + 20.0
     assert profile(model, wrong, [0], quietly).loss < best.loss + 1.0
-
-
-def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_anew():
-    def law(x, a, b, slope):  # two hills of a and b together, the farther one higher; beyond 0.5 slope acts alone
-        height = np.exp(-150.0 * ((a - 0.8) ** 2 + (b - 0.2) ** 2)) + 0.5 * np.exp(
-            -150.0 * ((a - 0.3) ** 2 + (b - 0.7) ** 2)
-        )
-        return np.where(x < 0.5, height * x, slope * (x - 0.5))
-
-    truth = (0.8, 0.2, 0.6)
-    model = Line(law, ("a", "b", "slope"), truth)
-    beside = climb(model, np.array([0.31, 0.69, 0.5]), [0, 1, 2])
-    best = climb(model, np.array(truth), [0, 1, 2])
-    assert beside.loss > best.loss + 20.0
-    assert profile(model, beside, [0], quietly).loss > best.loss + 20.0
-    assert groups(model, beside, [0]) == [[0, 1]]
-    assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
-
-
-def test_each_hill_is_climbed_once():
-    places = [np.array(u) for u in ((0.5, 0.5, 0.0), (0.52, 0.5, 0.9), (0.7, 0.5, 0.0), (0.71, 0.45, 0.0))]
-    assert [u.tolist() for u in distinct(places, (0, 1))] == [[0.5, 0.5, 0.0], [0.7, 0.5, 0.0]]
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,14 @@ class Fit:
 
     place : of all numbers; free : indices of those that were fitted; score : on the spans of the fit
     loss  : negative log-likelihood with the prior
+    others : places of other ends that a search has met
     """
 
     place: Array
     free: list[int]
     score: Score
     loss: float
+    others: tuple[Array, ...] = ()
 
 
 def prior(u: Array, free: Sequence[int]) -> float:

@@ -52,15 +52,23 @@ class Ridges:
 def ridges(
     model: Model, fit: Fit, spans: Sequence[int], drop: float, say: Callable[[], None] = lambda: None
 ) -> tuple[Fit, Ridges]:
-    """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood."""
+    """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood.
+
+    Other ends that the search has met, and places on the way to a better fit, are told with them where they are as
+    likely: each by itself, for a valley may lie between.
+    """
     ways: list[Way] = []
+    met = list(fit.others)
     for turn in range(AGAIN + 1):
         ways, better = _ways(model, fit, spans, drop, turn < AGAIN)
         say()
         if better is None:
             break
+        met += [fit.place, *(place for way in ways for place, _ in way)]
         fit = climb(model, better, fit.free, spans, slopes=(FINE, BOTH))
-    return fit, Ridges(tuple(ways))
+    falls = [max(model.score(u, spans).loss() - fit.score.loss(), 0.0) for u in met]
+    alone = [((u, fall), (u, fall)) for u, fall in zip(met, falls, strict=True) if fall <= drop]
+    return fit, Ridges((*ways, *alone))
 
 
 def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool) -> tuple[list[Way], Array | None]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import FINE, WIDE, Fit, climb, curvature, followed, jacobian, loss_at
+from airflock.infer.fit import WIDE, Fit, climb, curvature, followed, loss_at
 from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
@@ -22,13 +22,6 @@ SCAN = 10  # places along the range of one number
 PROFILE, FOLLOW = 6, 2  # the same while the others follow, by so many steps
 SWEEPS = 3  # of all numbers
 BETTER = 1.0  # loss that a move has to gain
-TOGETHER = 4  # numbers that are drawn anew together, at most
-ALIKE = 0.5  # overlap of where two numbers act, from which they are
-GROUPS = 3  # of them, those told worst first
-REDRAWN = 8  # two to the power of this: places of a group that are looked at
-NEARLY = 3.0  # loss above the fit on few frames, up to which a hill is climbed on all
-REGROUPED = ((16, 10), (4, 12))  # how many climb, by how many steps: the group alone, then all numbers
-SAME = 0.1  # of a range: places whose numbers of a group are all nearer than this are of one hill
 
 
 def usual(model: Model) -> list[int]:
@@ -109,59 +102,6 @@ def profile(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None
         if best.loss > before - BETTER:
             break
     return best
-
-
-def hills(model: Model, fit: Fit, few: Sequence[int], spans: Sequence[int], say: Callable[[], None]) -> Fit:
-    """The fit, or a better one elsewhere for numbers that act together, such as those of a wall.
-
-    Such numbers have several hills, with valleys between that no single number crosses. The rest of the law is known by
-    now, so places of these few numbers, spread over their whole ranges, tell where else to climb.
-
-    few, spans : on which is looked, and on which is fitted
-    """
-    from scipy.stats import qmc
-
-    for group in groups(model, fit, few):
-        places = np.tile(fit.place, (2**REDRAWN, 1))
-        places[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
-        (several, short), (one_by_one, long) = REGROUPED
-        best = sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[:several]
-        ends = sorted((climb(model, u, group, few, short, slopes=(WIDE, FINE)) for u in best), key=lambda end: end.loss)
-        # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
-        others = distinct([fit.place, *(end.place for end in ends)], group)[1 : 1 + one_by_one]
-        places = np.array([climb(model, u, fit.free, few, long, slopes=(WIDE, FINE)).place for u in others])
-        highest = loss_at(model, fit.place, fit.free, few) + NEARLY
-        likely = [u for u in places if loss_at(model, u, fit.free, few) < highest]
-        found = [climb(model, u, fit.free, spans, REGROUPED[1][1], slopes=(WIDE, FINE)) for u in likely]
-        fit = min([fit, *found], key=lambda each: each.loss)
-        say()
-    return fit
-
-
-def distinct(places: Sequence[Array], group: Sequence[int]) -> list[Array]:
-    """Places that differ from all before them in some number of a group."""
-    found: list[Array] = []
-    for u in places:
-        if all(np.abs(u - other)[list(group)].max() > SAME for other in found):
-            found.append(u)
-    return found
-
-
-def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
-    """Groups of named numbers that act on the same steps, around those that are told worst."""
-    named = [k for k in fit.free if k < model.named]
-    slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
-    flat = slopes.reshape(-1, len(named))
-    sizes = np.maximum(np.linalg.norm(flat, axis=0), 1e-30)
-    overlap = (flat.T @ flat) / np.outer(sizes, sizes)
-    errors = np.diag(np.linalg.inv(curvature(model, fit, spans)))[[fit.free.index(k) for k in named]]
-    found: list[list[int]] = []
-    for k in np.argsort(-errors).tolist():
-        near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
-        group = sorted(named[f] for f in (k, *near))
-        if near and not any(named[k] in other for other in found) and len(found) < GROUPS:
-            found.append(group)
-    return found
 
 
 def _moved(place: Array, number: int, x: float) -> Array:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
 from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
+from airflock.infer.hills import hills
 from airflock.infer.likelihood import Model
-from airflock.infer.search import drawn, hills, profile, race, scan
+from airflock.infer.search import drawn, profile, race, scan
 from airflock.infer.told import simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
@@ -109,7 +110,9 @@ def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -
     numbers = tuple(n for k, n in enumerate(model.law.numbers) if k not in gone)
     without = Model(replace(model.law, numbers=numbers), model.tracks, scale=model.scale)
     less = settle(without, polish(without, place[rest], LONG), sample(without))
-    return (without, less) if less.loss < found.loss + 2.0 * len(gone) else (model, found)
+    if less.loss >= found.loss + 2.0 * len(gone):
+        return model, found
+    return without, replace(less, others=tuple(place[rest] for place in found.others))
 
 
 def free(model: Model) -> list[int]:

@@ -1,0 +1,108 @@
+"""Hills: numbers that act together, such as those of a wall, looked for anew over their whole ranges.
+
+Such numbers have several hills, and long narrow ridges that bend between them: no single number leads along one, and a
+climb ends wherever on the ridge it has arrived. So many climbs are made, first with the numbers of the group alone,
+then with all; and where their ends lie apart, the way from one to the better one is gone on beyond it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airflock.infer.fit import BOTH, CAREFUL, FINE, WIDE, Fit, climb, curvature, jacobian, loss_at
+from airflock.infer.likelihood import Model
+
+Array = NDArray[np.float64]
+TOGETHER = 4  # numbers that are drawn anew together, at most
+ALIKE = 0.5  # overlap of where two numbers act, from which they are
+GROUPS = 3  # of them, those told worst first
+REDRAWN = 8  # two to the power of this: places of a group that are looked at
+ALONE, ALL, WHOLE = (16, 10), (10, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
+SAME = 0.1  # of a range: places whose numbers of a group are all nearer than this are of one hill
+UNLIKELY = 20.0  # loss above the best on few frames, beyond which a hill is left
+BEYOND = (0.5, -0.5)  # of the way from another end to the best one: how far is looked past it, and between the two
+ONWARD = 2  # times that ends are gone beyond
+BETTER = 0.5  # loss that a move has to gain
+
+
+def hills(model: Model, fit: Fit, few: Sequence[int], spans: Sequence[int], say: Callable[[], None]) -> Fit:
+    """The fit, or a better one elsewhere for numbers that act together; with the other ends that were met.
+
+    few, spans : on which is looked, and on which is fitted
+    """
+    from scipy.stats import qmc
+
+    met: list[Fit] = []
+    for group in groups(model, fit, few):
+        places = np.tile(fit.place, (2**REDRAWN, 1))
+        places[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
+        best = sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[: ALONE[0]]
+        ends = sorted((climb(model, u, group, few, ALONE[1], slopes=(WIDE, FINE)) for u in best), key=lambda e: e.loss)
+        # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
+        apart = distinct([fit.place, *(end.place for end in ends)], group)[1 : 1 + ALL[0]]
+        rough = sorted((climb(model, u, fit.free, few, ALL[1], slopes=CAREFUL) for u in apart), key=lambda e: e.loss)
+        say()
+        worst = loss_at(model, fit.place, fit.free, few) + UNLIKELY
+        likely = distinct([fit.place, *(end.place for end in rough if end.loss < worst)], group)[1 : 1 + WHOLE[0]]
+        found = [climb(model, u, fit.free, spans, WHOLE[1], slopes=(FINE, BOTH)) for u in likely]
+        say()
+        found = onward(model, [fit, *found], group, few, spans, say)
+        fit, met = found[0], [*met, *found[1:]]
+    return replace(fit, others=tuple(end.place for end in met))
+
+
+def onward(
+    model: Model,
+    ends: Sequence[Fit],
+    group: Sequence[int],
+    few: Sequence[int],
+    spans: Sequence[int],
+    say: Callable[[], None],
+) -> list[Fit]:
+    """Ends of climbs, best first, with those that are met beyond the best one, seen from the next ones.
+
+    Two ends on one ridge tell which way it goes, however narrow it is.
+    """
+    found = sorted(ends, key=lambda end: end.loss)
+    for _ in range(ONWARD):
+        best, rest = (
+            found[0],
+            [end for end in found[1:] if np.abs(end.place - found[0].place)[list(group)].max() > SAME],
+        )
+        starts = [np.clip(best.place + far * (best.place - end.place), 0.0, 1.0) for end in rest[:2] for far in BEYOND]
+        near = [climb(model, u, group, few, ALONE[1], slopes=(FINE, BOTH)).place for u in starts]
+        near = sorted(near, key=lambda u: loss_at(model, u, best.free, few))[:2]
+        found += [climb(model, u, best.free, spans, WHOLE[1], slopes=(FINE, BOTH)) for u in near]
+        found.sort(key=lambda end: end.loss)
+        say()
+        if found[0].loss > best.loss - BETTER:
+            break
+    return found
+
+
+def distinct(places: Sequence[Array], group: Sequence[int]) -> list[Array]:
+    """Places that differ from all before them in some number of a group."""
+    found: list[Array] = []
+    for u in places:
+        if all(np.abs(u - other)[list(group)].max() > SAME for other in found):
+            found.append(u)
+    return found
+
+
+def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
+    """Groups of named numbers that act on the same steps, around those that are told worst."""
+    named = [k for k in fit.free if k < model.named]
+    slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
+    flat = slopes.reshape(-1, len(named))
+    sizes = np.maximum(np.linalg.norm(flat, axis=0), 1e-30)
+    overlap = (flat.T @ flat) / np.outer(sizes, sizes)
+    errors = np.diag(np.linalg.inv(curvature(model, fit, spans)))[[fit.free.index(k) for k in named]]
+    found: list[list[int]] = []
+    for k in np.argsort(-errors).tolist():
+        near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
+        group = sorted(named[f] for f in (k, *near))
+        if near and not any(named[k] in other for other in found) and len(found) < GROUPS:
+            found.append(group)
+    return found

@@ -1,0 +1,63 @@
+"""Hills of infer: places of several numbers together that no single number leads to, and ridges between them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airflock.infer.fit import climb
+from airflock.infer.hills import distinct, groups, hills, onward
+from airflock.infer.ridges import ridges
+from airflock.infer.search import profile
+from line_laws import Line, quietly
+
+
+def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_anew():
+    def law(x, a, b, slope):  # two hills of a and b together, the farther one higher; beyond 0.5 slope acts alone
+        height = np.exp(-150.0 * ((a - 0.8) ** 2 + (b - 0.2) ** 2)) + 0.5 * np.exp(
+            -150.0 * ((a - 0.3) ** 2 + (b - 0.7) ** 2)
+        )
+        return np.where(x < 0.5, height * x, slope * (x - 0.5))
+
+    truth = (0.8, 0.2, 0.6)
+    model = Line(law, ("a", "b", "slope"), truth)
+    beside = climb(model, np.array([0.31, 0.69, 0.5]), [0, 1, 2])
+    best = climb(model, np.array(truth), [0, 1, 2])
+    assert beside.loss > best.loss + 20.0
+    assert profile(model, beside, [0], quietly).loss > best.loss + 20.0
+    assert groups(model, beside, [0]) == [[0, 1]]
+    assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
+
+
+def test_a_narrow_ridge_is_gone_along_beyond_the_better_of_two_ends():
+    def law(x, a, b):  # a and b make up for each other along a parabola, on which nothing but a slight slope leads on
+        return 30.0 * x * (b - (a - 0.1) ** 2) + 0.5 * x**2 * a
+
+    truth = (0.9, 0.64)
+    model = Line(law, ("a", "b"), truth)
+    best = climb(model, np.array(truth), [0, 1])
+    ends = [climb(model, np.array([a, (a - 0.1) ** 2]), [0, 1], steps=0) for a in (0.2, 0.45)]
+    assert climb(model, ends[1].place, [0, 1], steps=40).loss > best.loss + 10.0
+    assert onward(model, ends, [0, 1], [0], [0], quietly)[0].loss < best.loss + 5.0
+
+
+def test_a_hill_that_is_as_likely_lies_inside_the_interval():
+    def law(x, a, slope):  # a and 1 - a are the same law: which of both flew, the tracks do not say
+        return x * (a - 0.5) ** 2 * 4.0 + slope * x**2
+
+    model = Line(law, ("a", "slope"), (0.8, 0.6))
+    fit = climb(model, np.array([0.25, 0.5]), [0, 1])
+    assert fit.place[0] == pytest.approx(0.2, abs=0.05)
+    drop = 2.0
+    other = fit.place.copy()
+    other[0] = 1.0 - other[0]
+    without = ridges(model, fit, [0], drop)[1].ends(fit.place, drop)
+    found = ridges(model, replace(fit, others=(other, np.array([0.5, 0.5]))), [0], drop)[1].ends(fit.place, drop)
+    assert without[1][0] < 0.5
+    assert found[1][0] == pytest.approx(0.8, abs=0.05) and found[0][0] == pytest.approx(without[0][0], abs=0.02)
+    assert found[1][1] == pytest.approx(without[1][1], abs=0.02)  # the far place is less likely, and not told
+
+
+def test_each_hill_is_climbed_once():
+    places = [np.array(u) for u in ((0.5, 0.5, 0.0), (0.52, 0.5, 0.9), (0.7, 0.5, 0.0), (0.71, 0.45, 0.0))]
+    assert [u.tolist() for u in distinct(places, (0, 1))] == [[0.5, 0.5, 0.0], [0.7, 0.5, 0.0]]
