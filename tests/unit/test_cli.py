@@ -191,3 +191,12 @@ def test_what_is_no_scenario_says_what_takes_it(tmp_path, name, words):
 def test_a_scenario_that_is_not_there_is_named_once(tmp_path):
     told = called("evolve", "vasarhelyi_2018/4m", "--out", str(tmp_path / "study")).stderr
     assert told.startswith("airflock: vasarhelyi_2018/4m: no such file")
+
+
+@pytest.mark.parametrize("time", ["9" * 400 + "s", "0", "-3", "2mins", "nan", ""])
+def test_a_time_that_is_none_is_one_line(time):
+    """The first has more digits than a float: an infinite budget ended in an OverflowError."""
+    for command in (["certify", "vasarhelyi_2018/4ms", "--limit", "r_min<1 at 1/h", f"--budget={time}"],
+                    ["run", "vasarhelyi_2018/4ms", f"--duration={time}"]):  # fmt: skip
+        done = called(*command)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and "write a time above 0" in done.stderr

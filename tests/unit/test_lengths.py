@@ -7,7 +7,7 @@ import pytest
 import airflock
 from airflock.metrics.registry import SETS
 from airflock.recordings.lengths import IN_BODIES, in_bodies
-from airflock.recordings.scores import measure, not_told
+from airflock.recordings.scores import measure, not_told, scenario_of
 from processes import called
 
 GIVEN = {
@@ -30,13 +30,13 @@ def test_what_depends_on_a_length_says_so(kind, seed):
     recording = tracks(seed)
     settings = {"metrics.kind": kind, "world.arena": "square", "world.side": 200.0}
     settings |= {f"metrics.{key}": value for key, value in GIVEN.items()}
-    assert not_told(recording, settings) == {}
+    assert not_told(recording, scenario_of(recording, settings), settings) == {}
     here = measure(recording, settings)[0]
     for key, value in GIVEN.items():
         fewer = {name: given for name, given in settings.items() if name != f"metrics.{key}"}
         if key == "max_e" and "quality" in here:  # without it an error says what to give
             continue
-        refused = not_told(recording, fewer)
+        refused = not_told(recording, scenario_of(recording, fewer), fewer)
         for factor in (0.3, 3.0):
             there = measure(recording, {**settings, f"metrics.{key}": factor * value})[0]
             changed = {name for name in here if str(here[name]) != str(there[name])} - {"phi_lap", "phi_lap_abs"}
@@ -59,7 +59,7 @@ def test_a_body_is_a_length(seed):
 
 def test_a_simulated_flight_brings_its_lengths():
     flight = airflock.simulate(airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0}))
-    assert not_told(flight) == {} and {"n_coll", "phi_corr", "fitness"} <= set(measure(flight)[0])
+    assert not_told(flight, scenario_of(flight)) == {} and {"n_coll", "phi_corr", "fitness"} <= set(measure(flight)[0])
 
 
 def test_the_command_says_what_to_give(tmp_path, seed):

@@ -1,5 +1,6 @@
 """Options that several verbs share, and what they turn into."""
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -73,7 +74,7 @@ def settings(
 def time_of(text: str, option: str = "--budget") -> float:
     """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
     found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
-    if found is None or not float(found[1]) > 0.0:
+    if found is None or not 0.0 < float(found[1]) < math.inf:
         raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
     return float(found[1]) * SECONDS[found[2] or "s"]
 

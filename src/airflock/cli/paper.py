@@ -30,8 +30,8 @@ def paper(
     Needs pip install airflock-papers; in a clone of the repository: pip install -e ./papers
 
     `all --quick` flies the small form of every paper and fails if a verdict is not the committed one of this kind of
-    processor. `all --breaks`
-    makes the change of every claim and fails if one that is committed as turned red no longer is.
+    processor. `all --breaks` makes the change of every claim and fails if one that is committed as turned red no longer
+    is.
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """

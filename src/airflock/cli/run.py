@@ -166,11 +166,12 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
         recording = load_recording(source)
         settings = aero_settings(recording, changed) if aero else changed
         values, course = measure(recording, settings)
-        about |= reports(scenario_of(recording, settings).measures)
+        scenario = scenario_of(recording, settings)
+        about |= reports(scenario.measures)
         rows.append(values)
         courses.append(course.assign(file=str(path)))
         befell.append(faults(recording))
-        untold.append(not_told(recording, settings))
+        untold.append(not_told(recording, scenario, settings))
     if series is not None:
         import io
 

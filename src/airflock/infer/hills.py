@@ -67,10 +67,8 @@ def onward(
     """
     found = sorted(ends, key=lambda end: end.loss)
     for _ in range(ONWARD):
-        best, rest = (
-            found[0],
-            [end for end in found[1:] if np.abs(end.place - found[0].place)[list(group)].max() > SAME],
-        )
+        best = found[0]
+        rest = [end for end in found[1:] if np.abs(end.place - best.place)[list(group)].max() > SAME]
         starts = [np.clip(best.place + far * (best.place - end.place), 0.0, 1.0) for end in rest[:2] for far in BEYOND]
         near = [climb(model, u, group, few, ALONE[1], slopes=(FINE, BOTH)).place for u in starts]
         near = sorted(near, key=lambda u: loss_at(model, u, best.free, few))[:2]

@@ -115,32 +115,25 @@ def score(
                 table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
             return table
         values, _ = measure(what, settings)
-        table = _about(pd.DataFrame([values]), scenario_of(what, settings))
-        return _with_attributes(table, not_told=not_told(what, settings))
+        scenario = scenario_of(what, settings)
+        table = _about(pd.DataFrame([values]), scenario)
+        table.attrs["not_told"] = not_told(what, scenario, settings)
+        return table
     scenario, found = loaded(what), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
 
 
-def _with_attributes(table: pd.DataFrame, **attributes: Any) -> pd.DataFrame:
-    table.attrs.update(attributes)
-    return table
-
-
-def not_told(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> dict[str, tuple[str, ...]]:
+def not_told(
+    recording: xr.Dataset, scenario: Scenario, settings: Mapping[str, Any] | None = None
+) -> dict[str, tuple[str, ...]]:
     """Order parameters that a recording without a scenario does not have for want of a length, with the keys missing.
 
-    Examples
-    --------
-    >>> import airflock
-    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
-    >>> not_told(airflock.simulate(short))
-    {}
+    scenario : `scenario_of` the recording with these settings
     """
     if scenario_document(recording) is not None:
         return {}
-    scenario = scenario_of(recording, settings)
     sampled = (name for metric in scenario.measures.metrics for name in metric.Sample._fields)  # type: ignore[attr-defined]
     names = (*reports(scenario.measures), *sampled)
     return unsaid(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
@@ -210,7 +203,7 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
         course[[name for name in nearest.PAIRED if name in series]] = np.nan
     scores = replace(scenario, flight=replace(scenario.flight, agents=frames.shape[2])).judged(values)
     scores |= {} if present.all() else {"present": float(present.mean())}
-    untold = not_told(recording, settings)
+    untold = not_told(recording, scenario, settings)
     kept = {name: value for name, value in scores.items() if name not in untold}
     return kept, course[[name for name in course if name not in untold]]
 

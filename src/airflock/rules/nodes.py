@@ -7,7 +7,7 @@ WORDS = {"ctx", "op", "ops", "id", "attr", "name", "asname", "module", "level", 
 
 
 def walk(tree: ast.AST) -> list[ast.AST]:
-    """All nodes of a tree in the order of `ast.walk`, but neither contexts (`Load`, `Store`) nor operators."""
+    """All nodes of a tree in the order of `ast.walk`, without contexts (`Load`), operators and what is imported."""
     found = [tree]
     for node in found:  # which grows
         for name in _FIELDS[type(node)]:
