@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import njit, prange
+from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import NumbaError
 
 from inside import CALLED, INNER, KNOWN, SPARED
@@ -111,12 +112,43 @@ def test_closures_lists_and_whole_arrays_are_compiled_where_there_are_any():
     assert of_all(xs) == 14.0 * 2.0 + 6.0 + 14.0 * 2.0
 
 
-@pytest.mark.skipif(not KNOWN, reason="another version of Numba than those that were tried compiles as it likes")
+as_tried = pytest.mark.skipif(
+    not KNOWN, reason="another version of Numba than those that were tried compiles as it likes"
+)
+
+
+@as_tried
+def test_a_loop_over_threads_becomes_machine_code_where_it_is_called_alone(monkeypatch):
+    made, usual = [], JITCodeLibrary._finalize_specific
+    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda found: made.append(found.name) or usual(found))
+
+    @njit(**OPTIONS | INNER, parallel=True)
+    def doubled(xs):
+        for i in prange(xs.shape[0]):
+            xs[i] = 2.0 * xs[i]
+        return 0
+
+    @njit(**OPTIONS | CALLED)
+    def squared(xs):
+        doubled(xs)
+        doubled(xs)
+        return xs[0]
+
+    xs = np.arange(1000.0)
+    assert squared(xs) == 0.0
+    assert (xs == 4.0 * np.arange(1000.0)).all()
+    assert [name.split(".")[-1] for name in made] == [
+        "squared"
+    ]  # not the loop's body, what unpacks its arguments, and what hands its parts to threads
+
+
+@as_tried
 def test_a_driver_compiles_without_scipy_and_whoever_needs_it_has_it():
     text = """
 import sys
 import numpy as np
-from numba import njit
+from numba import njit, prange
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 sys.path.insert(0, {tests!r})
 from inside import CALLED, implementations

@@ -7,20 +7,18 @@ what it asks again and again about the same types is asked once.
 """
 
 from collections.abc import Callable, Hashable
-from types import SimpleNamespace
 from typing import Any
 
 from numba import types
 from numba.core import ir
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.imputils import RegistryLoader, builtin_registry
-from numba.core.runtime import rtsys  # type: ignore[attr-defined]
-from numba.core.typed_passes import NativeLowering, NopythonRewrites, NopythonTypeInference
+from numba.core.typed_passes import NativeLowering, NativeParforLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
-from airflock.engine.sparing import KNOWN, sparing
+from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
+from airflock.engine.sparing import sparing
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array
@@ -41,34 +39,6 @@ class QuickFlags(Flags):  # type: ignore[misc]  # Numba has no types, here and b
     def values(self) -> dict[str, Any]:
         """All values by name."""
         return self._usual | self._values
-
-
-class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code of a function."""
-
-    counted = True  # whether it counts references to arrays
-
-    def add_linking_library(self, library: Any) -> None:
-        """Link another one; that which counts references only where any are counted."""
-        if self.counted or library is not rtsys.library:
-            super().add_linking_library(library)
-
-    def _optimize_functions(self, module: Any) -> None:
-        if not KNOWN:
-            super()._optimize_functions(module)
-            return
-        module.data_layout = self._codegen._data_layout
-        written = [found for found in module.functions if not found.is_declaration]
-        super()._optimize_functions(SimpleNamespace(functions=written))
-
-
-class InlinedLibrary(DriverLibrary):
-    """Code of a function that only compiled functions call: optimised, and never turned into machine code."""
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
-        self._finalized = True
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
@@ -103,6 +73,14 @@ class InlinedLowering(Lowering):
         state.targetctx.insert_user_function(entry, described, [state.library])
         state["cr"] = found._replace(cfunc=entry)
         return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
+class SpreadLowering(InlinedLowering):
+    """Lowering of a function that only compiled functions call, whose loops are spread over threads."""
+
+    _name = "spread_lowering"
+    lowering_class = NativeParforLowering.lowering_class
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[untyped-decorator]
@@ -192,6 +170,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
             NopythonTypeInference: Typing,
             NopythonRewrites: ArrayRewrites,
             NativeLowering: InlinedLowering if inner else Lowering,
+            NativeParforLowering: SpreadLowering if inner else NativeParforLowering,
         }
         made = PassManager("driver")
         made.passes = [(other.get(kind, kind), said) for kind, said in found.passes]
@@ -199,7 +178,7 @@ class DriverCompiler(CompilerBase):  # type: ignore[misc]
         return [made]
 
     def _compile_core(self) -> Any:
-        with sparing():  # below Numba's lock: one thread at a time
+        with sparing(SPREAD):  # below Numba's lock: one thread at a time
             return super()._compile_core()
 
 

@@ -15,6 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
 from airflock.engine.sparing import implementations, seldom_collected
+from airflock.engine.threads import waiting_briefly
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next
@@ -28,7 +29,11 @@ def one_at_a_time(compile_: Callable[[Any], Any], folder: Path) -> Callable[[Any
     """
 
     def under_lock(signature: Any) -> Any:
-        with global_compiler_lock, seldom_collected():  # the first of all reads half of Numba's modules
+        with (
+            global_compiler_lock,
+            seldom_collected(),
+            waiting_briefly(),
+        ):  # the first of all reads half of Numba's modules
             implementations()
             return compile_(signature)
 

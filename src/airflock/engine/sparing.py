@@ -12,12 +12,14 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numba
-from numba.core import base, event, interpreter, ssa, transforms, types
-from numba.core.postproc import PostProcessor, VariableLifetime
+from numba.core import base, event, interpreter, ssa, types
+from numba.core.postproc import PostProcessor
 
 TRIED = (0, 62), (0, 68)  # first and last version of Numba of which this was tried, beside 0.65
 KNOWN = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 SELDOM = (100_000, 50, 50)  # for gc: a compilation makes millions of objects that stay; to look at them takes a tenth
+
+Spared = tuple[Any, str, Callable[..., Any]]  # whose, which of its functions, and what is called in its place
 
 _signatures: dict[Hashable, Any] = {}
 _sizes: dict[Hashable, int] = {}
@@ -25,11 +27,18 @@ _places: dict[Callable[..., Any], bool] = {}
 
 
 @contextmanager
-def sparing() -> Iterator[None]:
+def sparing(*more: Spared) -> Iterator[None]:
     """Around the passes over one function, below Numba's lock; may be entered again for another one that it calls."""
+    with exchanging(*(*SPARED, *more) if KNOWN else ()):
+        yield
+
+
+@contextmanager
+def exchanging(*spared: Spared) -> Iterator[None]:
+    """Exchange parts of Numba and collect garbage seldom, by one thread at a time."""
     with ExitStack() as changed:
         changed.enter_context(seldom_collected())
-        for owner, name, spare in SPARED if KNOWN else ():
+        for owner, name, spare in spared:
             changed.enter_context(_exchanged(owner, name, spare))
         yield
 
@@ -87,11 +96,11 @@ def _exchanged(owner: Any, name: str, spare: Callable[..., Any]) -> Iterator[Non
         setattr(owner, name, usual)
 
 
-def _call_type(usual: Callable[..., Any], function: Any, context: Any, given: Any, named: Any) -> Any:
+def call_type(usual: Callable[..., Any], function: Any, context: Any, given: Any, named: Any) -> Any:
     """Signature of a call of a function of Numba's, which its typing and its lowering ask for each statement."""
     if named:
         return usual(function, context, given, named)
-    key = function, tuple(given)
+    key = context, function, tuple(given)
     if key not in _signatures:
         _signatures[key] = usual(function, context, given, named)
     return _signatures[key]
@@ -108,20 +117,21 @@ def _size(usual: Callable[..., int], context: Any, kind: Any) -> int:
     return _sizes[key]
 
 
-def _processed(usual: Callable[..., None], processor: Any, emit_dels: bool = False, **named: Any) -> None:
+def processed(usual: Callable[..., None], processor: Any, emit_dels: bool = False, **named: Any) -> None:
     """Blocks in order after a pass. Which variables live where is computed only if it is asked for."""
     code = processor.func_ir
     if code.is_generator:
         usual(processor, emit_dels, **named)
         return
-    code.blocks = transforms.canonicalize_cfg(code.blocks)  # type: ignore[no-untyped-call]
-    code.variable_lifetime = VariableLifetime(code.blocks)  # type: ignore[no-untyped-call]
+    there = vars(sys.modules[type(processor).__module__])  # Numba has this twice: numba-cuda brings its own
+    code.blocks = there["transforms"].canonicalize_cfg(code.blocks)
+    code.variable_lifetime = there["VariableLifetime"](code.blocks)
     code.generator_info = None
     if emit_dels:
         processor._insert_var_dels(**named)
 
 
-def _rewritten(usual: Callable[..., Any], blocks: dict[int, Any], states: Any, handler: Any) -> dict[int, Any]:
+def rewritten(usual: Callable[..., Any], blocks: dict[int, Any], states: Any, handler: Any) -> dict[int, Any]:
     """Blocks with versions of one variable: of those that name it. The others stay as they are."""
     naming = {label: block for label, block in blocks.items() if states["varname"] in _named(block)}
     made = usual(naming, states, handler)
@@ -157,13 +167,13 @@ def _told(usual: Callable[..., None], kind: str, *given: Any, **named: Any) -> N
         usual(kind, *given, **named)
 
 
-SPARED: tuple[tuple[Any, str, Callable[..., Any]], ...] = (
-    (types.functions.BaseFunction, "get_call_type", _call_type),
+SPARED: tuple[Spared, ...] = (
+    (types.functions.BaseFunction, "get_call_type", call_type),
     (base.BaseContext, "get_abi_sizeof", _size),
     (base, "_has_loc", _takes_place),
-    (PostProcessor, "run", _processed),
+    (PostProcessor, "run", processed),
     (interpreter, "peep_hole_delete_with_exit", _without_exits),
-    (ssa, "_run_block_rewrite", _rewritten),
+    (ssa, "_run_block_rewrite", rewritten),
     (event, "start_event", _told),
     (event, "end_event", _told),
 )

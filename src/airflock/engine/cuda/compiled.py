@@ -7,6 +7,7 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from airflock.engine.cuda.kernel import ARGUMENTS
+from airflock.engine.cuda.sparing import sparing
 
 # dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words
 KINDS = dict(zip(ARGUMENTS, (
@@ -46,7 +47,7 @@ def ptx(
     compiler: Any = import_module("numba.cuda.compiler")
     dispatched = getattr(driver, kernel)
     options = dispatched.targetoptions
-    with pretending(capabilities[0]):
+    with pretending(capabilities[0]), sparing():
         library, _ = compiler._compile_pyfunc_with_fixup(
             dispatched.py_func,
             types,

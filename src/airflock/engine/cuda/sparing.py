@@ -1,0 +1,47 @@
+"""Work of numba-cuda's that changes nothing, left out while a kernel is compiled, as on the CPU. Same PTX."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from airflock.engine.sparing import Spared, call_type, exchanging, processed, rewritten
+
+TRIED = (0, 30), (0, 30)  # first and last version of numba-cuda of which this was tried
+
+
+@contextmanager
+def sparing() -> Iterator[None]:
+    """Around the compilation of kernels by one thread at a time."""
+    tried = TRIED[0] <= tuple(map(int, import_module("numba_cuda").__version__.split(".")[:2])) <= TRIED[1]
+    with exchanging(*_spared() if tried else ()):
+        yield
+
+
+def _spared() -> tuple[Spared, ...]:
+    """Those of numba-cuda, which has a compiler of its own with the names of Numba's."""
+    core = "numba.cuda.core."
+    flags: Any = import_module(core + "targetconfig").TargetConfig
+    return (
+        (import_module("numba.core.types").functions.BaseFunction, "get_call_type", call_type),
+        (import_module(core + "postproc").PostProcessor, "run", processed),
+        (import_module(core + "ssa"), "_run_block_rewrite", rewritten),
+        (flags, "values", _values),
+        (flags, "__hash__", _hash),
+        (flags, "__eq__", _equal),
+    )
+
+
+def _values(usual: Callable[..., Any], flags: Any) -> dict[str, Any]:
+    """All flags of a compilation by name, of which few are not the usual ones."""
+    return {name: flags._values.get(name, option.default) for name, option in flags.options.items()}
+
+
+def _hash(usual: Callable[..., int], flags: Any) -> int:
+    """That of their names, which is all that Numba hashes."""
+    return hash(tuple(sorted(flags.options)))
+
+
+def _equal(usual: Callable[..., Any], flags: Any, other: Any) -> Any:
+    """Whether all flags are the same."""
+    return flags is other or usual(flags, other)

@@ -1,0 +1,49 @@
+"""Libraries: code of LLVM of the functions of a driver, of which only what Python calls becomes machine code."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from numba.core.codegen import Codegen, JITCodeLibrary
+from numba.core.runtime import rtsys  # type: ignore[attr-defined]  # Numba has no types, here and below
+
+from airflock.engine.sparing import KNOWN
+
+# what Numba calls the body of a loop over threads, what unpacks its arguments, and what hands its parts to threads
+OF_LOOPS = ("__numba_parfor_gufunc", "<numba.np.ufunc.wrappers.", "parallelgufuncwrapper")
+
+
+class DriverLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function."""
+
+    counted = True  # whether it counts references to arrays
+
+    def add_linking_library(self, library: Any) -> None:
+        """Link another one; that which counts references only where any are counted."""
+        if self.counted or library is not rtsys.library:
+            super().add_linking_library(library)
+
+    def _optimize_functions(self, module: Any) -> None:
+        if not KNOWN:
+            super()._optimize_functions(module)
+            return
+        module.data_layout = self._codegen._data_layout
+        written = [found for found in module.functions if not found.is_declaration]
+        super()._optimize_functions(SimpleNamespace(functions=written))
+
+
+class InlinedLibrary(DriverLibrary):
+    """Code of a function that only compiled functions call: optimised, and never turned into machine code."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+def _made(usual: Callable[..., Any], codegen: Any, name: str, **named: Any) -> Any:
+    """A library of Numba's. Those of a loop over threads are linked, and called, by the function around it alone."""
+    return InlinedLibrary(codegen, name) if name.startswith(OF_LOOPS) else usual(codegen, name, **named)
+
+
+SPREAD = Codegen, "create_library", _made
