@@ -1,5 +1,8 @@
 """All errors that Airflock raises on purpose: one line each, ready for a person to read."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 MOST_LETTERS = 2000  # of one line; what a stranger's file holds is echoed, and must not flood a terminal
 MOST_LINES = 50
 
@@ -40,6 +43,15 @@ class AirflockError(Exception):
     ...     print(fault)
     vasarhelyi_2018/4m: no such file or preset; did you mean vasarhelyi_2018/4ms?
     """
+
+
+@contextmanager
+def gathering(faults: list[str]) -> Iterator[None]:
+    """Note the faults of what is checked inside, one line each, and go on, so that all can be told at once."""
+    try:
+        yield
+    except AirflockError as fault:
+        faults += [line for line in str(fault).splitlines() if line not in faults]
 
 
 class ParameterError(AirflockError):

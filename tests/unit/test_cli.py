@@ -116,6 +116,21 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == [folder] and list(folder.iterdir()) == []
 
 
+def test_a_disk_that_fills_up_takes_no_score_away(tmp_path, monkeypatch, capsys):
+    from airflock.cli.main import app
+    from airflock.errors import RecordingError
+    from airflock.recordings import files
+
+    def full(recording, path):
+        raise RecordingError(f"{path}: No space left on device; nothing was saved")
+
+    monkeypatch.setattr(files, "save", full)
+    few = ["--device", "python", "--agents", "2", "--duration", "1", "--json", "--save", str(tmp_path / "a.nc")]
+    with pytest.raises(RecordingError, match="No space left"):
+        app(["run", "vicsek_1995/ordered", *few], standalone_mode=False)
+    assert 0.0 <= json.loads(capsys.readouterr().out)["runs"][0]["polarisation"] <= 1.0
+
+
 def test_a_cut_off_recording_is_refused(tmp_path):
     file = tmp_path / "flight.nc"
     assert called("run", "vasarhelyi_2018/4ms", "--save", file, *SHORT).returncode == 0

@@ -128,6 +128,12 @@ def test_arrays_and_movement_of_both_generations_agree(tmp_path):
         )
         assert "position has no unit" in refused(given)
         assert "counts frames" in refused(given.assign_attrs(fps=None), unit="m")
+        both = refused(given.assign_attrs(fps=None))
+        assert "counts frames" in both and "position has no unit" in both
+    both = refused(array)
+    assert "counts frames" in both and "has no unit" in both
+    both = refused(pd.DataFrame({"id": [1, 1], "frame": [0, 1], "x_px": [0.0, 1.0], "y_px": [0.0, 1.0]}))
+    assert "counts frames" in both and "--scale" in both
     two = xr.concat([given, given.assign_coords(keypoints=["nose"])], "keypoints")
     assert "choose one: --keypoint" in refused(two, unit="m")
     assert "no keypoint tail; it has centroid, nose" in refused(two, unit="m", keypoint="tail")

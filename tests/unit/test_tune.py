@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -206,3 +207,16 @@ def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
     with pytest.raises(RecordingError, match=r"missing.csv: No such file"):
         tune([tmp_path / "missing.csv"], tmp_path / "a", like=make(MINE, "mine"))
     assert not (tmp_path / "a").exists()
+
+
+def test_what_was_said_before_the_search_is_not_said_again(capsys):
+    from airflock.cli.tune import _print
+
+    evolved = SimpleNamespace(fitness=0.5, low=0.4, high=0.6, seeds=10, limits=[])
+    told = SimpleNamespace(statements=["r_min<3: shown"])
+    made = SimpleNamespace(
+        notes=("scaled", "out of reach"), result=evolved, steps=(), why="no", certificate=told, folder="tuned"
+    )
+    _print(made, ["out of reach"])
+    printed = capsys.readouterr().out
+    assert "start: scaled" in printed and "out of reach" not in printed

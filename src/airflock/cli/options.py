@@ -11,7 +11,8 @@ import typer
 
 from airflock.doors import from_outside, toml_value
 from airflock.endings import ending_fault
-from airflock.errors import AirflockError, ScenarioError
+from airflock.errors import ScenarioError
+from airflock.errors import gathering as gathering  # verbs say options.gathering
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
@@ -83,15 +84,6 @@ def value(text: str, where: str) -> Any:
     """A TOML value, or the text itself if it is none; `where` names the option in faults."""
     with from_outside(where):
         return toml_value(text)
-
-
-@contextmanager
-def gathering(faults: list[str]) -> Iterator[None]:
-    """Note the faults of what is checked inside, one line each, and go on, so that all can be told at once."""
-    try:
-        yield
-    except AirflockError as fault:
-        faults += [line for line in str(fault).splitlines() if line not in faults]
 
 
 def refuse(faults: list[str]) -> None:

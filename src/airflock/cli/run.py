@@ -32,8 +32,6 @@ def run(
     """
     from airflock.engine import picked
     from airflock.executors.scores import scores
-    from airflock.metrics.registry import reports
-    from airflock.recordings.rare import remarks, upper_bound
     from airflock.scenarios.files import load
     from airflock.scenarios.seeds import sound_seeds
 
@@ -54,8 +52,17 @@ def run(
     chosen: dict[str, Any] = {"scheduler": scheduler, "threads": threads, "precision": precision, "device": device}
     with options.progress(f"{found.name}: flights", seeds, quiet=as_json) as done:
         rows = scores(flights, numbers, **chosen, done=done)
-    if save or plot:
+    _tell(found, numbers, rows, changed, as_json)
+    if save or plot:  # after the scores, which a full disk does not take away
         _record(found, numbers, precision, device, save, plot)
+
+
+def _tell(found, numbers, rows, changed, as_json) -> None:  # type: ignore[no-untyped-def]
+    """Print what flights came to, beside the paper's figures."""
+    from airflock.metrics.registry import reports
+    from airflock.recordings.rare import remarks, upper_bound
+
+    seeds = len(numbers)
     if as_json:
         from airflock.recordings.flights import plain
 
@@ -65,7 +72,7 @@ def run(
         result = {"scenario": {"name": found.name, **plain(found.document)}, "seeds": seeds, "runs": runs}
         tables.emit_json({**result, **tables.statistics(rows), **bounds})
         return
-    count = f"{seeds} flights" if seeds > 1 else f"seed {first_seed}"
+    count = f"{seeds} flights" if seeds > 1 else f"seed {numbers[0]}"
     title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
     published = {} if changed else found.published
     tables.score_table(title, rows, published, reports(found.measures))

@@ -75,12 +75,19 @@ def tune(
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
         how |= {"like": found, "heard": heard}
+    said: list[str] = []
     with _stages(as_json) as (watch, note):
-        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=note, **how)
+
+        def heard_once(text: str) -> None:
+            said.append(text)
+            if note is not None:
+                note(text)
+
+        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=heard_once, **how)
     if as_json:
         tables.emit_json(made.document())
     else:
-        _print(made)
+        _print(made, said)
     if not made.shown:
         raise typer.Exit(1)
 
@@ -120,7 +127,7 @@ def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
         yield watch, note
 
 
-def _print(made: Any) -> None:
+def _print(made: Any, said: list[str]) -> None:
     from rich.console import Console
 
     from airflock.evolve.safe import told
@@ -131,7 +138,8 @@ def _print(made: Any) -> None:
         console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     for note in made.notes:
-        line(f"start: {note}")
+        if note not in said:  # before the search began
+            line(f"start: {note}")
     r = made.result
     line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")
     for entry in r.limits:

@@ -1,12 +1,13 @@
 """Arrays: NumPy (frame, individual, axis), .npy and .npz without pickles, trajectories.h5 of idtracker.ai."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from airflock.errors import RecordingError
+from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.track import POSITION, Findings, Options, Track
 
@@ -25,12 +26,16 @@ def read_array(
         values = values[:, None, :]
     if values.ndim != 3 or values.shape[2] not in (2, 3):
         raise RecordingError(f"{where}: has shape {values.shape}; give (frame, individual, 2 or 3)")
-    rate = options.fps or fps
-    if rate is None:
-        raise RecordingError(f"{where}: counts frames; say how many a second: --fps 25")
-    if not options.unit:
-        raise RecordingError(f"{where}: has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m")
-    scale = headers.factor("x", "", where, options)
+    rate, scale = options.fps or fps, math.nan
+    faults = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
+    with gathering(faults):
+        if not options.unit:
+            raise RecordingError(
+                f"{where}: has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
+            )
+        scale = headers.factor("x", "", where, options)
+    if faults or rate is None:
+        raise RecordingError("\n".join(faults))
     frames = np.arange(len(values))
     found = []
     for number in range(values.shape[1]):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
+from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import expressions, headers
 from airflock.recordings.imports.track import COMMAND, POSITION, TARGETS, VELOCITY, Options
 from airflock.spelling import meant
@@ -52,14 +52,14 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
     twice = [name for i, name in enumerate(columns) if name in columns[:i]]
     if twice:
         raise RecordingError(f"{where}: column {twice[0]} appears twice; rename one of them")
-    found, faults = Layout(where), []
+    faults: list[str] = []
+    found = Layout(where)
     for step in (_mapped, _recognised):
-        try:
+        with gathering(faults):
             step(found, columns, options)
-        except RecordingError as fault:
-            faults += str(fault).splitlines()
-    if not faults:
-        _frames(found, options, faults)
+    whole = not faults
+    _frames(found, options, faults)
+    if whole:
         _complete(found, columns, faults)
     if faults:
         raise RecordingError("\n".join(faults))

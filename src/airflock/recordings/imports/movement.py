@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.errors import RecordingError
+from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.arrays import read_idtracker
 from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
@@ -37,8 +37,14 @@ def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") 
     axes = [str(axis) for axis in found["space"].values]
     if axes not in (["x", "y"], ["x", "y", "z"]):
         raise RecordingError(f"{where}: space has the axes {', '.join(axes)}, not x, y or x, y, z")
-    seconds = _seconds(found, options, where)
-    scale = _scale(found, options, where)
+    faults: list[str] = []
+    seconds, scale = np.empty(0), np.nan
+    with gathering(faults):
+        seconds = _seconds(found, options, where)
+    with gathering(faults):
+        scale = _scale(found, options, where)
+    if faults:
+        raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
     tracks = []
     for name in found["individual"].values:
