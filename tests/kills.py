@@ -94,11 +94,11 @@ def tune(folder):
     from airflock.scenarios.making import make
 
     tuning = import_module("airflock.tune.run")
-    tuning._rate = lambda *_: 300.0
+    tuning.rate_of = lambda *_: 300.0
     import_module("airflock.evolve.run").draw = lambda *_: None
     import_module("airflock.tune.report").save = lambda found: atomic.write(found.folder / "report.html", repr(found))
     # the limit is shown after its first looks, whatever the time
-    resume = (folder / tuning.PLAN).is_file()
+    resume = (folder / "tune.toml").is_file()
     tuning.tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 20%"], resume=resume)
 
 

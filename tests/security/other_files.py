@@ -289,13 +289,13 @@ def _memory(path):
 
 
 def _plan(path):
-    from airflock.tune.run import read_plan
+    from airflock.tune.kept import read_plan
 
     read_plan(path)
 
 
 def _hardening(path):
-    from airflock.tune.run import read_steps
+    from airflock.tune.kept import read_steps
 
     read_steps(path)
 

@@ -132,7 +132,7 @@ def python(text):
 
 NAMES = {
     "airflock": airflock, "load_study": load_study, "Path": Path, "read_card": read_card,
-    "hardened": import_module("airflock.tune.run")._hardened,
+    "hardened": import_module("airflock.tune.stages").hardening,
 }  # fmt: skip
 CONSENT = "would run the code in "
 WAYS = {

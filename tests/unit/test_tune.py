@@ -21,6 +21,7 @@ from airflock.evolve.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
+from airflock.tune.kept import MOST_SEEDS
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
 from airflock.tune.reach import out_of_reach
 from airflock.tune.run import tune, usual_limits
@@ -86,7 +87,7 @@ def done(tmp_path_factory):
     """A tuning of a few seconds; and how many flights a second were assumed."""
     folder = tmp_path_factory.mktemp("tuned") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuning, "_rate", lambda *_: 300.0)
+        patch.setattr(tuning, "rate_of", lambda *_: 300.0)
         patch.setattr("airflock.evolve.run.draw", lambda *_: None)  # the study's own pictures
         return tune(make(MINE, "mine"), folder, budget=4.0, limit=["r_min<0.1 at 10%"]), folder
 
@@ -105,7 +106,7 @@ def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):
 
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):
     found, folder = done
-    monkeypatch.setattr(tuning, "_rate", lambda *_: pytest.fail("the plan is kept"))
+    monkeypatch.setattr(tuning, "rate_of", lambda *_: pytest.fail("the plan is kept"))
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
     with pytest.raises(StudyError, match="holds a tuning already; continue it with --resume"):
         tune(make(MINE, "mine"), folder)
@@ -140,7 +141,7 @@ def logs(tmp_path_factory):
 
 
 def test_logs_are_identified_once_and_what_they_told_is_tuned_and_reported(logs, tmp_path, monkeypatch):
-    monkeypatch.setattr(tuning, "_rate", lambda *_: 300.0)
+    monkeypatch.setattr(tuning, "rate_of", lambda *_: 300.0)
     monkeypatch.setattr("airflock.evolve.run.draw", lambda *_: None)
     how = {"like": make(MINE, "mine"), "warm": True, "budget": 4.0, "limit": ["r_min<0.1 at 10%"]}
     found = tune([logs], tmp_path / "a", **how)
@@ -193,7 +194,7 @@ def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_
         certified = {seed for (seed,) in store.rows("SELECT seed FROM flight")}
     parts = [*searched.values(), certified]
     assert all(parts) and sum(map(len, parts)) == len(set().union(*parts))
-    assert min(map(min, parts)) > 2 * tuning.MOST_SEEDS  # hardening has the seeds from 0 on
+    assert min(map(min, parts)) > 2 * MOST_SEEDS  # hardening has the seeds from 0 on
 
 
 def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):

@@ -7,7 +7,7 @@ from airflock.errors import CardError
 from airflock.evolve.space import with_parameters
 
 if TYPE_CHECKING:
-    from airflock.tune.run import Tuned
+    from airflock.tune.tuned import Tuned
 
 REPLAYS = 3  # of the worst flights, at most
 SHOWN = ("speed_max", "accel", "response", "brake", "soft_margin", "base", "mission_time")  # limits that the set moves

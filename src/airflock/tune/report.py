@@ -23,7 +23,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock.tune.next_flight import card, replays
 
 if TYPE_CHECKING:
-    from airflock.tune.run import Tuned
+    from airflock.tune.tuned import Tuned
 
 PAGE, FIGURES = "report.html", "figures.pdf"
 STYLE = """

@@ -1,91 +1,27 @@
 """The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
 
-import json
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock import atomic
 from airflock.certify.asked import campaign_of
-from airflock.certify.campaign import FOLDER
-from airflock.certify.certificate import Certificate
-from airflock.certify.executing import executor_for
-from airflock.certify.run import run as certified
-from airflock.certify.seeds import identity
-from airflock.doors import from_outside, json_object, read_text
 from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.after import Result
 from airflock.evolve.bounds import usual_space
-from airflock.evolve.folder import open_folder, read, write
-from airflock.evolve.harden import document as hardened_document
-from airflock.evolve.harden import harden
-from airflock.evolve.run import executor_for as searching
-from airflock.evolve.run import run as evolved
 from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
-from airflock.evolve.steps import Measured
-from airflock.evolve.study import make_study
-from airflock.scenarios import formats
 from airflock.scenarios.change import variant
-from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.tune.kept import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
-from airflock.tune.plan import USUAL, Plan, plan_of
+from airflock.tune.plan import plan_of
 from airflock.tune.reach import out_of_reach
+from airflock.tune.stages import Note, certificate, hardening, rate_of, search
 from airflock.tune.start import has_walls, start_of
+from airflock.tune.tuned import Tuned
 
-PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
-    "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
-)  # fmt: skip
-MOST_SEEDS = 1_000_000  # of each step of hardening
 STAGES = "search", "hardening", "certificate", "report"
-PILOT = 4  # flights per core that tell how long one takes
-Note = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """What tuning found: the scenario to fly, and what each stage said.
-
-    identified : what logs told, where it began with logs
-    steps : of hardening; empty where the law has no recipe, and `why` says so
-    """
-
-    folder: Path
-    scenario: Scenario
-    start: Scenario
-    notes: tuple[str, ...]
-    result: Result
-    steps: tuple[Measured, ...]
-    why: str
-    certificate: Certificate
-    seconds: float
-    identified: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def shown(self) -> bool:
-        """Whether the certificate shows all limits."""
-        return self.certificate.shown
-
-    def __repr__(self) -> str:
-        return f"<Tuned {self.folder / TUNED}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
-
-    def document(self) -> dict[str, Any]:
-        """What was found as plain values, for --json."""
-        return {
-            "folder": str(self.folder),
-            "tuned": str(self.folder / TUNED),
-            "notes": list(self.notes),
-            "evolved": self.result.document(),
-            "hardening": [step.as_dict() for step in self.steps],
-            "why_not_hardened": self.why,
-            "certificate": self.certificate.document(),
-            "seconds": self.seconds,
-            **({"identified": dict(self.identified)} if self.identified else {}),
-        }
 
 
 def tune(
@@ -164,7 +100,10 @@ def tune(
     limits = list(limit) or usual_limits(start)
     asked = campaign_of(start, limits, confidence)  # refused before anything flies
     telling = flights_that_count([each for each in asked.limits if each.rate is not None], start)
-    plan = _planned(folder, start, budget, resume, threads, warm=warm, telling=telling)
+    plan = kept_plan(folder, start, resume)
+    if plan is None:
+        plan = plan_of(budget, rate_of(start, threads), warm=warm, telling=telling)
+        keep_plan(folder, start, plan)
     searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
@@ -172,16 +111,16 @@ def tune(
     for line in short:
         _say(note, line)
     _say(note, STAGES[0])
-    result = _evolved(folder, start, plan, searched, threads, watch)
+    result = search(folder, start, plan, searched, threads, watch)
     notes = [*notes, *usual_space(start)[1], *short]
     if result.dead:
         raise StudyError(f"{mine.name}: {result.dead}")
     _say(note, STAGES[1])
-    tuned, steps, why = _hardened(folder, result, plan, searched, threads, trust)
+    tuned, steps, why = hardening(folder, result, plan, searched, threads, trust)
     _say(note, STAGES[2])
-    certificate = _certified(folder, tuned, limits, confidence, plan, threads, note)
+    shown = certificate(folder, tuned, limits, confidence, plan, threads, note)
     found = Tuned(
-        folder, tuned, start, tuple(notes), result, tuple(steps), why, certificate, time.monotonic() - began,
+        folder, tuned, start, tuple(notes), result, tuple(steps), why, shown, time.monotonic() - began,
         {} if logs is None else logs.told,
     )  # fmt: skip
     _say(note, STAGES[3])
@@ -221,150 +160,3 @@ def usual_limits(scenario: Scenario) -> list[str]:
 def _say(note: Note | None, text: str) -> None:
     if note:
         note(text)
-
-
-def _planned(
-    folder: Path,
-    start: Scenario,
-    budget: float,
-    resume: bool,
-    threads: int | None,
-    *,
-    warm: bool = False,
-    telling: int = USUAL,
-) -> Plan:
-    """The plan of the folder, made where there is none. Raises StudyError for a folder of something else."""
-    if (folder / PLAN).is_file():
-        if not resume:
-            raise StudyError(f"{folder}: holds a tuning already; continue it with --resume, or give another --out")
-        made, of = read_plan(folder / PLAN)
-        if of != identity(start):
-            raise StudyError(f"{folder}: holds the tuning of another scenario; give another --out")
-        return made
-    if resume:
-        raise StudyError(f"{folder}: holds no tuning to resume ({PLAN} is missing)")
-    if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise StudyError(f"{folder}: is not empty and holds no {PLAN}; give a new folder")
-    plan = plan_of(budget, _rate(start, threads), warm=warm, telling=telling)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write(folder / START, _document(start), "Where tuning starts.")
-        write(
-            folder / PLAN,
-            {**plan.document(), "identity": identity(start)},
-            "A tuning of Airflock. Written once, when it began.",
-        )
-    except OSError as fault:
-        raise StudyError(f"{folder}: cannot be written: {fault.strerror or fault}") from fault
-    return plan
-
-
-def read_plan(path: Path) -> tuple[Plan, str]:
-    """The plan that a folder keeps, and the identity of its scenario; StudyError where the file is damaged."""
-    found = read(path)
-    try:
-        search = {str(key): value for key, value in found["search"].items()}
-        made = Plan(search, int(found["seeds"]), float(found["seconds"]), float(found["rate"]))
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged: no plan of a tuning is in it; give another --out") from fault
-    if not (0 < made.seeds <= MOST_SEEDS and 0.0 <= made.seconds < 1e9 and 0.0 < made.rate < 1e9):
-        raise StudyError(f"{path}: is damaged: its numbers are no plan of a tuning; give another --out")
-    return made, str(found.get("identity"))
-
-
-def _document(scenario: Scenario) -> dict[str, Any]:
-    return {formats.KEY: formats.FORMAT, **{k: v for k, v in scenario.document.items() if k != "published"}}
-
-
-def _rate(scenario: Scenario, threads: int | None) -> float:
-    """Flights per second, from a few of them."""
-    from airflock.engine import compile_for, score_flights
-    from airflock.threads import cores
-
-    compile_for(scenario)
-    count = PILOT * (threads or cores())
-    began = time.perf_counter()
-    score_flights([scenario] * count, range(count), threads=threads)
-    return count / max(time.perf_counter() - began, 1e-6)
-
-
-def _evolved(
-    folder: Path, start: Scenario, plan: Plan, limits: Sequence[str], threads: int | None, watch: Watch | None
-) -> Result:
-    objective = {"objective": {"limits": list(limits)}} if limits else {}
-    study = make_study(objective, start.name, search=plan.search, scenario=start)
-    open_folder(folder / STUDY, study, resume=(folder / STUDY / "study.toml").is_file())
-    return evolved(study, folder / STUDY, searching(study, threads=threads), watch)
-
-
-def _hardened(
-    folder: Path, result: Result, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool
-) -> tuple[Scenario, list[Measured], str]:
-    """The scenario after hardening, its steps, and why there are none."""
-    if (folder / STEPS).is_file():
-        steps, why = read_steps(folder / STEPS)
-        return load(folder / TUNED, trust=trust), steps, why
-    best = load(folder / STUDY / "best.toml", trust=trust)
-    steps, why = [], ""
-    try:
-        steps = harden(best, range(plan.seeds), limit=limits, threads=threads)
-        write(folder / TUNED, hardened_document(best, steps[-1]), "Evolved and hardened by airflock tune.")
-    except ScenarioError as fault:
-        why = fault.faults[0]
-        law = folder / STUDY / str(best.document.get("model", {}).get("kind", ""))
-        if law.suffix == ".py" and law.is_file():
-            atomic.write(folder / law.name, law.read_bytes())
-        write(folder / TUNED, _document(best), "Evolved by airflock tune; not hardened.")
-    atomic.write(folder / STEPS, json.dumps({"why": why, "steps": [step.as_dict() for step in steps]}))
-    return load(folder / TUNED, trust=trust), steps, why
-
-
-def read_steps(path: Path) -> tuple[list[Measured], str]:
-    """Steps of hardening that a folder keeps, and why there are none; StudyError where the file is damaged."""
-    with from_outside(path, StudyError):
-        told = json_object(read_text(path))
-    try:
-        return [_measured(step) for step in told["steps"]], str(told["why"])
-    except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as fault:
-        raise StudyError(f"{path}: is damaged; remove it, and the hardening is done once more") from fault
-
-
-def _measured(told: Mapping[str, Any]) -> Measured:
-    """One step from plain values; raises what its constructors raise."""
-
-    def three(values: Any) -> tuple[float, float, float]:
-        mean, low, high = map(float, values)
-        return mean, low, high
-
-    def table(name: str) -> dict[str, float]:
-        return {str(key): float(value) for key, value in told[name].items()}
-
-    return Measured(
-        name=str(told["name"]), reason=str(told["reason"]), parameters=table("parameters"),
-        fitness=float(told["fitness"]), r_min=float(told["r_min"]), n_coll=float(told["n_coll"]),
-        cost=three(told["cost"]), gain=three(told["gain"]), parts=table("parts"), contacts=float(told["contacts"]),
-        clearance=float(told.get("clearance", "nan")), kept=bool(told["kept"]), verdict=str(told["verdict"]),
-    )  # fmt: skip
-
-
-def _certified(
-    folder: Path,
-    tuned: Scenario,
-    limits: Sequence[str],
-    confidence: float,
-    plan: Plan,
-    threads: int | None,
-    note: Note | None,
-) -> Certificate:
-    from airflock.certify.tolerance import usual_keys
-
-    campaign = campaign_of(tuned, limits, confidence)
-    path = folder / "certificate_flights"
-    open_folder(path, campaign, resume=(path / f"{FOLDER}.toml").is_file(), kind=FOLDER)
-    executor = executor_for(campaign, threads=threads)
-    try:
-        made = certified(campaign, path, executor, plan.seconds, keys=usual_keys(tuned), threads=threads, note=note)
-    finally:
-        executor.close()
-    made.save(folder / CERTIFICATE)
-    return made

@@ -1,0 +1,57 @@
+"""Tuned: what a tuning found, and the names of what its folder holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from airflock.certify.certificate import Certificate
+from airflock.evolve.after import Result
+from airflock.evolve.steps import Measured
+from airflock.scenarios.scenario import Scenario
+
+PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
+    "tune.toml", "start.toml", "study", "tuned.toml", "certificate.toml", "hardening.json",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What tuning found: the scenario to fly, and what each stage said.
+
+    identified : what logs told, where it began with logs
+    steps : of hardening; empty where the law has no recipe, and `why` says so
+    """
+
+    folder: Path
+    scenario: Scenario
+    start: Scenario
+    notes: tuple[str, ...]
+    result: Result
+    steps: tuple[Measured, ...]
+    why: str
+    certificate: Certificate
+    seconds: float
+    identified: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> bool:
+        """Whether the certificate shows all limits."""
+        return self.certificate.shown
+
+    def __repr__(self) -> str:
+        return f"<Tuned {self.folder / TUNED}: fitness {self.result.fitness:.3f}; {self.certificate!r}>"
+
+    def document(self) -> dict[str, Any]:
+        """What was found as plain values, for --json."""
+        return {
+            "folder": str(self.folder),
+            "tuned": str(self.folder / TUNED),
+            "notes": list(self.notes),
+            "evolved": self.result.document(),
+            "hardening": [step.as_dict() for step in self.steps],
+            "why_not_hardened": self.why,
+            "certificate": self.certificate.document(),
+            "seconds": self.seconds,
+            **({"identified": dict(self.identified)} if self.identified else {}),
+        }
