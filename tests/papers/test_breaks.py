@@ -180,6 +180,19 @@ def test_no_sentence_that_is_reproduced_still_holds_under_its_change(name: str) 
 
 
 @pytest.mark.parametrize("name", airflock_papers.PAPERS)
+def test_every_sentence_that_is_judged_names_its_change_and_what_came_of_it(name: str) -> None:
+    judged = {
+        claim.id for path in (ROOT / name).glob("*.toml") for claim in read_claims(path)[1]
+        if claim.verdict in ("reproduced", "not reproduced")
+    }  # fmt: skip
+    rows = {row.id: row for row in campaign.committed() if row.paper == name}
+    assert judged <= set(rows)
+    stated = breaks.load(f"airflock_papers.{name}")
+    assert all(rows[id].change for id in judged)
+    assert all(stated[id].breaks or rows[id].result == breaks.ALREADY for id in judged)  # who can turn red is flown
+
+
+@pytest.mark.parametrize("name", airflock_papers.PAPERS)
 def test_red_as_they_are_are_the_sentences_that_their_page_does_not_count_as_reproduced(name: str) -> None:
     pages = campaign.verdicts(ROOT)
     for row in campaign.committed():
@@ -197,7 +210,9 @@ def test_the_committed_changes_are_those_of_the_statements() -> None:
     for name in airflock_papers.PAPERS:
         told = {row.id: (row.part, row.change) for row in rows if row.paper == name}
         statements = breaks.load(f"airflock_papers.{name}").values()
-        assert told == {s.id: (breaks.part_of(s), breaks.in_words(s.breaks)) for s in statements if s.breaks}
+        keys = {s.id: (breaks.part_of(s), breaks.in_words(s.breaks)) for s in statements if s.breaks}
+        words = {s.id: (breaks.part_of(s), s.fails_if) for s in statements if s.kind == "paper" and s.bound}
+        assert told == words | keys
 
 
 ROWS = [

@@ -119,12 +119,15 @@ def replaced(rows: Iterable[Row], found: Iterable[Row]) -> list[Row]:
 
 
 def as_stated(rows: Iterable[Row], statements: Mapping[str, Iterable[Statement]]) -> list[Row]:
-    """One row for each claim with a change, by papers, parts and statements; new ones are not made yet."""
+    """One row for each claim with a change, by papers, parts and statements; new ones are not made yet.
+
+    Of a sentence of a paper the change may stand in words alone, as long as it is red as it is.
+    """
     old = {(row.paper, row.id): row for row in rows}
     found = []
     for name, every in statements.items():
-        for s in (s for s in every if s.breaks):
-            plain = Row(name, breaks.part_of(s), s.id, breaks.in_words(s.breaks), UNMADE)
+        for s in (s for s in every if s.breaks or (s.kind == "paper" and s.bound)):
+            plain = Row(name, breaks.part_of(s), s.id, breaks.in_words(s.breaks) or s.fails_if, UNMADE)
             before = old.get((name, s.id), plain)
             found.append(before if before[:4] == plain[:4] else plain)
     order = {key: place for place, key in enumerate(parts(found))}
