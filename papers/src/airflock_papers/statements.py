@@ -47,7 +47,7 @@ class Statement:
                 `times 0.5` halves a number, keys of `search` change an evolution
     part      : which part of the paper measures it; else the first word of the id
     verdict   : of a statement without a bound: qualitative only, not testable or not flown yet
-    reason    : why it has none; command : what would fly it
+    reason    : why it has none, or why what was measured misses the bound; command : what would fly it
     changed   : what was judged before, with date and reason
     """
 
@@ -110,7 +110,7 @@ def _expanded(entries: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         plain = {key: value for key, value in entry.items() if key != "each"}
         for values in entry.get("each", [{}]):
             filled = {k: _filled(v, values) if values else v for k, v in plain.items()}
-            found.append(filled | {k: v for k, v in values.items() if k in ("published", "published_sd", "bound")})
+            found.append(filled | {k: v for k, v in values.items() if k in ("published", "published_sd", "bound", "reason")})
     return found
 
 
