@@ -19,6 +19,7 @@ from airflock_papers.quantities import QUANTITIES
 KINDS = ("paper", "program", "ours")
 UNTESTED = ("qualitative only", "not testable", "not flown yet")
 LONGEST = 25  # words of a quote
+OF_A_ROW = ("published", "published_sd", "bound", "reason")  # what a row of `each` gives as it is
 # a number with its unit of time or its kind of place, as quotes and `at` write it
 TIMES = {
     "generation": r"generations?\s+(?P<a>\d+)|(?P<b>\d+)\s+generations?",
@@ -110,7 +111,7 @@ def _expanded(entries: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         plain = {key: value for key, value in entry.items() if key != "each"}
         for values in entry.get("each", [{}]):
             filled = {k: _filled(v, values) if values else v for k, v in plain.items()}
-            found.append(filled | {k: v for k, v in values.items() if k in ("published", "published_sd", "bound", "reason")})
+            found.append(filled | {k: v for k, v in values.items() if k in OF_A_ROW})
     return found
 
 
