@@ -68,7 +68,7 @@ def test_all_places_of_a_surface_that_are_as_likely_lie_inside_the_intervals():
     low, high = found.ends(fit.place, drop)
     p, v = (each.ravel() for each in np.meshgrid(np.linspace(0.1, 1.0, 31), np.linspace(0.3, 0.9, 31)))
     places = np.stack([0.17 + (v - 0.2) ** 2 - 0.03 / (0.1 + p) ** 2, p, v], axis=1)
-    likely = [u for u in places if 0.0 <= u[0] and model.score(u).loss() < fit.score.loss() + drop]
+    likely = [u for u in places if u[0] >= 0.0 and model.score(u).loss() < fit.score.loss() + drop]
     assert len(likely) > 50 and np.ptp(likely, axis=0)[1] > 0.7
     assert (np.array(likely) > low - 0.02).all() and (np.array(likely) < high + 0.02).all()
 

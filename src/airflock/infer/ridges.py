@@ -1,8 +1,10 @@
 """Ridges: how far numbers that make up for each other can go together before the tracks are explained worse.
 
 The numbers of a braking curve lie on a ridge of the likelihood that bends. The curvature at the fit knows its first
-steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: the number that is told
-worst is moved step by step, all others follow, and the places on the way tell how far each of them goes.
+steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: a number is moved step by
+step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
+in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
+numbers that are told worst are walked each by itself, and so are those that act as the worst one does.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,8 +18,9 @@ from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-RIDGES = 4  # numbers whose ridges are walked, at most
-NESTED = (1, 3)  # that act most like the moved number follow first
+WORST = 4  # numbers that are walked, at most, and
+BESIDE = 3  # that act as the worst of them does
+NESTED = (1, 3)  # numbers that act most like the moved one, which follow first
 ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
 SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
 FIRST = 0.4  # of the way to the end that the curvature tells: first step
@@ -80,9 +83,9 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
     named = [k for k, f in enumerate(fit.free) if f < model.named]
     reach = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
     near = {k: [g for g in _alike(curved[1], k) if g in named] for k in named}
-    worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:RIDGES]
+    worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:WORST]
     ways: list[Way] = []
-    for k in dict.fromkeys([*worst, *(near[worst[0]][: NESTED[-1]] if worst else [])]):
+    for k in dict.fromkeys([*worst, *(near[worst[0]][:BESIDE] if worst else [])]):
         slope = np.zeros(len(fit.place))
         slope[fit.free] = covariances[1][k] / covariances[1][k, k]
         follow = [fit.free[g] for g in near[k]]
