@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import BOTH, FINE, WIDE, Fit, climb, curvature
+from airflock.infer.fit import BOTH, FINE, FINEST, WIDE, Fit, climb, curvature
 from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ NESTED = (1, 3)  # numbers that act most like the moved one, which follow first
 ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
 SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
 FIRST = 0.4  # of the way to the end that the curvature tells: first step
-STRIDE = (0.01, 0.15)  # of a range: least and longest step
+STRIDE = (0.01, 0.15)  # of a range: least step, but for a first one that is shorter, and longest
 FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
 PLACES = 12  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
@@ -121,7 +121,8 @@ def _walk(
     """
     rest = [f for f in fit.free if f != number]
     way = [(fit.place, 0.0)]
-    step = float(np.clip(step, *STRIDE))
+    step = float(np.clip(step, FINEST, STRIDE[1]))
+    least = min(step, STRIDE[0])
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
@@ -136,8 +137,8 @@ def _walk(
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
             break
-        if fell - way[-1][1] > 0.5 * drop and step > STRIDE[0]:
-            step = max(step / SHORTER, STRIDE[0])
+        if fell - way[-1][1] > 0.5 * drop and step > least:
+            step = max(step / SHORTER, least)
             continue
         way.append((found.place, fell))
         if fell >= drop or not 0.0 < found.place[number] < 1.0:
