@@ -73,6 +73,19 @@ def test_all_places_of_a_surface_that_are_as_likely_lie_inside_the_intervals():
     assert (np.array(likely) > low - 0.02).all() and (np.array(likely) < high + 0.02).all()
 
 
+def test_a_number_that_is_told_sharply_is_walked_by_steps_shorter_than_its_interval():
+    def law(x, a, p, v):  # the same surface, seen through a v that moves forty times as fast
+        w = 0.6 + 40.0 * (v - 0.5)
+        return np.where(x < 0.6, 10.0 * x * (a + 0.03 / (0.1 + p) ** 2 - (w - 0.2) ** 2), 0.5 * (x - 0.6) * w)
+
+    model, drop = Line(law, ("a", "p", "v"), (0.3, 0.9, 0.5)), 4.0
+    start = climb(model, np.array([0.33 - 0.03 / 0.45**2, 0.35, 0.5]), [0, 1, 2], steps=3, slopes=(FINE,))
+    fit, found = ridges(model, start, [0], drop)
+    low, high = found.ends(fit.place, drop)
+    assert high[2] - low[2] < 0.01
+    assert all(way[1][1] < drop for way in found.ways)
+
+
 def test_each_hill_is_climbed_once():
     places = [np.array(u) for u in ((0.5, 0.5, 0.0), (0.52, 0.5, 0.9), (0.7, 0.5, 0.0), (0.71, 0.45, 0.0))]
     assert [u.tolist() for u in distinct(places, (0, 1))] == [[0.5, 0.5, 0.0], [0.7, 0.5, 0.0]]
