@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airflock.infer.fit import climb
+from airflock.infer.fit import FINE, climb
 from airflock.infer.hills import distinct, groups, hills, onward
 from airflock.infer.ridges import ridges
 from airflock.infer.search import profile
@@ -56,6 +56,34 @@ def test_a_hill_that_is_as_likely_lies_inside_the_interval():
     assert without[1][0] < 0.5
     assert found[1][0] == pytest.approx(0.8, abs=0.05) and found[0][0] == pytest.approx(without[0][0], abs=0.02)
     assert found[1][1] == pytest.approx(without[1][1], abs=0.02)  # the far place is less likely, and not told
+
+
+def test_all_places_of_a_surface_that_are_as_likely_lie_inside_the_intervals():
+    def law(x, a, p, v):  # where x is small, only a + 0.03 / (0.1 + p)² - (v - 0.2)² shows; beyond, v alone, faintly
+        return np.where(x < 0.6, 10.0 * x * (a + 0.03 / (0.1 + p) ** 2 - (v - 0.2) ** 2), 0.5 * (x - 0.6) * v)
+
+    model, drop = Line(law, ("a", "p", "v"), (0.3, 0.9, 0.6)), 4.0
+    start = np.array([0.33 - 0.03 / 0.45**2, 0.35, 0.6])  # on the surface, where p is small
+    fit, found = ridges(model, climb(model, start, [0, 1, 2], steps=3, slopes=(FINE,)), [0], drop)
+    low, high = found.ends(fit.place, drop)
+    p, v = (each.ravel() for each in np.meshgrid(np.linspace(0.1, 1.0, 31), np.linspace(0.3, 0.9, 31)))
+    places = np.stack([0.17 + (v - 0.2) ** 2 - 0.03 / (0.1 + p) ** 2, p, v], axis=1)
+    likely = [u for u in places if u[0] >= 0.0 and model.score(u).loss() < fit.score.loss() + drop]
+    assert len(likely) > 50 and np.ptp(likely, axis=0)[1] > 0.7
+    assert (np.array(likely) > low - 0.02).all() and (np.array(likely) < high + 0.02).all()
+
+
+def test_a_number_that_is_told_sharply_is_walked_by_steps_shorter_than_its_interval():
+    def law(x, a, p, v):  # the same surface, seen through a v that moves forty times as fast
+        w = 0.6 + 40.0 * (v - 0.5)
+        return np.where(x < 0.6, 10.0 * x * (a + 0.03 / (0.1 + p) ** 2 - (w - 0.2) ** 2), 0.5 * (x - 0.6) * w)
+
+    model, drop = Line(law, ("a", "p", "v"), (0.3, 0.9, 0.5)), 4.0
+    start = climb(model, np.array([0.33 - 0.03 / 0.45**2, 0.35, 0.5]), [0, 1, 2], steps=3, slopes=(FINE,))
+    fit, found = ridges(model, start, [0], drop)
+    low, high = found.ends(fit.place, drop)
+    assert high[2] - low[2] < 0.01
+    assert all(way[1][1] < drop for way in found.ways)
 
 
 def test_each_hill_is_climbed_once():

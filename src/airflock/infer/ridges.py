@@ -1,8 +1,10 @@
 """Ridges: how far numbers that make up for each other can go together before the tracks are explained worse.
 
 The numbers of a braking curve lie on a ridge of the likelihood that bends. The curvature at the fit knows its first
-steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: the number that is told
-worst is moved step by step, all others follow, and the places on the way tell how far each of them goes.
+steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: a number is moved step by
+step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
+in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
+numbers that are told worst are walked each by itself, and so are those that act as the worst one does.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,15 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.fit import BOTH, FINE, WIDE, Fit, climb, curvature
+from airflock.infer.fit import BOTH, FINE, FINEST, WIDE, Fit, climb, curvature
 from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-RIDGES = 3  # that are walked, at most
+WORST = 4  # numbers that are walked, at most, and
+BESIDE = 3  # that act as the worst of them does
+NESTED = (1, 3)  # numbers that act most like the moved one, which follow first
+ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
 SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
 FIRST = 0.4  # of the way to the end that the curvature tells: first step
-STRIDE = (0.01, 0.15)  # of a range: least and longest step
+STRIDE = (0.01, 0.15)  # of a range: least step, but for a first one that is shorter, and longest
 FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
 PLACES = 12  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
@@ -74,56 +79,71 @@ def ridges(
 def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool) -> tuple[list[Way], Array | None]:
     """Ways along all ridges; and, where it may be left for it, a better place."""
     curved = [curvature(model, fit, spans, way) for way in (WIDE, BOTH)]
+    covariances = [np.linalg.inv(each) for each in curved]
+    named = [k for k, f in enumerate(fit.free) if f < model.named]
+    reach = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
+    near = {k: [g for g in _alike(curved[1], k) if g in named] for k in named}
+    worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:WORST]
     ways: list[Way] = []
-    rest = list(range(len(fit.free)))
-    for _ in range(RIDGES):
-        covariances = [np.linalg.inv(each[np.ix_(rest, rest)]) for each in curved]
-        errors = np.sqrt(np.maximum(*(np.diag(each) for each in covariances)))
-        errors[[k for k, f in enumerate(rest) if fit.free[f] >= model.named]] = 0.0
-        worst = int(np.argmax(errors))
-        reach = float(errors[worst]) * (2.0 * drop) ** 0.5
-        if reach < SHORTEST:
-            break
+    for k in dict.fromkeys([*worst, *(near[worst[0]][:BESIDE] if worst else [])]):
         slope = np.zeros(len(fit.place))
-        slope[[fit.free[f] for f in rest]] = covariances[1][worst] / covariances[1][worst, worst]
-        number = fit.free[rest[worst]]
+        slope[fit.free] = covariances[1][k] / covariances[1][k, k]
+        follow = [fit.free[g] for g in near[k]]
         for side in (-1.0, 1.0):
-            way, better = _walk(model, fit, spans, number, side * slope, FIRST * reach, drop)
+            way, better = _walk(model, fit, spans, fit.free[k], follow, side * slope, FIRST * float(reach[k]), drop)
             if leave and better is not None:
                 return ways, better
             ways.append(way)
-        rest.pop(worst)
     return ways, None
 
 
+def _alike(curved: Array, k: int) -> list[int]:
+    """Numbers that act as one of them does, by their curvature; the most alike first."""
+    sizes = np.sqrt(np.diag(curved))
+    overlap = np.abs(curved[k]) / (sizes[k] * sizes)
+    return [g for g in np.argsort(-overlap).tolist() if g != k and overlap[g] > ALIKE]
+
+
 def _walk(
-    model: Model, fit: Fit, spans: Sequence[int], number: int, slope: Array, step: float, drop: float
+    model: Model,
+    fit: Fit,
+    spans: Sequence[int],
+    number: int,
+    near: Sequence[int],
+    slope: Array,
+    step: float,
+    drop: float,
 ) -> tuple[Way, Array | None]:
     """One way along a ridge; a better place than the fit, if one was met.
 
+    near  : numbers that act as the moved one does, which follow first
     slope : moves of all numbers at first, that of the moved one is 1 or -1; step : first move
     """
     rest = [f for f in fit.free if f != number]
     way = [(fit.place, 0.0)]
-    step = float(np.clip(step, *STRIDE))
+    step = float(np.clip(step, FINEST, STRIDE[1]))
+    least = min(step, STRIDE[0])
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
+        for count in NESTED:
+            if near[:count]:
+                start = climb(model, start, near[:count], spans, FOLLOWS, slopes=(FINE, BOTH)).place
         found = climb(model, start, rest, spans, FOLLOWS, slopes=(FINE,))
         down = found.score.loss() - fit.score.loss()
         if down < -HIGHER:
             return tuple(way), found.place
-        fell = max(down, way[-1][1])
+        fell = max(down, 0.0)
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
             break
-        if fell - way[-1][1] > 0.5 * drop and step > STRIDE[0]:
-            step = max(step / SHORTER, STRIDE[0])
+        if fell - way[-1][1] > 0.5 * drop and step > least:
+            step = max(step / SHORTER, least)
             continue
         way.append((found.place, fell))
         if fell >= drop or not 0.0 < found.place[number] < 1.0:
             break
         slope = (found.place - last) / moved
-        if fell < 0.25 * drop:
+        if fell - way[-2][1] < 0.1 * drop:
             step = min(FASTER * step, STRIDE[1])
     return tuple(way), None
