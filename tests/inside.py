@@ -49,7 +49,7 @@ NAMES = {
     "KNOWN": ("sparing", "KNOWN"),
     "SPARED": ("sparing", "SPARED"),
     "implementations": ("sparing", "implementations"),
-    "waiting_briefly": ("threads", "waiting_briefly"),
+    "waiting_briefly": ("waiting", "waiting_briefly"),
     "Flown": ("cpu", "Flown"),
     "SCRIPT": ("aside", "SCRIPT"),
     "alone": ("locked", "alone"),

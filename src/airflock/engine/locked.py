@@ -15,7 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
 from airflock.engine.sparing import implementations, seldom_collected
-from airflock.engine.threads import waiting_briefly
+from airflock.engine.waiting import waiting_briefly
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next
