@@ -111,6 +111,7 @@ def full_disk(seed, number, folder, tell=False):
     limit = int(10 ** rng.uniform(0.0, WRITERS[what][1]))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     results()
+    writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python keeps a module's bytecode cut off here
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     fault = None
     try:
@@ -124,6 +125,7 @@ def full_disk(seed, number, folder, tell=False):
         fault = str(refused)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        sys.dont_write_bytecode = writes
     if tell:
         sys.stdout.write(f"{what} of {limit} bytes: {fault}\n")
     left = sorted(path.name for path in place.iterdir())
