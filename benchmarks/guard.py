@@ -70,7 +70,8 @@ class Version:
 
     def __init__(self, tree: Path):
         """Start the process."""
-        paths = os.environ | {"PYTHONPATH": str(tree / "src"), "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+        path = os.pathsep.join([str(tree / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+        paths = os.environ | {"PYTHONPATH": path, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         command = [sys.executable, str(Path(__file__).resolve()), "--child"]
         self.process = subprocess.Popen(
             command, env=paths, cwd=tree, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
