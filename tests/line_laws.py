@@ -25,7 +25,7 @@ class Line(Model):
         self.seen = law(self.input, *truth)
 
     def differences(self, u, spans=None):
-        u = [n.default if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
+        u = [n.place(n.default) if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
         e = self.noise.copy()
         e[:, 0] += self.seen - self.rule(self.input, *u)
         return e, np.zeros(STEPS, np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airflock.infer import noise as noises
-from airflock.infer import select
+from airflock.infer import select, told
 from airflock.infer.candidates import Number
 from airflock.infer.fit import (
     FINE,
@@ -25,9 +25,9 @@ from airflock.infer.fit import (
     spread,
 )
 from airflock.infer.flights import Noise
-from airflock.infer.ridges import ridges
+from airflock.infer.ridges import at_end, ridges
 from airflock.infer.search import drawn, profile, race, usual
-from airflock.infer.told import simplify, telling
+from airflock.infer.told import exchanged, simplify, telling
 from line_laws import STEPS, Line, quietly
 
 
@@ -76,29 +76,77 @@ class Several:
     scenario: Any
 
 
+def with_some_numbers(monkeypatch, where, law, truth, defaults, log=()):
+    """A maker of models of a law of one line, as the module `where` makes them, and its candidate with all numbers."""
+    names = list(truth)
+    ranges = {name: Number(f"model.{name}", -1, "1", 1.0, 10.0, True, 10.0 ** defaults[name]) for name in log}
+    numbers = [ranges.get(n.key[6:], n) for n in Line(law, names, tuple(truth.values()), defaults).numbers]
+
+    def lines(several, tracks=(), scale=None):
+        chosen = [number.key[6:] for number in several.numbers]
+        rule = lambda x, *u: law(x, **{**defaults, **dict(zip(chosen, u, strict=True))})  # noqa: E731
+        model = Line(rule, chosen, [truth[name] for name in chosen], defaults)
+        model.numbers, model.seen = list(several.numbers), law(model.input, **truth)
+        model.law, model.own_speed, model.tracks, model.scale = several, True, (), None
+        return model
+
+    monkeypatch.setattr(where, "Model", lines)
+    return lines, Several(tuple(numbers), None)
+
+
 def test_a_number_that_was_given_up_and_explains_something_at_the_fit_is_fitted_after_all(monkeypatch):
     truth = {"a": 0.7, "mass": 0.5, "dead": 0.5, "bend": 0.9}
 
     def law(x, a, mass, dead, bend):
         return x * (a - mass) + 0.0 * dead + bend * x**2
 
-    def lines(several, tracks=(), scale=None):
-        names = [number.key.partition(".")[2] for number in several.numbers]
-        rule = lambda x, *u: law(x, **{**dict.fromkeys(truth, 0.5), **dict(zip(names, u, strict=True))})  # noqa: E731
-        model = Line(rule, names, [truth[name] for name in names])
-        model.seen = law(model.input, **truth)
-        model.law, model.own_speed, model.tracks, model.scale = several, True, (), None
-        return model
-
-    monkeypatch.setattr(select, "Model", lines)
+    lines, whole = with_some_numbers(monkeypatch, select, law, truth, dict.fromkeys(truth, 0.5))
     monkeypatch.setattr(select, "sample", lambda model: [0])
-    numbers = Line(law, tuple(truth), tuple(truth.values())).numbers
-    whole = Several(tuple(numbers), None)
     model = lines(Several(whole.numbers[:1], None))
     found = climb(model, model.start(), [0])
     fuller, better = select.regained(whole, model, found, quietly)
     assert [number.key for number in fuller.law.numbers] == ["model.a", "model.bend"]
     assert better.place == pytest.approx([0.7, 0.9], abs=0.03) and better.loss < found.loss - 10.0
+
+
+def test_a_weight_that_was_given_up_does_not_come_back_as_the_unit_of_all_weights(monkeypatch):
+    truth = {"apart": 0.9, "together": 0.8, "unit": 0.3}
+    defaults = {"apart": 0.5, "together": 0.5, "unit": 0.3}
+
+    def law(x, apart, together, unit):  # powers of ten, as places of a logarithmic range are
+        return 10.0 ** (unit + together) * x - 10.0 ** (unit + apart) * x**3
+
+    lines, whole = with_some_numbers(monkeypatch, told, law, truth, defaults, log=tuple(truth))
+    model = lines(Several(whole.numbers[1:], None))  # without the weight of keeping apart
+    found = climb(model, np.array([0.5, 0.5]), [0, 1])
+    assert found.place == pytest.approx([0.4, 0.7], abs=0.02)  # the unit makes up for it
+    in_order, place = exchanged(whole, model, found, quietly)
+    assert [number.key for number in in_order.law.numbers] == ["model.apart", "model.together"]
+    assert place == pytest.approx([0.9, 0.8], abs=0.02)
+
+
+def test_a_radius_is_told_by_its_own_name_and_not_by_that_of_a_later_one_that_takes_its_part(monkeypatch):
+    truth, defaults = {"radius": 0.62, "weight": 0.7, "floor": 0.0}, {"radius": 0.1, "weight": 0.7, "floor": 0.0}
+
+    def law(x, radius, weight, floor):  # who is within either acts
+        return weight * (x < max(radius, floor))
+
+    lines, whole = with_some_numbers(monkeypatch, told, law, truth, defaults)
+    model = lines(Several(whole.numbers[1:], None))
+    found = climb(model, np.array([0.7, 0.62]), [0, 1])
+    in_order, place = exchanged(whole, model, found, quietly)
+    assert [number.key for number in in_order.law.numbers] == ["model.radius", "model.weight"]
+    assert place == pytest.approx([0.62, 0.7], abs=0.02)
+    again, same = exchanged(whole, in_order, climb(in_order, place, [0, 1]), quietly)
+    assert again is in_order and same == pytest.approx(place, abs=0.02)
+
+
+def test_a_later_number_stays_where_the_earlier_one_does_not_take_its_part(monkeypatch):
+    truth, defaults = {"slope": 0.2, "bend": 0.8}, {"slope": 0.2, "bend": 0.5}
+    lines, whole = with_some_numbers(monkeypatch, told, lambda x, slope, bend: slope * x + bend * x**2, truth, defaults)
+    model = lines(Several(whole.numbers[1:], None))
+    in_order, place = exchanged(whole, model, climb(model, np.array([0.5]), [0]), quietly)
+    assert in_order is model and place == pytest.approx([0.8], abs=0.02)
 
 
 def test_what_is_usual_stays_until_the_rest_is_found():
@@ -164,9 +212,11 @@ def test_a_force_over_a_mass_is_one_number_however_far_it_is_moved():
     model = Line(law, ("force", "mass", "length"), (0.8, 0.7, 0.4))
     model.numbers = [Number(f"model.{k}", -1, "1", 1.0, 10.0, k != "length", 1.0) for k in ("force", "mass", "length")]
     fit = climb(model, np.array([0.8, 0.7, 0.4]), [0, 1, 2])
-    moved = by_powers(model, fit, followed(fit, curvature(model, fit, None), 1, 0.1), 1)
+    moved = by_powers(model, fit, followed(fit, curvature(model, fit, None), 1, 0.1), 1, None)
     assert moved == pytest.approx([fit.place[0] - fit.place[1] + 0.1, 0.1, fit.place[2]], abs=1e-9)
     assert model.score(moved).loss() == pytest.approx(model.score(fit.place).loss(), abs=1e-6)
+    rough = np.array([fit.place[0] - 0.2, 0.1, fit.place[2]])  # a third of the way, as a rough curvature may say
+    assert by_powers(model, fit, rough, 1, None) == pytest.approx(moved, abs=1e-9)
 
 
 def test_a_bent_ridge_is_followed_by_fine_slopes():
@@ -191,6 +241,20 @@ def test_a_limit_that_nobody_reaches_has_no_upper_end():
     assert below.tolist() == [False, False] and above.tolist() == [True, False]
     edge = fit.place[0] - closed_end(model, fit, [0], 0, 0.0)
     assert 0.4 < edge < 0.5  # the largest that the tracks ask for is 0.5
+
+
+def test_a_plateau_is_reached_where_the_others_follow():
+    def law(x, most, weight, late):  # a limit that cuts, and a number that makes up for it
+        return np.minimum(weight * x, most) + (late - 0.5) * np.maximum(x - 0.7, 0.0)
+
+    model = Line(law, ("most", "weight", "late"), (0.9, 0.5, 0.5))
+    held = climb(model, np.array([0.42, 0.5, 0.5]), [1, 2])
+    fit = Fit(held.place, [0, 1, 2], held.score, held.loss)
+    alone = np.array([1.0, *fit.place[1:]])
+    assert model.score(alone).loss() > fit.score.loss() + 10.0
+    place, fell = at_end(model, fit, [0], 0, 1.0)
+    assert place[0] == 1.0 and fell < 0.0  # the truth, in which nobody reaches the limit
+    assert place[1:] == pytest.approx([0.5, 0.5], abs=0.05)
 
 
 def test_numbers_that_make_up_for_each_other_go_as_far_as_their_ridge_bends():

@@ -7,7 +7,7 @@ of half the range, on the scale that is sought) keeps flat directions in place.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -216,18 +216,36 @@ def followed(fit: Fit, curved: Array, number: int, place: float) -> Array:
     return np.clip(u, 0.0, 1.0)
 
 
-def by_powers(model: Model, fit: Fit, moved: Array, number: int) -> Array:
+def by_powers(model: Model, fit: Fit, moved: Array, number: int, spans: Sequence[int] | None) -> Array:
     """What `followed` says, with whole exponents: laws are products of whole powers, such as a force over a mass.
 
-    Of numbers that are sought by their logarithm; the others stay where they are.
+    Of numbers that are sought by their logarithm; the others stay where they are. Where thresholds make the curvature
+    rough, an exponent may be read off wrongly: each is raised and lowered by one while that explains more.
     """
     wide = [math.log(n.high / n.low) if n.log else 0.0 for n in model.numbers]
-    u = fit.place.copy()
-    u[number] = moved[number]
     step = (moved[number] - fit.place[number]) * wide[number]
-    for f in (f for f in fit.free if f < model.named and f != number and wide[f] and step):
-        u[f] += round((moved[f] - fit.place[f]) * wide[f] / step) * step / wide[f]
-    return np.clip(u, 0.0, 1.0)
+    powers = {
+        f: round((moved[f] - fit.place[f]) * wide[f] / step)
+        for f in fit.free
+        if f < model.named and f != number and wide[f] and step
+    }
+
+    def place(powers: Mapping[int, int]) -> Array:
+        u = fit.place.copy()
+        u[number] = moved[number]
+        for f, power in powers.items():
+            u[f] += power * step / wide[f]
+        return np.clip(u, 0.0, 1.0)
+
+    lowest, better = loss_at(model, place(powers), fit.free, spans), True
+    while better:
+        better = False
+        for f, more in ((f, more) for f in powers for more in (1, -1)):
+            changed = {**powers, f: powers[f] + more}
+            found = loss_at(model, place(changed), fit.free, spans)
+            if found < lowest - GAINED:
+                powers, lowest, better = changed, found, True
+    return place(powers)
 
 
 def _normal(

@@ -5,6 +5,9 @@ steps alone, and a fit that is repeated from beside its end does not walk it. So
 step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
 in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
 numbers that are told worst are walked each by itself, and so are those that act as the worst one does.
+
+A number such as a largest force acts nowhere beyond some value: a plateau, to which no walk leads on. So each end of
+each range is looked at by itself, with all others following there.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,6 +34,7 @@ FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
 HIGHER = 1.0  # log-likelihood by which a place on the way must be better than the fit, to begin again from there
 AGAIN = 2  # times
+UNLIKELY = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,12 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
     near = {k: [g for g in _alike(curved[1], k) if g in named] for k in named}
     worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:WORST]
     ways: list[Way] = []
+    for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
+        found, fell = at_end(model, fit, spans, k, end)
+        if leave and fell < -HIGHER:
+            return ways, found
+        if fell <= drop:
+            ways.append(((found, max(fell, 0.0)), (found, max(fell, 0.0))))
     for k in dict.fromkeys([*worst, *(near[worst[0]][:BESIDE] if worst else [])]):
         slope = np.zeros(len(fit.place))
         slope[fit.free] = covariances[1][k] / covariances[1][k, k]
@@ -95,6 +105,18 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
                 return ways, better
             ways.append(way)
     return ways, None
+
+
+def at_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float) -> tuple[Array, float]:
+    """The fit with one number at an end of its range, the others following; and the fall of the log-likelihood."""
+    u = fit.place.copy()
+    u[number] = end
+    fell = model.score(u, spans).loss() - fit.score.loss()
+    if fell > UNLIKELY:
+        return u, fell
+    rest = [f for f in fit.free if f != number]
+    followed = climb(model, u, rest, spans, FOLLOWS, slopes=(FINE, BOTH))
+    return followed.place, followed.score.loss() - fit.score.loss()
 
 
 def _alike(curved: Array, k: int) -> list[int]:

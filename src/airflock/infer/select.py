@@ -12,7 +12,7 @@ from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
 from airflock.infer.hills import hills
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, scan
-from airflock.infer.told import simplify, telling
+from airflock.infer.told import exchanged, simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]
@@ -99,6 +99,9 @@ def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -
     law : with all its numbers
     """
     model, found = regained(law, model, found, say)
+    in_order, place = exchanged(law, model, found, say)
+    if in_order is not model:
+        model, found = in_order, polish(in_order, place, LONG)
     other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
     found = hills(model, min(found, other, key=lambda each: each.loss), model.few(), sample(model), say)
