@@ -220,11 +220,12 @@ def by_powers(model: Model, fit: Fit, moved: Array, number: int, spans: Sequence
     """What `followed` says, with whole exponents: laws are products of whole powers, such as a force over a mass.
 
     Of numbers that are sought by their logarithm; the others stay where they are. Where thresholds make the curvature
-    rough, an exponent may be read off wrongly: each is raised and lowered by one while that explains more.
+    rough, exponents may be read off wrongly: from those that are read and from none, each is raised and lowered by one
+    while that explains more.
     """
     wide = [math.log(n.high / n.low) if n.log else 0.0 for n in model.numbers]
     step = (moved[number] - fit.place[number]) * wide[number]
-    powers = {
+    read = {
         f: round((moved[f] - fit.place[f]) * wide[f] / step)
         for f in fit.free
         if f < model.named and f != number and wide[f] and step
@@ -237,15 +238,18 @@ def by_powers(model: Model, fit: Fit, moved: Array, number: int, spans: Sequence
             u[f] += power * step / wide[f]
         return np.clip(u, 0.0, 1.0)
 
-    lowest, better = loss_at(model, place(powers), fit.free, spans), True
-    while better:
-        better = False
-        for f, more in ((f, more) for f in powers for more in (1, -1)):
-            changed = {**powers, f: powers[f] + more}
-            found = loss_at(model, place(changed), fit.free, spans)
-            if found < lowest - GAINED:
-                powers, lowest, better = changed, found, True
-    return place(powers)
+    def lower(powers: dict[int, int]) -> tuple[float, Array]:
+        lowest, better = loss_at(model, place(powers), fit.free, spans), True
+        while better:
+            better = False
+            for f, more in ((f, more) for f in powers for more in (1, -1)):
+                changed = {**powers, f: powers[f] + more}
+                found = loss_at(model, place(changed), fit.free, spans)
+                if found < lowest - GAINED:
+                    powers, lowest, better = changed, found, True
+        return lowest, place(powers)
+
+    return min(lower(read), lower(dict.fromkeys(read, 0)), key=lambda found: found[0])[1]
 
 
 def _normal(

@@ -4,7 +4,7 @@ The numbers of a braking curve lie on a ridge of the likelihood that bends. The 
 steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: a number is moved step by
 step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
 in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
-numbers that are told worst are walked each by itself, and so are those that act as the worst one does.
+numbers that are told worst are walked each by itself, and so are those that act alike.
 
 A number such as a largest force acts nowhere beyond some value: a plateau, to which no walk leads on. So each end of
 each range is looked at by itself, with all others following there.
@@ -21,18 +21,19 @@ from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-WORST = 4  # numbers that are walked, at most, and
-BESIDE = 3  # that act as the worst of them does
-NESTED = (1, 3)  # numbers that act most like the moved one, which follow first
+WORST, WALKED = 4, 8  # numbers that are told worst, and numbers that are walked, at most
+TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however well they seem to be told
+NESTED = 3  # numbers that act most like the moved one, which follow before all do
+WINDOW, LOOKS = 0.05, 14  # of a range: on which one of them looks for its place alone, at least; and how often it looks
 ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
 SHORTEST = 0.03  # of a range: ends nearer than this by the curvature are not looked for
 FIRST = 0.4  # of the way to the end that the curvature tells: first step
 STRIDE = (0.01, 0.15)  # of a range: least step, but for a first one that is shorter, and longest
 FASTER = 1.6  # each step is so much longer than the one before, while the likelihood hardly falls
-PLACES = 12  # that are looked at, on each side of a ridge
+PLACES = 16  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
-HIGHER = 1.0  # log-likelihood by which a place on the way must be better than the fit, to begin again from there
+HIGHER = 0.5  # of the drop: by how much a place on the way must be better than the fit, to begin again from there
 AGAIN = 2  # times
 UNLIKELY = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
 
@@ -86,22 +87,26 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
     covariances = [np.linalg.inv(each) for each in curved]
     named = [k for k, f in enumerate(fit.free) if f < model.named]
     reach = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
-    near = {k: [g for g in _alike(curved[1], k) if g in named] for k in named}
+    alike = _alike(curved[1])
+    near = {k: [g for g in np.argsort(-alike[k]).tolist() if g in named and alike[k, g] > ALIKE] for k in named}
     worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:WORST]
+    tied = [k for k in sorted(named, key=lambda k: -alike[k, named].max()) if alike[k, named].max() > TIED]
     ways: list[Way] = []
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
         found, fell = at_end(model, fit, spans, k, end)
-        if leave and fell < -HIGHER:
+        if leave and fell < -HIGHER * drop:
             return ways, found
         if fell <= drop:
             ways.append(((found, max(fell, 0.0)), (found, max(fell, 0.0))))
-    for k in dict.fromkeys([*worst, *(near[worst[0]][:BESIDE] if worst else [])]):
+    for k in list(dict.fromkeys([*worst, *tied]))[:WALKED]:
         slope = np.zeros(len(fit.place))
         slope[fit.free] = covariances[1][k] / covariances[1][k, k]
         follow = [fit.free[g] for g in near[k]]
         for side in (-1.0, 1.0):
-            way, better = _walk(model, fit, spans, fit.free[k], follow, side * slope, FIRST * float(reach[k]), drop)
-            if leave and better is not None:
+            way, better = _walk(
+                model, fit, spans, fit.free[k], follow, side * slope, FIRST * float(reach[k]), drop, leave
+            )
+            if better is not None:
                 return ways, better
             ways.append(way)
     return ways, None
@@ -109,8 +114,7 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
 
 def at_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float) -> tuple[Array, float]:
     """The fit with one number at an end of its range, the others following; and the fall of the log-likelihood."""
-    u = fit.place.copy()
-    u[number] = end
+    u = _moved(fit.place, number, end)
     fell = model.score(u, spans).loss() - fit.score.loss()
     if fell > UNLIKELY:
         return u, fell
@@ -119,11 +123,34 @@ def at_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float
     return followed.place, followed.score.loss() - fit.score.loss()
 
 
-def _alike(curved: Array, k: int) -> list[int]:
-    """Numbers that act as one of them does, by their curvature; the most alike first."""
+def _slid(model: Model, u: Array, number: int, spans: Sequence[int], far: float) -> tuple[Array, float]:
+    """A place with one number where the tracks are explained best, as far again as it has come; and the loss.
+
+    Where single individuals are lost, the likelihood has edges, at which slopes lead nowhere.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def loss(x: float) -> float:
+        return model.score(_moved(u, number, x), spans).loss()
+
+    ends = np.clip([u[number] - far - WINDOW, u[number] + far + WINDOW], 0.0, 1.0)
+    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"maxiter": LOOKS, "xatol": FINEST})
+    here = loss(float(u[number]))
+    return (_moved(u, number, float(found.x)), float(found.fun)) if found.fun < here else (u, here)
+
+
+def _moved(place: Array, number: int, x: float) -> Array:
+    u = place.copy()
+    u[number] = x
+    return u
+
+
+def _alike(curved: Array) -> Array:
+    """How much any two numbers act alike: correlations of their slopes, 0 of each with itself."""
     sizes = np.sqrt(np.diag(curved))
-    overlap = np.abs(curved[k]) / (sizes[k] * sizes)
-    return [g for g in np.argsort(-overlap).tolist() if g != k and overlap[g] > ALIKE]
+    found: Array = np.abs(curved) / np.outer(sizes, sizes)
+    np.fill_diagonal(found, 0.0)
+    return found
 
 
 def _walk(
@@ -135,26 +162,34 @@ def _walk(
     slope: Array,
     step: float,
     drop: float,
+    leave: bool,
 ) -> tuple[Way, Array | None]:
-    """One way along a ridge; a better place than the fit, if one was met.
+    """One way along a ridge; and, where it may be left for it, the best place that was met, if it is a better one.
+
+    Where the way leads higher it is gone on: what leads along a ridge is a walk, not a climb.
 
     near  : numbers that act as the moved one does, which follow first
     slope : moves of all numbers at first, that of the moved one is 1 or -1; step : first move
     """
     rest = [f for f in fit.free if f != number]
     way = [(fit.place, 0.0)]
+    best: tuple[Array | None, float] = (None, -HIGHER * drop)
     step = float(np.clip(step, FINEST, STRIDE[1]))
     least = min(step, STRIDE[0])
     for _ in range(PLACES):
         last = way[-1][0]
         start = np.clip(last + step * slope, 0.0, 1.0)
-        for count in NESTED:
-            if near[:count]:
-                start = climb(model, start, near[:count], spans, FOLLOWS, slopes=(FINE, BOTH)).place
+        if near:
+            # all along the way so far, or none but the moved one and one that makes up for it
+            beside = _moved(last, number, float(start[number]))
+            asked = [(start, near[0]), *((beside, f) for f in near[:NESTED])]
+            alone = [_slid(model, u, f, spans, abs(float(start[f] - last[f]))) for u, f in asked]
+            start = min(alone, key=lambda each: each[1])[0]
+            start = climb(model, start, near[:NESTED], spans, FOLLOWS, slopes=(FINE, BOTH)).place
         found = climb(model, start, rest, spans, FOLLOWS, slopes=(FINE,))
         down = found.score.loss() - fit.score.loss()
-        if down < -HIGHER:
-            return tuple(way), found.place
+        if leave and down < best[1]:
+            best = found.place, down
         fell = max(down, 0.0)
         moved = abs(found.place[number] - last[number])
         if moved == 0.0:
@@ -168,4 +203,4 @@ def _walk(
         slope = (found.place - last) / moved
         if fell - way[-2][1] < 0.1 * drop:
             step = min(FASTER * step, STRIDE[1])
-    return tuple(way), None
+    return tuple(way), best[0]

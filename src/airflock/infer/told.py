@@ -17,6 +17,7 @@ LOOKS = 6  # best places at which is asked what a number does
 ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where is asked whether a number does anything
 FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
 APART = 0.1  # of a range, from the default
+ELSEWHERE = 0.2  # of a range: move of a number of which is asked whether the others make up for it wholly
 UNLIKELY = 20.0  # loss above the fit, beyond which no climb begins where another number has taken a part
 
 
@@ -74,10 +75,10 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
     the unit of all forces, a radius as another within which its neighbours act, too. Of two numbers of which either
     explains the tracks beside the others, the one that is declared first is told; the later one takes its default.
 
-    law : with all its numbers
+    law : with all its numbers; the fit is on all spans, and its place is carried over as it is
     """
     few = model.few()
-    best = climb(model, fit.place, fit.free, few, slopes=(WIDE,))
+    place, lowest = fit.place, climb(model, fit.place, fit.free, few, slopes=(WIDE,)).loss
     for earlier in law.numbers:
         assert model.law is not None
         kept = model.law.numbers
@@ -85,24 +86,25 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
             continue
         several = tuple(number for number in law.numbers if number in kept or number == earlier)
         fuller, i = Model(replace(law, numbers=several), model.tracks, model.scale), several.index(earlier)
-        u = np.insert(best.place, i, earlier.place(earlier.default))
-        beside = Fit(u, sorted([i, *(f + (f >= i) for f in best.free)]), best.score, best.loss)
+        u = np.insert(place, i, earlier.place(earlier.default))
+        free = sorted([i, *(f + (f >= i) for f in fit.free)])
+        beside = Fit(u, free, fuller.score(u, few), loss_at(fuller, u, free, few))
         curved = curvature(fuller, beside, few, EVEN)
         for k in reversed(range(i + 1, fuller.named)):
-            if not _spare(fuller, beside, k):
+            if not (_may_go(fuller, k) and _away(fuller, beside, k)):
                 continue
-            without, rest = fuller.fixed([k]), [f for f in beside.free if f != k]
+            without, rest = fuller.fixed([k]), [f for f in free if f != k]
             start = min(_taken_over(without, beside, curved, i, k, few), key=lambda u: loss_at(without, u, rest, few))
-            if loss_at(without, start, rest, few) > best.loss + UNLIKELY:
+            if loss_at(without, start, rest, few) > beside.loss + UNLIKELY or abs(start[i] - u[i]) < APART:
                 continue
             found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
-            if found.loss < best.loss + WORSE:
+            if found.loss < lowest + WORSE:
                 numbers = tuple(number for f, number in enumerate(several) if f != k)
-                model = Model(replace(law, numbers=numbers), model.tracks, model.scale)
-                best = Fit(np.delete(found.place, k), [f - (f > k) for f in rest], found.score, found.loss)
+                model, place = Model(replace(law, numbers=numbers), model.tracks, model.scale), np.delete(start, k)
+                fit = replace(fit, free=[f - (f > k) for f in rest])
                 break
         say()
-    return model, best.place
+    return model, place
 
 
 def _taken_over(
@@ -119,15 +121,23 @@ def _taken_over(
         yield u
 
 
-def _spare(model: Model, fit: Fit, number: int) -> bool:
-    """Whether a number may be given up: one away from its default, or whose default lies beyond what is sought.
-
-    Numbers of the body are where their default is none at all.
-    """
+def _may_go(model: Model, number: int) -> bool:
+    """Whether a number may be given up: those of the law; of the body, where the default is none at all."""
     one = model.numbers[number]
-    if number == model.usual or not (one.key.startswith("model.") or one.default == 0.0):
-        return False
+    return number != model.usual and (one.key.startswith("model.") or one.default == 0.0)
+
+
+def _away(model: Model, fit: Fit, number: int) -> bool:
+    """Whether a number stands away from its default, or its default lies beyond what is sought."""
+    one = model.numbers[number]
     return not one.low <= one.default <= one.high or abs(one.place(one.default) - fit.place[number]) >= APART
+
+
+def _anywhere(model: Model, fit: Fit, curved: Array, number: int, spans: Sequence[int]) -> bool:
+    """Whether the tracks are explained as well with a number elsewhere, the others moved by whole powers of it."""
+    x = float(fit.place[number])
+    moved = followed(fit, curved, number, x + (ELSEWHERE if x < 0.5 else -ELSEWHERE))
+    return loss_at(model, by_powers(model, fit, moved, number, spans), fit.free, spans) < fit.loss + WORSE
 
 
 def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int], Array]:
@@ -135,18 +145,22 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
 
     Each that stands away from its default, or whose default lies beyond what was sought, is put there in turn, the last
     declared first, and the rest is fitted anew: from where the others make up for it, and from where another number of
-    its unit takes its part.
+    its unit takes its part. So is one near its default that may as well stand elsewhere, such as a mass beside forces.
     """
     few = model.few()
     best = climb(model, fit.place, fit.free, few, slopes=(WIDE,))
     lowest, gone = best.loss, list[int]()
     for k in reversed(range(model.named)):
-        if not _spare(model, best, k):
-            continue
         number = model.numbers[k]
         default = number.place(number.default)
+        if not _may_go(model, k):
+            continue
+        present = model.fixed(gone)
+        curved = curvature(present, best, few, EVEN)
+        if not _away(model, best, k) and not _anywhere(present, best, curved, k, few):
+            continue
         without, rest = model.fixed([*gone, k]), [f for f in best.free if f != k]
-        moved = followed(best, curvature(model.fixed(gone), best, few, EVEN), k, default)
+        moved = followed(best, curved, k, default)
         starts = [moved, by_powers(without, best, moved, k, few)]
         for other in (f for f in rest if f < model.named and model.numbers[f].unit == number.unit):
             starts.append(best.place.copy())
@@ -157,3 +171,13 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
         if found.loss < lowest + WORSE:
             gone, best, lowest = [*gone, k], found, min(lowest, found.loss)
     return gone, best.place
+
+
+def carried(model: Model, fit: Fit, gone: Sequence[int], spans: Sequence[int]) -> Array:
+    """A fit's place with some numbers at their defaults, and the others moved by whole powers of them."""
+    for held, k in enumerate(gone):
+        without, number = model.fixed(gone[: held + 1]), model.numbers[k]
+        moved = fit.place.copy()
+        moved[k] = number.place(number.default)
+        fit = replace(fit, place=by_powers(without, fit, moved, k, spans))
+    return fit.place
