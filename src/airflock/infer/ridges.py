@@ -33,7 +33,10 @@ FASTER = 1.6  # each step is so much longer than the one before, while the likel
 PLACES = 16  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
-HIGHER = 0.5  # of the drop: by how much a place on the way must be better than the fit, to begin again from there
+HIGHER = (
+    6.0  # log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin
+)
+# beside each other end several units apart, and from the top of a spike every way falls
 AGAIN = 2  # times
 UNLIKELY = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
 
@@ -94,7 +97,7 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
     ways: list[Way] = []
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
         found, fell = at_end(model, fit, spans, k, end)
-        if leave and fell < -HIGHER * drop:
+        if leave and fell < -HIGHER:
             return ways, found
         if fell <= drop:
             ways.append(((found, max(fell, 0.0)), (found, max(fell, 0.0))))
@@ -173,7 +176,7 @@ def _walk(
     """
     rest = [f for f in fit.free if f != number]
     way = [(fit.place, 0.0)]
-    best: tuple[Array | None, float] = (None, -HIGHER * drop)
+    best: tuple[Array | None, float] = (None, -HIGHER)
     step = float(np.clip(step, FINEST, STRIDE[1]))
     least = min(step, STRIDE[0])
     for _ in range(PLACES):
