@@ -75,19 +75,19 @@ def tune(
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
         how |= {"like": found, "heard": heard}
-    said: list[str] = []
+    told_already: list[str] = []
     with _stages(as_json) as (watch, note):
 
-        def heard_once(text: str) -> None:
-            said.append(text)
+        def tell(text: str) -> None:
+            told_already.append(text)
             if note is not None:
                 note(text)
 
-        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=heard_once, **how)
+        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=tell, **how)
     if as_json:
         tables.emit_json(made.document())
     else:
-        _print(made, said)
+        _print(made, told_already)
     if not made.shown:
         raise typer.Exit(1)
 
@@ -127,7 +127,8 @@ def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
         yield watch, note
 
 
-def _print(made: Any, said: list[str]) -> None:
+def _print(made: Any, told_already: list[str]) -> None:
+    """What was found, and those notes that were not told while it was sought."""
     from rich.console import Console
 
     from airflock.evolve.safe import told
@@ -138,7 +139,7 @@ def _print(made: Any, said: list[str]) -> None:
         console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     for note in made.notes:
-        if note not in said:  # before the search began
+        if note not in told_already:
             line(f"start: {note}")
     r = made.result
     line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")

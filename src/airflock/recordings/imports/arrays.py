@@ -29,11 +29,7 @@ def read_array(
     rate, scale = options.fps or fps, math.nan
     faults = [] if rate else [f"{where}: counts frames; say how many a second: --fps 25"]
     with gathering(faults):
-        if not options.unit:
-            raise RecordingError(
-                f"{where}: has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
-            )
-        scale = headers.factor("x", "", where, options)
+        scale = headers.length("", where, "array", options)
     if faults or rate is None:
         raise RecordingError("\n".join(faults))
     frames = np.arange(len(values))

@@ -126,8 +126,7 @@ def _recognised(found: Layout, columns: Sequence[str], options: Options) -> None
         tracker = [c for c in columns if headers.split(c)[0] in OF_A_TRACKER]
         if tracker:
             raise RecordingError(
-                f"{found.where}: column {unsaid[0]} has no unit, and {tracker[0]} tells of a tracker; "
-                "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
+                f"{found.where}: column {unsaid[0]} has no unit, and {tracker[0]} tells of a tracker; {headers.GIVE}"
             )
         found.notes.append(f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; otherwise --unit mm")
 

@@ -12,6 +12,7 @@ SPEEDS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/
           "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048}  # fmt: skip
 ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
 PIXELS = ("px", "pixel", "pixels")
+GIVE = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # where nothing tells the unit of a length
 
 _EAST, _NORTH, _UP = ("x", "e", "east"), ("y", "n", "north"), ("z", "u", "up")
 ALIASES: dict[str, tuple[str, ...]] = {
@@ -100,3 +101,13 @@ def factor(target: str, unit: str, where: str, options: Options) -> float:
     if unit and unit not in kind:
         raise RecordingError(f"{where}: {unit}: unknown unit of {target}; known: {', '.join(kind)}")
     return kind[unit] if unit else 1.0
+
+
+def length(unit: str, where: str, what: str, options: Options) -> float:
+    """Metres in one unit of what has no header; raises RecordingError where neither it nor the options tell the unit.
+
+    unit : that the file tells, if any; where, what : file and variable, for the message
+    """
+    if options.unit or unit in LENGTHS or unit in PIXELS:
+        return factor("x", options.unit or unit, where, options)
+    raise RecordingError(f"{where}: {what} has no unit; {GIVE}")

@@ -42,7 +42,7 @@ def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") 
     with gathering(faults):
         seconds = _seconds(found, options, where)
     with gathering(faults):
-        scale = _scale(found, options, where)
+        scale = headers.length(str(found["position"].attrs.get("units", "")), where, "position", options)
     if faults:
         raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
@@ -89,12 +89,3 @@ def _seconds(found: xr.Dataset, options: Options, where: str) -> Any:
     if unit not in factors:
         raise RecordingError(f"{where}: {unit}: unknown unit of time; known: {', '.join(headers.TIMES)}, frames")
     return times * factors[unit]
-
-
-def _scale(found: xr.Dataset, options: Options, where: str) -> float:
-    told = str(found["position"].attrs.get("units", ""))
-    if options.unit or told in headers.LENGTHS or told in headers.PIXELS:
-        return headers.factor("x", options.unit or told, where, options)
-    raise RecordingError(
-        f"{where}: position has no unit; write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"
-    )
