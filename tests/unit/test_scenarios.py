@@ -120,6 +120,20 @@ def test_a_fault_names_key_value_unit_and_range(key, value, said):
     assert line.startswith("vasarhelyi_2018/4ms: ") and said in line
 
 
+@pytest.mark.parametrize(
+    ("keys", "size"),
+    [
+        ({"agents": 100000}, "world.side"),
+        ({"start.kind": "ball", "start.separation": 8.0}, "start.radius"),
+        ({"start.kind": "box", "start.separation": 8.0}, "start.side"),
+        ({"agents": 100000, "world.arena": "circle", "world.walls": "every_edge"}, "world.radius"),
+    ],
+)
+def test_a_crowd_without_room_is_told_what_to_enlarge(keys, size):
+    (line,) = faults_of(keys)
+    assert f"enlarge {size}, or lower agents" in line
+
+
 def test_all_faults_are_reported_together():
     lines = faults_of({"model.p_rep": -1.0, "radio.range": "far", "world.sid": 3.0, "body.tau": -2.0, "dt": 0.0})
     assert len(lines) == 5

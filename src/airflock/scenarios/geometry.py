@@ -132,6 +132,12 @@ def _region(world: arena.Parameters, begin: start.Parameters) -> tuple[Any, floa
     return None if plan is None else plan.buffer(-room), max(high - low - 2.0 * room, 0.0)
 
 
+def _size(world: arena.Parameters, begin: start.Parameters) -> str:
+    """Key that says how large the region is in which agents start."""
+    of_arena = {"circle": "world.radius", "polygon": "world.corners"}.get(world.arena, "world.side")
+    return {"ball": "start.radius", "box": "start.side"}.get(begin.kind, of_arena)
+
+
 def height_faults(world: arena.Parameters) -> list[str]:
     """What is wrong with floor, ceiling and the heights of obstacles."""
     found = []
@@ -186,7 +192,7 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
             f"agents = {agents} do not fit at start.separation = {separation:g} m"
             + (f" and start.wall_clearance = {begin.wall_clearance:g} m" if begin.wall_clearance else "")
             + (f": they would cover {need:.0%} of" if free * height > 0.0 else ": no place is left in")
-            + " the region they start in; enlarge world.side, or lower agents or "
+            + f" the region they start in; enlarge {_size(world, begin)}, or lower agents or "
             + ("start.separation or start.wall_clearance" if begin.wall_clearance else "start.separation")
         )
     if not found and world.arena == "none" and agents > 1 and begin.kind == "arena":
