@@ -15,7 +15,7 @@ from airflock.evolve.search import search
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import load_study
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 NAME = "vasarhelyi_2018/6ms"
 
@@ -27,7 +27,7 @@ def overhead(generations, rounds):
     best = float("inf")
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as folder, Store(Path(folder)) as store:
-            executor = Here(lambda p, s: values, 1)
+            executor = InProcess(lambda p, s: values, 1)
             begin = time.process_time()
             search(study, store, executor)
             best = min(best, (time.process_time() - begin) / generations)

@@ -23,8 +23,8 @@ import numpy as np
 
 from airflock import __version__, atomic
 from airflock.engine import score_flight, score_flights
-from airflock.evolve.after import interval
 from airflock.evolve.folder import open_folder
+from airflock.evolve.intervals import interval
 from airflock.evolve.optimisers import optimiser
 from airflock.evolve.run import executor_for, run
 from airflock.evolve.search import averaged

@@ -17,8 +17,8 @@ import numpy as np
 
 from airflock import atomic
 from airflock.engine import score_flights
-from airflock.evolve.after import interval
 from airflock.evolve.folder import open_folder
+from airflock.evolve.intervals import interval
 from airflock.evolve.run import executor_for, run
 from airflock.evolve.space import with_parameters
 from airflock.evolve.study import load_study

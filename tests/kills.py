@@ -22,11 +22,11 @@ from pathlib import Path
 
 import toys
 from airflock import atomic
-from airflock.evolve.after import conclude
 from airflock.evolve.folder import STUDY, open_folder, sweep, versions
 from airflock.evolve.search import search
 from airflock.evolve.store import FILE, Store
-from airflock.executors.here import Here
+from airflock.evolve.winner import conclude
+from airflock.executors.in_process import InProcess
 
 RUN, NAMED = versions(), ("result.toml", "best.toml", "study.toml")
 CANDIDATES = "SELECT * FROM candidate"
@@ -41,7 +41,7 @@ def evolve(folder):
     """A study of toy flights."""
     study = toys.study(generations=12, seeds=2, restarts=1)
     open_folder(folder, study, resume=(folder / STUDY).exists())
-    executor = Here(toys.slow_bowl, 2)
+    executor = InProcess(toys.slow_bowl, 2)
     with Store(folder) as store:
         store.begin(RUN)
         sweep(folder)
@@ -75,7 +75,7 @@ def certify(folder):
         return {"r_min": 0.5 if chance.random() < 0.005 else 5.0, "phi_vel": 6.0 + chance.gauss(0.0, 0.4)}
 
     open_folder(folder, campaign, resume=(folder / f"{FOLDER}.toml").is_file(), kind=FOLDER)
-    executor = Here(dice, 2)
+    executor = InProcess(dice, 2)
     try:
         run(campaign, folder, executor, 60.0).save(folder / "certificate.toml")
     finally:
@@ -287,7 +287,7 @@ def workers(folder, kills, seed):
         run(study, folder / name, executor)
         return rows(folder / name)
 
-    wanted = ended("here", Here(lambda p, s: task(p, s)[0], 2))
+    wanted = ended("here", InProcess(lambda p, s: task(p, s)[0], 2))
 
     def life(number, address):
         assert ended(f"there{number}", Cluster([task], address)) == wanted, f"study {number} ended differently"
@@ -334,7 +334,7 @@ def certificates(folder, kills, seed):
             executor.close()
         return of_certificate(place)
 
-    wanted = ended("here", Here(lambda p, s: task(p, s)[0], 1))
+    wanted = ended("here", InProcess(lambda p, s: task(p, s)[0], 1))
 
     def life(number, address):
         assert ended(f"there{number}", Cluster([task], address)) == wanted, f"campaign {number} ended differently"

@@ -21,7 +21,7 @@ from airflock.evolve.task import tasks_of
 from airflock.executors import Flight
 from airflock.executors import cluster as executors_cluster
 from airflock.executors.cluster import Cluster
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.executors.scores import scores
 from airflock.limits.limit import read_all
 from airflock.scenarios.files import load
@@ -80,7 +80,7 @@ def here(parameters, seed):
 def test_workers_killed_at_random_change_nothing(tmp_path, doomed, seed):
     study = toys.study(population=10, generations=10, seeds=2)
     open_folder(tmp_path / "here", study, resume=False)
-    wanted = run(study, tmp_path / "here", Here(here, 2))
+    wanted = run(study, tmp_path / "here", InProcess(here, 2))
     over, kills = threading.Event(), []
 
     def killer():
@@ -178,7 +178,7 @@ def test_a_certificate_over_workers_that_are_killed_is_that_of_one_process(tmp_p
         return {"r_min": 0.5, "closest": 0.4, "first": [3.0]} if near else {"r_min": 5.0}, "", 0.0, "worker"
 
     open_folder(tmp_path / "here", campaign, resume=False, kind=FOLDER)
-    wanted = certified(campaign, tmp_path / "here", Here(lambda p, own: task(p, own)[0], 4), 600.0, kept=False)
+    wanted = certified(campaign, tmp_path / "here", InProcess(lambda p, own: task(p, own)[0], 4), 600.0, kept=False)
     open_folder(tmp_path / "there", campaign, resume=False, kind=FOLDER)
     executor = Cluster([task], doomed.scheduler_address)
     worker = random.Random(seed).choice(list(doomed.workers.values()))

@@ -24,9 +24,9 @@ import numpy as np
 import airflock
 from airflock import __version__, atomic
 from airflock.errors import ScenarioError, StudyError
-from airflock.evolve.after import interval
 from airflock.evolve.folder import STUDY
 from airflock.evolve.harden import COST, SAFETY, SLACK, harden
+from airflock.evolve.intervals import interval
 from airflock.evolve.steps import Table, flown
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario

@@ -19,7 +19,7 @@ from airflock.cli.main import app
 from airflock.errors import AirflockError, ScenarioError, StudyError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.limits.bounds import per_hour
 from airflock.limits.limit import read, read_all
 from airflock.scenarios.files import load
@@ -47,7 +47,7 @@ def dice(p):
 
 def flown(asked, folder, p, *, budget=60.0, resume=False, score=None, **how):
     open_folder(folder, asked, resume=resume, kind=FOLDER)
-    executor = Here(score or dice(p), 2)
+    executor = InProcess(score or dice(p), 2)
     try:
         return run(asked, folder, executor, budget, **how)
     finally:

@@ -14,14 +14,14 @@ from airflock.evolve.run import Interrupted, run
 from airflock.evolve.search import averaged
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 WHOLE = 600.0
 
 
 def finished(folder, study, score=toys.bowl, **options):
     open_folder(folder, study, resume=False)
-    return run(study, folder, Here(score, 2), **options)
+    return run(study, folder, InProcess(score, 2), **options)
 
 
 def hasty(parameters, seed):
@@ -78,8 +78,8 @@ def test_a_search_that_is_cut_off_among_short_flights_ends_the_same(tmp_path):
     open_folder(tmp_path / "cut", toys.study(**keys), resume=False)
     for _ in range(2):
         with pytest.raises(Interrupted):
-            run(toys.study(**keys), tmp_path / "cut", Here(hasty, 2), stop)
-    assert run(toys.study(**keys), tmp_path / "cut", Here(hasty, 2)).document() == whole.document()
+            run(toys.study(**keys), tmp_path / "cut", InProcess(hasty, 2), stop)
+    assert run(toys.study(**keys), tmp_path / "cut", InProcess(hasty, 2)).document() == whole.document()
 
 
 def test_a_warm_start_flies_near_the_scenario_s_own_numbers_and_a_cold_one_in_the_middle(tmp_path):

@@ -11,7 +11,7 @@ from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from inside import simulate
@@ -193,7 +193,7 @@ def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):
 
     for method in ("sobol", "morris"):
         with Store(tmp_path) as store:
-            executor = Here(plane, 2)
+            executor = InProcess(plane, 2)
             table = sensitivity(study, store, executor, method=method, samples=64)
             executor.close()
         if method == "sobol":

@@ -11,7 +11,7 @@ from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, run, study_of
 from airflock.evolve.search import search, total_flights, windowed
 from airflock.evolve.store import Batch, Store
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 SAFE = 0.288  # where expected() is largest
 
@@ -44,7 +44,7 @@ def ends(tmp_path, name, **keys):
     open_folder(tmp_path / name, study, resume=False)
     with Store(tmp_path / name) as store:
         store.begin({})
-        (mean,) = search(study, store, Here(gamble, 1))
+        (mean,) = search(study, store, InProcess(gamble, 1))
         assert store.count() == total_flights(study)
     return courage(study.space.parameters(mean))
 
@@ -80,7 +80,7 @@ def test_windows_are_means_of_equal_parts_of_the_last_half():
 def test_the_best_finalists_fly_again_and_the_winner_is_the_best_of_all_their_flights(tmp_path):
     study = toys.study(windows=2, averages=1, again=2, final_seeds=5)
     open_folder(tmp_path / "a", study, resume=False)
-    result = run(study, tmp_path / "a", Here(lambda p, seed: toys.bowl(p, seed, noise=0.3), 1))
+    result = run(study, tmp_path / "a", InProcess(lambda p, seed: toys.bowl(p, seed, noise=0.3), 1))
     with Store(tmp_path / "a", write=False) as store:
         first, again = (store.flown(Batch(stage, 0, 0)) for stage in ("final", "again"))
         seeds = {seed for (seed,) in store.rows("SELECT seed FROM flight WHERE stage IN ('final', 'again', 'score')")}
@@ -98,7 +98,7 @@ def test_the_best_finalists_fly_again_and_the_winner_is_the_best_of_all_their_fl
 def test_a_search_that_is_cut_off_among_its_late_flights_ends_the_same(tmp_path):
     keys = {"generations": 10, "late_seeds": 3, "windows": 2, "again": 1, "restarts": 1}
     open_folder(tmp_path / "whole", toys.study(**keys), resume=False)
-    whole = run(toys.study(**keys), tmp_path / "whole", Here(toys.bowl, 2))
+    whole = run(toys.study(**keys), tmp_path / "whole", InProcess(toys.bowl, 2))
 
     def stop(progress):
         if progress.fresh in (70, 120):
@@ -107,8 +107,8 @@ def test_a_search_that_is_cut_off_among_its_late_flights_ends_the_same(tmp_path)
     open_folder(tmp_path / "cut", toys.study(**keys), resume=False)
     for _ in range(2):
         with pytest.raises(Interrupted):
-            run(toys.study(**keys), tmp_path / "cut", Here(toys.bowl, 2), stop)
-    assert run(toys.study(**keys), tmp_path / "cut", Here(toys.bowl, 2)).document() == whole.document()
+            run(toys.study(**keys), tmp_path / "cut", InProcess(toys.bowl, 2), stop)
+    assert run(toys.study(**keys), tmp_path / "cut", InProcess(toys.bowl, 2)).document() == whole.document()
     with Store(tmp_path / "whole", write=False) as store:
         seeds = [seed for (seed,) in store.rows("SELECT seed FROM flight WHERE stage = 'search'")]
     flown = 2 * 8 * sum(toys.study(**keys).seeds(generation) for generation in range(10))

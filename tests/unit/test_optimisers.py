@@ -11,7 +11,7 @@ from airflock.evolve.nondominated import front
 from airflock.evolve.optimisers import optimiser
 from airflock.evolve.race import race
 from airflock.evolve.store import Store
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 
 def run(algorithm, f, dimension, objectives, population, generations, seed):
@@ -134,7 +134,7 @@ def test_race_finds_the_best_where_one_flight_says_little(tmp_path, seed):
     study = toys.study(pool=200, top=5)
     rng = np.random.default_rng(seed)
     points = rng.random((2000, 3))
-    noisy = Here(lambda p, s: {"fitness": toys.bowl(p | {"model.p_rep": 0.2}, s, noise=0.1)["fitness"]}, 2)
+    noisy = InProcess(lambda p, s: {"fitness": toys.bowl(p | {"model.p_rep": 0.2}, s, noise=0.1)["fitness"]}, 2)
     given = [study.space.parameters(point) | {"model.p_rep": 0.2} for point in points]
     true = np.array([toys.bowl(parameters, 0, noise=0.0)["fitness"] for parameters in given])
     with Store(tmp_path) as store:

@@ -21,7 +21,8 @@ from airflock.cli.main import app
 from airflock.core.maths import bell, braking_curve, excess, peak, rising
 from airflock.errors import AirflockError, RecordingError
 from airflock.models import vasarhelyi_2018
-from airflock.plots import scene, style
+from airflock.plots import flight as flight_view
+from airflock.plots import style
 from airflock.plots.exposure import develop, exposure, light
 from airflock.plots.film_stage import Stage
 from airflock.plots.heatmap import heatmap
@@ -143,13 +144,13 @@ def test_missing_positions_leave_gaps_and_nothing_else():
 def test_missing_positions_shed_no_light_and_take_none_away_elsewhere():
     films = []
     for recording in (flight(document=SQUARE), with_a_gap()):
-        shown = scene.paths_of(recording)
+        shown = flight_view.paths_of(recording)
         films.append(light(shown, shown.position[:, 0], shown.position[:, 1], (-60.0, 60.0, -60.0, 60.0), 20.0))
     lost = films[0] - films[1]
     assert np.isfinite(films[1]).all()
     assert lost.min() > -1e-9
     expected = 20.0 * (math.exp(-(100.0 - 80.0) / 20.0) - math.exp(-(100.0 - 74.5) / 20.0))
-    assert lost.sum(axis=(0, 1)) == pytest.approx(expected * exposure_colour(scene.paths_of(flight())), rel=1e-4)
+    assert lost.sum(axis=(0, 1)) == pytest.approx(expected * exposure_colour(flight_view.paths_of(flight())), rel=1e-4)
     rows, columns = np.nonzero(lost.sum(axis=2) > 1e-9)
     angle = np.arctan2(rows + 0.5 - lost.shape[0] / 2, columns + 0.5 - lost.shape[1] / 2)
     begin, end = ((t * PACE / RADIUS + 2.0 * math.pi / 3.0) % (2.0 * math.pi) for t in (74.5, 80.0))
@@ -162,7 +163,7 @@ def save_to_nowhere(figure):
 
 
 def test_light_adds_up_to_one_unit_per_agent_and_second_faded():
-    shown = scene.paths_of(flight())
+    shown = flight_view.paths_of(flight())
     x, y = shown.position[:, 0], shown.position[:, 1]
     film = light(shown, x, y, (-60.0, 60.0, -60.0, 60.0), 20.0)
     one_colour = exposure_colour(shown)
@@ -176,7 +177,7 @@ def test_light_adds_up_to_one_unit_per_agent_and_second_faded():
 def exposure_colour(shown):
     from airflock.plots.exposure import LAMP
 
-    low, high = scene.speed_range(shown)
+    low, high = flight_view.speed_range(shown)
     return np.array(LAMP((PACE - low) / max(high - low, 1e-9))[:3])
 
 
@@ -347,7 +348,7 @@ def test_darts_are_where_the_agents_are_and_point_where_they_fly():
 
 
 def test_pictures_in_space_project_parallel():
-    view = scene.view_of(3)
+    view = flight_view.view_of(3)
     assert np.allclose([view.right @ view.up, view.right @ view.right, view.up @ view.up], [0.0, 1.0, 1.0])
     stage = Stage(flight(axes=3, document=BOX), None, None, tail=0.0, height=120, speed=1.0)
     assert stage.picture(1.0).shape == (stage.size[1], stage.size[0], 4)
@@ -475,7 +476,7 @@ def test_nothing_is_drawn_through_a_periodic_face():
         centre = corners[:, 0, 0] + (corners[:, 2, 0] - corners[:, 0, 0]) * (0.6 / 0.82)
         away = np.abs(centre - expected)
         assert np.minimum(away, 40.0 - away).max() <= 0.5 * 0.5 * PACE + 0.02  # half a frame's way, at a face
-    shown = scene.paths_of(recording)
+    shown = flight_view.paths_of(recording)
     leaps = np.abs(np.diff(shown.position[:, 0], axis=0)) > 20.0
     film = light(shown, shown.position[:, 0], shown.position[:, 1], (-20.0, 20.0, -20.0, 20.0), 1e9, leaps)
     rows = film.sum(axis=2)[[350, 700, 1049]]  # where the three fly

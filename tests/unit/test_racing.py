@@ -11,14 +11,14 @@ from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder
 from airflock.evolve.racing import still_needed
 from airflock.evolve.run import Interrupted, run
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 RACE = {"racing": "optimistic", "random_numbers": "generation", "seeds": 4, "population": 16, "generations": 8}
 
 
 def finished(folder, study, score=toys.bowl, watch=None, resume=False):
     open_folder(folder, study, resume=resume)
-    return run(study, folder, Here(score, 2), watch)
+    return run(study, folder, InProcess(score, 2), watch)
 
 
 @given(st.lists(st.floats(-100, 100), min_size=4, max_size=12), st.lists(st.floats(-5, 5), min_size=3, max_size=3))

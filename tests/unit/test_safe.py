@@ -15,7 +15,7 @@ from airflock.evolve import harden
 from airflock.evolve.run import run
 from airflock.evolve.safe import allowed, excess, flights_that_count, safe_first
 from airflock.evolve.study import make_study, with_limits
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.limits.chance import chance, indices
 from airflock.limits.limit import read
 from airflock.scenarios.files import load
@@ -48,7 +48,7 @@ def searched(folder, limits=()):
     study = toys.study(population=12, generations=40, seeds=4, averages=2, pool=24, top=4, final_seeds=100)
     folder.mkdir(exist_ok=True)
     study = with_limits(study, limits) if limits else study
-    return run(study, folder, Here(flight, 1))
+    return run(study, folder, InProcess(flight, 1))
 
 
 @pytest.fixture(autouse=True)

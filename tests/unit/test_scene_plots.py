@@ -12,11 +12,11 @@ from airflock.aero.wing import pitch
 from airflock.cli import tables
 from airflock.errors import RecordingError
 from airflock.plots.film_stage import Stage
+from airflock.plots.flight import paths_of, view_of
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import cast_at, rays
-from airflock.plots.scene import paths_of, view_of
+from airflock.plots.scene_paths import nearby, scenery, through
 from airflock.plots.solid import render
-from airflock.plots.through import nearby, scenery, through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.video import video
 from airflock.plots.wash import downwash, formation_at, wash

@@ -5,13 +5,13 @@ import pytest
 import toys
 from airflock.engine import score_flight
 from airflock.errors import StudyError
-from airflock.evolve.after import conclude
 from airflock.evolve.bounds import unread, usual_space
 from airflock.evolve.search import search
 from airflock.evolve.space import declared, with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study, make_study
-from airflock.executors.here import Here
+from airflock.evolve.winner import conclude
+from airflock.executors.in_process import InProcess
 from airflock.scenarios.files import load, presets
 
 OWN = {"agents": 12, "world.side": 120.0}
@@ -54,7 +54,7 @@ def test_a_number_that_nothing_reads_changes_no_flight_and_is_not_searched():
 
 
 def run(study, score, folder):
-    executor = Here(score, 2)
+    executor = InProcess(score, 2)
     with Store(folder) as store:
         try:
             return conclude(study, store, executor, search(study, store, executor), folder)

@@ -16,6 +16,7 @@ from airflock.cli.harden import _optima
 from airflock.engine import score_flight, score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
+from airflock.evolve.batched import Batched
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, executor_for, run
 from airflock.evolve.search import evaluate
@@ -24,9 +25,8 @@ from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import load_study, make_study
 from airflock.evolve.task import tasks_of
-from airflock.evolve.together import Together
 from airflock.executors.cluster import rebuild
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from inside import simulate
@@ -52,7 +52,7 @@ def valley(best, height):
 
 def flown(folder, study, watch=None, resume=False):
     open_folder(folder, study, resume=resume)
-    return run(study, folder, Here(valley(0.1, 1.0), 2, [valley(0.3, 0.5)]), watch)
+    return run(study, folder, InProcess(valley(0.1, 1.0), 2, [valley(0.3, 0.5)]), watch)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5))
@@ -116,7 +116,7 @@ def test_real_flights_are_those_of_each_scenario_here_together_and_on_workers(tm
     given = study.space.parameters(points[0])
     wanted = [score_flight(with_parameters(each, given), 7)["fitness"] for each in (small, longer)]
     rows = []
-    for name, executor in (("here", executor_for(study, threads=2)), ("together", Together(study, "cpu"))):
+    for name, executor in (("here", executor_for(study, threads=2)), ("together", Batched(study, "cpu"))):
         (tmp_path / name).mkdir()
         with Store(tmp_path / name) as store:
             rows += evaluate(study, store, executor, Batch("search", 0, 0), points, seeds=[[7]])

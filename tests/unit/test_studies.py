@@ -15,14 +15,14 @@ import pytest
 import airflock
 import toys
 from airflock.errors import ScenarioError, StudyError
+from airflock.evolve.batched import Batched
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, on_device, run, score_of
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import FILE, Batch, Store
 from airflock.evolve.study import differences, load_study, shipped
-from airflock.evolve.together import Together
 from airflock.executors import Flight
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock_papers.dimock_2003.units import gains
 from airflock_papers.vasarhelyi_2018.published import SPEEDS, optimum
 from processes import called
@@ -31,7 +31,7 @@ from processes import called
 def finished(folder, study=None, score=toys.bowl, **options):
     study = study or toys.study()
     open_folder(folder, study, resume=False)
-    return run(study, folder, Here(score, 2), **options)
+    return run(study, folder, InProcess(score, 2), **options)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_ctrl_c_keeps_what_has_landed_and_resume_ends_the_same(tmp_path, done):
         finished(tmp_path / "a", study, watch=stop)
     open_folder(tmp_path / "a", study, resume=True)
     fresh = []
-    again = run(study, tmp_path / "a", Here(toys.bowl, 2), lambda p: fresh.append(p.fresh))
+    again = run(study, tmp_path / "a", InProcess(toys.bowl, 2), lambda p: fresh.append(p.fresh))
     assert max(fresh) <= 16 * 25 * 2 - 100
     assert again.document() == done.document()
 
@@ -319,10 +319,10 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
     space, flights = study.space, []
     for i in range(7):
         flights.append(Flight(i, 0, space.parameters([0.1 + 0.1 * i] * 11), 40 + i))
-    executor = Here(score_of(study), 2)
+    executor = InProcess(score_of(study), 2)
     alone = {landed.flight.candidate: landed.values for landed in executor.fly(flights)}
     executor.close()
-    together = {x.flight.candidate: x.values for x in Together(study, "cpu").fly(flights)}
+    together = {x.flight.candidate: x.values for x in Batched(study, "cpu").fly(flights)}
     assert together == alone
     whole = simulate.score_flights
 
@@ -332,7 +332,7 @@ def test_batches_flown_together_are_the_same_flights_and_faults_stay_alone(monke
         return whole(scenarios, seeds, **keywords)
 
     monkeypatch.setattr(simulate, "score_flights", faulty)
-    landed = {x.flight.candidate: x for x in Together(study, "cpu").fly(flights)}
+    landed = {x.flight.candidate: x for x in Batched(study, "cpu").fly(flights)}
     assert landed[3].values is None and landed[3].reason.startswith("seed 43")
     assert {i: x.values for i, x in landed.items() if i != 3} == {i: v for i, v in alone.items() if i != 3}
 

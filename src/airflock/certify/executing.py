@@ -16,7 +16,7 @@ from airflock.errors import StudyError
 from airflock.evolve.folder import read
 from airflock.executors import Executor, Flight
 from airflock.executors.cluster import Cluster
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 
 PILOT = 16  # flights that tell how many there is time for
 
@@ -44,9 +44,9 @@ def executor_for(
 
     score = score_of(campaign.flown, campaign.limits, campaign.precision, campaign.device)
     if campaign.device != "cpu":
-        return Here(score, 1)
+        return InProcess(score, 1)
     compile_for(campaign.flown, precision=campaign.precision)
-    return Here(score, 1 if takes_all_cores(campaign.flown) else threads or cores())
+    return InProcess(score, 1 if takes_all_cores(campaign.flown) else threads or cores())
 
 
 def planned(campaign: Campaign, executor: Executor, budget: float, folder: Path, resume: bool) -> Campaign:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PICTURES, SCENARIOS
+from airflock.suffixes import PICTURES, SCENARIOS
 
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset or a scenario file; with --check a certificate.")

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PICTURES, RECORDINGS
+from airflock.suffixes import PICTURES, RECORDINGS
 
 
 def display(

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import RECORDINGS
 from airflock.spelling import meant
+from airflock.suffixes import RECORDINGS
 
 VEHICLES = ("px4", "ardupilot")
 FLOWN = ("multirotor", "quadrotor")

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import SCENARIOS
 from airflock.errors import ScenarioError
+from airflock.suffixes import SCENARIOS
 
 
 def harden(
@@ -95,7 +95,7 @@ def harden(
 
 def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
     """The optimum, or that of each scenario of a study's folder."""
-    from airflock.evolve.after import BEST, further_best
+    from airflock.evolve.winner import BEST, further_best
     from airflock.scenarios.files import load
 
     folder = Path(where)

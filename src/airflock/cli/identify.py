@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import imports, options, tables
-from airflock.endings import PICTURES, SCENARIOS
 from airflock.errors import AirflockError
+from airflock.suffixes import PICTURES, SCENARIOS
 
 
 def identify(

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import RECORDINGS
 from airflock.errors import RecordingError
+from airflock.suffixes import RECORDINGS
 
 Files = Annotated[
     list[Path],

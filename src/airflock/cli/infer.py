@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PICTURES, SCENARIOS
 from airflock.errors import AirflockError
+from airflock.suffixes import PICTURES, SCENARIOS
 
 LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
 Tracks = Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PAGES, PICTURES, VIDEOS
+from airflock.suffixes import PAGES, PICTURES, VIDEOS
 
 
 class Kind(StrEnum):

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from airflock.doors import from_outside, toml_value
-from airflock.endings import ending_fault
 from airflock.errors import ScenarioError
 from airflock.errors import gathering as gathering  # verbs say options.gathering
+from airflock.suffixes import suffix_fault
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
@@ -100,7 +100,7 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
     for path, endings in outputs:
         if path is None:
             continue
-        folder, wrong = path.parent, ending_fault(path, endings)
+        folder, wrong = path.parent, suffix_fault(path, endings)
         if wrong:
             faults.append(wrong)
         if not folder.is_dir():

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.endings import PICTURES, TABLES
 from airflock.errors import ScenarioError
+from airflock.suffixes import PICTURES, TABLES
 
 MOST_VALUES = 100_000  # of one key, and points of a whole grid
 

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from airflock.errors import ScenarioError
-from airflock.evolve.after import interval
 from airflock.evolve.folder import plain
+from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import ZERO, why_zero
 from airflock.evolve.objective_table import read_limits
 from airflock.evolve.safe import allowed, excess

@@ -9,7 +9,6 @@ from typing import Any
 
 from airflock import atomic
 from airflock.errors import StudyError
-from airflock.evolve.after import Result, conclude
 from airflock.evolve.fitness import Objective, Own
 from airflock.evolve.folder import open_folder, sweep, versions
 from airflock.evolve.pictures import draw
@@ -20,9 +19,10 @@ from airflock.evolve.sensitivity import sensitivity as sensitivities
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Store
 from airflock.evolve.study import Study, load_study, make_study, with_limits
+from airflock.evolve.winner import Result, conclude
 from airflock.executors import Executor, Score
 from airflock.executors.cluster import Cluster, fly_on_their_cpu
-from airflock.executors.here import Here
+from airflock.executors.in_process import InProcess
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 
@@ -219,9 +219,9 @@ def executor_for(
 ) -> Executor:
     """Who flies: this process, or the workers of a dask scheduler."""
     if study.device != "cpu":
-        from airflock.evolve.together import Together
+        from airflock.evolve.batched import Batched
 
-        return Together(study, study.device)
+        return Batched(study, study.device)
     if scheduler is not None:
         from airflock.evolve.task import tasks_of
 
@@ -235,7 +235,7 @@ def executor_for(
         compile_for(scenario, precision=int(study.search.precision))
     alone = any(takes_all_cores(scenario) for scenario in study.scenarios)
     scores = [score_of(study, place) for place in range(len(study.scenarios))]
-    return Here(scores[0], 1 if alone else threads or cores(), scores[1:])
+    return InProcess(scores[0], 1 if alone else threads or cores(), scores[1:])
 
 
 def run(

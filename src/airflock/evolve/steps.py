@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import ScenarioError
-from airflock.evolve.after import interval
+from airflock.evolve.intervals import interval
 from airflock.evolve.space import declared, with_parameters
 from airflock.scenarios.scenario import Scenario
 

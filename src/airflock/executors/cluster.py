@@ -18,7 +18,7 @@ from typing import Any
 from airflock.engine import compile_for, score_flight
 from airflock.errors import AirflockError, StudyError
 from airflock.executors import Flight, Landed, Score
-from airflock.executors.here import land
+from airflock.executors.in_process import land
 from airflock.machine import processor
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario

@@ -12,9 +12,9 @@ from airflock.plots.rays import rays
 from airflock.plots.reception import received
 from airflock.plots.rules import rules
 from airflock.plots.save import save_figure
+from airflock.plots.scene_paths import through
 from airflock.plots.series import rotations, series
 from airflock.plots.slices import slices
-from airflock.plots.through import through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.wash import wash

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from airflock.plots import style
-from airflock.plots.save import positive
-from airflock.plots.scene import (
+from airflock.plots.flight import (
     Paths,
     details_of,
     extent,
@@ -24,6 +23,7 @@ from airflock.plots.scene import (
     walls,
     world_of,
 )
+from airflock.plots.save import positive
 
 Array = NDArray[Any]
 WINDOW = 30.0  # s

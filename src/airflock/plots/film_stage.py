@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import (
+from airflock.plots.flight import (
     Paths,
     View,
     details_of,
@@ -26,8 +26,8 @@ from airflock.plots.scene import (
     walls,
     world_of,
 )  # fmt: skip
+from airflock.plots.scene_paths import built, scenery
 from airflock.plots.solid import Rendering
-from airflock.plots.through import built, scenery
 from airflock.recordings.scores import over_time
 from airflock.spelling import meant
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import details_of, name_of, window
+from airflock.plots.flight import details_of, name_of, window
 from airflock.plots.series import Pen
 from airflock.recordings.scores import measure
 

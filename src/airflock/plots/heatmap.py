@@ -13,7 +13,7 @@ from airflock.core.parameters import Quantity, declarations
 from airflock.errors import AirflockError
 from airflock.metrics.registry import METRICS
 from airflock.plots import style
-from airflock.plots.scene import name_of
+from airflock.plots.flight import name_of
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS, Flight
 

@@ -14,8 +14,8 @@ from airflock.plots.flocked import flocked
 from airflock.plots.rays import rays
 from airflock.plots.reception import received
 from airflock.plots.rules import rules
+from airflock.plots.scene_paths import through
 from airflock.plots.series import series
-from airflock.plots.through import through
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.wash import wash

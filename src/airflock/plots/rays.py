@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from airflock.core.agent import Heard, State
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import details_of, flown_with, name_of, paths_of
-from airflock.plots.through import ground_plans, nearby
+from airflock.plots.flight import details_of, flown_with, name_of, paths_of
+from airflock.plots.scene_paths import ground_plans, nearby
 from airflock.scenarios.surroundings import Course, Place
 from airflock.stage.rays import Ray, cast_rays
 

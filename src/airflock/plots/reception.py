@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airflock.plots import style
-from airflock.plots.scene import details_of, flown_with, name_of
+from airflock.plots.flight import details_of, flown_with, name_of
 from airflock.recordings.reception import BINS, reception
 
 FEW = 10  # pairs of a bin below which it is not drawn

@@ -15,9 +15,9 @@ from airflock.core.contract import Model
 from airflock.core.vocabulary import asks
 from airflock.errors import RuleError
 from airflock.plots import style
+from airflock.plots.flight import name_of
 from airflock.plots.responses import FASTEST, Array, alignment, allowed_difference, repulsion, wall_response
 from airflock.plots.save import positive
-from airflock.plots.scene import name_of
 from airflock.scenarios.scenario import Scenario
 from airflock.stage.arrows import vectors, word_of
 

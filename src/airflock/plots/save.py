@@ -10,8 +10,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from airflock.atomic import atomic
-from airflock.endings import PICTURES, ending_fault
 from airflock.errors import AirflockError, RecordingError
+from airflock.suffixes import PICTURES, suffix_fault
 
 # no dates: the same figure gives the same file
 DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -40,7 +40,7 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
 def complete_or_absent(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
     target = Path(path)
-    fault = ending_fault(target, endings)
+    fault = suffix_fault(target, endings)
     if fault:
         raise PictureError(fault)
     if target.is_dir():

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from airflock.errors import AirflockError
 from airflock.plots import style
-from airflock.plots.scene import details_of, name_of, window
+from airflock.plots.flight import details_of, name_of, window
 from airflock.recordings.attributes import faults
 from airflock.recordings.scores import over_time, scenario_of
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.plots.scene import View
+from airflock.plots.flight import View
 from airflock.stage.scene import Solid
 
 Array = NDArray[Any]

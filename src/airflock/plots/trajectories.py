@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from airflock.errors import AirflockError, RecordingError
 from airflock.plots import style
-from airflock.plots.scene import (
+from airflock.plots.flight import (
     Paths,
     details_of,
     extent,
@@ -26,7 +26,7 @@ from airflock.plots.scene import (
     walls,
     world_of,
 )  # fmt: skip
-from airflock.plots.through import through
+from airflock.plots.scene_paths import through
 from airflock.world import arena
 
 WINDOW = 60.0  # s; longer paths cover each other

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from airflock.core.maths import bell, peak, rising
 from airflock.plots import style
-from airflock.plots.scene import name_of
+from airflock.plots.flight import name_of
 from airflock.scenarios.scenario import Scenario
 
 

@@ -13,11 +13,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.endings import VIDEOS
 from airflock.errors import AirflockError
 from airflock.plots.film_stage import Stage
+from airflock.plots.flight import window
 from airflock.plots.save import PictureError, complete_or_absent, positive
-from airflock.plots.scene import window
+from airflock.suffixes import VIDEOS
 
 Array = NDArray[Any]
 # GIF: a palette for each frame, because one for all would need all frames in memory

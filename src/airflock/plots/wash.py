@@ -17,7 +17,7 @@ from airflock.aero.lifting_line import induced_drag, shapes, solo_drag, solve
 from airflock.aero.wing import pitch, segments_of
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import details_of, flown_with, name_of, paths_of
+from airflock.plots.flight import details_of, flown_with, name_of, paths_of
 from airflock.scenarios.scenario import Scenario
 
 Array = NDArray[Any]

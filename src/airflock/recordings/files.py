@@ -12,7 +12,6 @@ import xarray as xr
 from airflock import atomic
 from airflock.body.registry import BODIES
 from airflock.doors import from_outside
-from airflock.endings import RECORDINGS, ending_fault
 from airflock.errors import RecordingError
 from airflock.machine import processor
 from airflock.metrics.registry import SETS
@@ -26,6 +25,7 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
 from airflock.sensors.registry import SENSORS
+from airflock.suffixes import RECORDINGS, suffix_fault
 from airflock.topology.registry import TOPOLOGIES
 
 
@@ -62,7 +62,7 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     """
     check(recording, str(path))
     target = Path(path)
-    wrong = ending_fault(target, RECORDINGS)
+    wrong = suffix_fault(target, RECORDINGS)
     if wrong:
         raise RecordingError(wrong)
     if target.is_dir():

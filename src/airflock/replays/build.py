@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from airflock import atomic
-from airflock.endings import PAGES, ending_fault
 from airflock.errors import RecordingError
 from airflock.metrics.registry import numbers_of
 from airflock.recordings import attributes
@@ -31,6 +30,7 @@ from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
 from airflock.stage import colours, shades
 from airflock.stage.scene import Stage, stage_of
+from airflock.suffixes import PAGES, suffix_fault
 
 RATE = 10.0  # frames per second that are kept at most; the page draws between them
 MOST_EVENTS = 500
@@ -48,7 +48,7 @@ class Replay:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the page as .html."""
         target = Path(path)
-        wrong = ending_fault(target, PAGES)
+        wrong = suffix_fault(target, PAGES)
         if wrong:
             raise RecordingError(wrong)
         atomic.write(target, self.text)

@@ -12,7 +12,6 @@ from airflock.certify.certificate import Certificate
 from airflock.certify.executing import executor_for
 from airflock.certify.run import run as certified
 from airflock.errors import ScenarioError
-from airflock.evolve.after import Result
 from airflock.evolve.folder import open_folder, write
 from airflock.evolve.harden import document as hardened_document
 from airflock.evolve.harden import harden
@@ -21,6 +20,7 @@ from airflock.evolve.run import run as evolved
 from airflock.evolve.search import Watch
 from airflock.evolve.steps import Measured
 from airflock.evolve.study import make_study
+from airflock.evolve.winner import Result
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.kept import document, read_steps

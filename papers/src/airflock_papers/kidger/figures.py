@@ -18,7 +18,7 @@ def draw(folder: Path, tuning: pd.DataFrame) -> None:
     from airflock.plots.flocked import flocked
     from airflock.plots.rays import rays
     from airflock.plots.save import save_figure
-    from airflock.plots.through import through
+    from airflock.plots.scene_paths import through
 
     city = simulate(load("kidger/city", FLIGHT), 0)
     save_figure(through(city), folder / "city.png")

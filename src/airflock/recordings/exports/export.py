@@ -5,10 +5,10 @@ from pathlib import Path
 
 import xarray as xr
 
-from airflock.endings import ending_fault
 from airflock.errors import RecordingError
 from airflock.recordings.exports.movement import write_movement
 from airflock.recordings.exports.tables import write_csv, write_parquet
+from airflock.suffixes import suffix_fault
 
 ENDINGS = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
@@ -45,7 +45,7 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     'flight.csv'
     """
     target = Path(path)
-    wrong = ending_fault(target, ENDINGS)
+    wrong = suffix_fault(target, ENDINGS)
     if wrong:
         raise RecordingError(wrong)
     if layout not in LAYOUTS:

@@ -19,7 +19,7 @@ def land(score: Score, flight: Flight, worker: str = "") -> Landed:
     return Landed(flight, values, reason, time.perf_counter() - begin, worker)
 
 
-class Here:
+class InProcess:
     """A pool of threads, one per core unless told otherwise."""
 
     def __init__(self, score: Score, threads: int, others: Sequence[Score] = ()):

@@ -11,7 +11,7 @@ PAGES = (".html",)
 SCENARIOS = (".toml",)
 
 
-def ending_fault(path: str | os.PathLike[str], endings: tuple[str, ...]) -> str:
+def suffix_fault(path: str | os.PathLike[str], endings: tuple[str, ...]) -> str:
     """What is wrong with the ending of a file to be written; empty if nothing is."""
     target = Path(path)
     if target.suffix.lower() in endings:

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from airflock.errors import RecordingError
 from airflock.plots import style
-from airflock.plots.scene import (
+from airflock.plots.flight import (
     Paths,
     View,
     details_of,

@@ -1,4 +1,4 @@
-"""After the search: who is best when luck is taken out, and which parameters work.
+"""The winner of a search: who is best when luck is taken out, and which parameters work.
 
 The best of 15,000 noisy evaluations is the luckiest as much as the best. The final mean of each run and the top
 candidates (of a race, `airflock.evolve.race`) fly again on the same fresh seeds, the winner once more on other fresh
@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
 
 from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import tables
 from airflock.evolve.folder import plain, write
+from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
 from airflock.evolve.race import race
@@ -292,14 +292,6 @@ def _winner(study: Study, rows: Sequence[Sequence[float | None]], excess: NDArra
     best, worst = table[sound].max(axis=0), table[sound].min(axis=0)
     away = ((best - table) / np.where(best > worst, best - worst, 1.0)) ** 2
     return int(np.argmin(np.where(sound, away.sum(axis=1), np.inf)))
-
-
-def interval(values: Sequence[float]) -> tuple[float, float, float, float]:
-    """Mean, SD, and Student's 95 % interval of the mean."""
-    x = np.array(values, float)
-    mean, sd = float(x.mean()), float(x.std(ddof=1)) if len(x) > 1 else 0.0
-    half = float(stats.t.ppf(0.975, len(x) - 1)) * sd / len(x) ** 0.5 if len(x) > 1 else 0.0
-    return mean, sd, mean - half, mean + half
 
 
 def scenario_document(

@@ -9,7 +9,7 @@ from airflock.evolve.study import Study
 from airflock.executors import Flight, Landed
 
 
-class Together:
+class Batched:
     """One call of the engine for each batch; a flight that goes wrong is found by halves, and the others stand."""
 
     def __init__(self, study: Study, device: str):
