@@ -165,7 +165,7 @@ def test_a_number_that_others_make_up_for_goes_back_to_its_default():
     model = Line(law, ("force", "unit", "free"), (0.8, 0.1, 0.6), {"force": 0.5, "unit": 0.1, "free": 0.5})
     ridge = climb(model, np.array([0.3, 0.6, 0.6]), [0, 1, 2])
     assert ridge.place[1] > 0.3  # the prior alone does not bring it back
-    gone, place = simplify(model, ridge, quietly)
+    gone, place, _ = simplify(model, ridge, quietly)
     assert gone == [1] and place[[0, 2]] == pytest.approx([0.8, 0.6], abs=0.05)
 
 
@@ -175,8 +175,9 @@ def test_the_part_of_one_radius_is_taken_by_another_of_its_unit():
 
     model = Line(law, ("radius", "floor", "weight"), (0.62, 0.0, 0.7), {"radius": 0.2, "floor": 0.0, "weight": 0.7})
     swapped = np.array([0.2, 0.62, 0.7])
-    gone, place = simplify(model, Fit(swapped, [0, 1, 2], model.score(swapped), 0.0), quietly)
+    gone, place, carried = simplify(model, Fit(swapped, [0, 1, 2], model.score(swapped), 0.0), quietly)
     assert gone == [1] and place[0] == pytest.approx(0.62, abs=0.01)
+    assert carried.tolist() == [0.62, swapped[1], 0.7]  # as it was, but for the radius
 
 
 def test_standard_errors_are_those_of_least_squares():

@@ -12,7 +12,7 @@ from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
 from airflock.infer.hills import hills
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, scan
-from airflock.infer.told import carried, exchanged, simplify, telling
+from airflock.infer.told import exchanged, simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]
@@ -98,26 +98,29 @@ def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -
 
     law : with all its numbers
     """
-    model, found = without_spare(*regained(law, model, found, say), say)
-    in_order, place = exchanged(law, model, found, say)
-    if in_order is not model:
-        model, found = in_order, _nearest(in_order, place, place)
+    model, found = first_names(law, *without_spare(*regained(law, model, found, say), say), say)
     other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
     found = hills(model, min(found, other, key=lambda each: each.loss), model.few(), sample(model), say)
-    return without_spare(model, found, say)
+    return first_names(law, *without_spare(model, found, say), say)
+
+
+def first_names(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
+    """The fit told by the numbers that are declared first, where either of two explains the tracks."""
+    renamed, place = exchanged(law, model, found, say)
+    return (model, found) if renamed is model else (renamed, _nearest(renamed, place, place))
 
 
 def without_spare(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The model without numbers that the others make up for, where the sample is explained as well by what is left."""
-    gone, place = simplify(model, found, say)
+    gone, place, carried = simplify(model, found, say)
     if not gone:
         return model, found
     rest = [k for k in range(len(model.numbers)) if k not in gone]
     assert model.law is not None
     numbers = tuple(n for k, n in enumerate(model.law.numbers) if k not in gone)
     without = Model(replace(model.law, numbers=numbers), model.tracks, scale=model.scale)
-    less = _nearest(without, place[rest], carried(model, found, gone, sample(model))[rest])
+    less = _nearest(without, place[rest], carried[rest])
     if less.loss >= found.loss + 2.0 * len(gone):
         return model, found
     return without, replace(less, others=tuple(place[rest] for place in found.others))

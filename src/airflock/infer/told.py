@@ -1,6 +1,6 @@
 """Told: which numbers of a law the tracks can tell at all, and which the others make up for."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -94,7 +94,7 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
             if not (_may_go(fuller, k) and _away(fuller, beside, k)):
                 continue
             without, rest = fuller.fixed([k]), [f for f in free if f != k]
-            start = min(_taken_over(without, beside, curved, i, k, few), key=lambda u: loss_at(without, u, rest, few))
+            start = _given_up(without, beside, curved, k, few)
             if loss_at(without, start, rest, few) > beside.loss + UNLIKELY or abs(start[i] - u[i]) < APART:
                 continue
             found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
@@ -105,20 +105,6 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
                 break
         say()
     return model, place
-
-
-def _taken_over(
-    model: Model, fit: Fit, curved: Array, earlier: int, later: int, spans: Sequence[int]
-) -> Iterator[Array]:
-    """Places at which an earlier number, and the others, may have taken the part of a later one, now at its default."""
-    one, other = model.numbers[earlier], model.numbers[later]
-    moved = followed(fit, curved, later, other.place(other.default))
-    yield moved
-    yield by_powers(model, fit, moved, later, spans)
-    if one.unit == other.unit:
-        u = fit.place.copy()
-        u[earlier] = one.place(other.value(u[later]))
-        yield u
 
 
 def _may_go(model: Model, number: int) -> bool:
@@ -140,19 +126,19 @@ def _anywhere(model: Model, fit: Fit, curved: Array, number: int, spans: Sequenc
     return loss_at(model, by_powers(model, fit, moved, number, spans), fit.free, spans) < fit.loss + WORSE
 
 
-def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int], Array]:
-    """Named numbers without which the tracks are explained as well, and the place of the rest without them.
+def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int], Array, Array]:
+    """Named numbers without which the tracks are explained as well, and places of the rest without them.
 
     Each that stands away from its default, or whose default lies beyond what was sought, is put there in turn, the last
     declared first, and the rest is fitted anew: from where the others make up for it, and from where another number of
     its unit takes its part. So is one near its default that may as well stand elsewhere, such as a mass beside forces.
+
+    The first place is where a few frames are explained best; at the second the fit's place is carried over as it is.
     """
     few = model.few()
     best = climb(model, fit.place, fit.free, few, slopes=(WIDE,))
-    lowest, gone = best.loss, list[int]()
+    carried, lowest, gone = fit.place, best.loss, list[int]()
     for k in reversed(range(model.named)):
-        number = model.numbers[k]
-        default = number.place(number.default)
         if not _may_go(model, k):
             continue
         present = model.fixed(gone)
@@ -160,24 +146,24 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
         if not _away(model, best, k) and not _anywhere(present, best, curved, k, few):
             continue
         without, rest = model.fixed([*gone, k]), [f for f in best.free if f != k]
-        moved = followed(best, curved, k, default)
-        starts = [moved, by_powers(without, best, moved, k, few)]
-        for other in (f for f in rest if f < model.named and model.numbers[f].unit == number.unit):
-            starts.append(best.place.copy())
-            starts[-1][other] = model.numbers[other].place(number.value(best.place[k]))
-        start = min(starts, key=lambda u: loss_at(without, u, rest, few))
+        start = _given_up(without, best, curved, k, few)
         found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
         say()
         if found.loss < lowest + WORSE:
+            carried = _given_up(without, replace(best, place=carried), curved, k, few)
             gone, best, lowest = [*gone, k], found, min(lowest, found.loss)
-    return gone, best.place
+    return gone, best.place, carried
 
 
-def carried(model: Model, fit: Fit, gone: Sequence[int], spans: Sequence[int]) -> Array:
-    """A fit's place with some numbers at their defaults, and the others moved by whole powers of them."""
-    for held, k in enumerate(gone):
-        without, number = model.fixed(gone[: held + 1]), model.numbers[k]
-        moved = fit.place.copy()
-        moved[k] = number.place(number.default)
-        fit = replace(fit, place=by_powers(without, fit, moved, k, spans))
-    return fit.place
+def _given_up(model: Model, fit: Fit, curved: Array, number: int, spans: Sequence[int]) -> Array:
+    """The likeliest place with a number at its default: the others make up for it, or one of its unit takes its part.
+
+    model : in which the number is held
+    """
+    one, rest = model.numbers[number], [f for f in fit.free if f != number]
+    moved = followed(fit, curved, number, one.place(one.default))
+    starts = [moved, by_powers(model, fit, moved, number, spans)]
+    for other in (f for f in rest if f < model.named and model.numbers[f].unit == one.unit):
+        starts.append(fit.place.copy())
+        starts[-1][other] = model.numbers[other].place(one.value(fit.place[number]))
+    return min(starts, key=lambda u: loss_at(model, u, rest, spans))
