@@ -33,10 +33,9 @@ FASTER = 1.6  # each step is so much longer than the one before, while the likel
 PLACES = 16  # that are looked at, on each side of a ridge
 FOLLOWS = 4  # steps of the climb by which the others follow
 SHORTER = 3.0  # a step is so much shorter where the likelihood has fallen too far: the others could not follow
-HIGHER = (
-    6.0  # log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin
-)
-# beside each other end several units apart, and from the top of a spike every way falls
+# log-likelihood by which a place must be better than the fit, to begin again from there: climbs that begin beside each
+# other end several units apart, and from the top of a spike every way falls
+HIGHER = 6.0
 AGAIN = 2  # times
 UNLIKELY = 20.0  # fall at the end of a range, the others where they are, beyond which they are not asked to follow
 
