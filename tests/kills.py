@@ -104,7 +104,7 @@ def tune(folder):
 
 def of_tuning(folder):
     """All stages; of the certificate what counting showed, because tolerances are looked for as long as time allows."""
-    from airflock.doors import read_toml
+    from airflock.untrusted import read_toml
 
     told = read_toml(folder / "certificate.toml")
     names = ("tune.toml", "start.toml", "tuned.toml", "hardening.json")

@@ -1,6 +1,6 @@
 """A reader of files that is forked from this process instead of started, so that a case takes milliseconds.
 
-It is what `recordings.opened` makes of `subprocess.Popen`, as far as that is used there. That a reader of its own is
+It is what `recordings.isolated` makes of `subprocess.Popen`, as far as that is used there. That a reader of its own is
 started as it should be is tested elsewhere (test_recordings_apart.py).
 """
 
@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 
-from airflock.recordings import opened, reader
+from airflock.recordings import isolated, reader
 
 SHORT = 2.0  # s of a processor that a small file may take, without the start of an interpreter
 
@@ -53,7 +53,7 @@ class Forked:
 
 
 class Started:
-    """The part of the module subprocess that `recordings.opened` uses."""
+    """The part of the module subprocess that `recordings.isolated` uses."""
 
     PIPE = DEVNULL = None
     Popen = Forked
@@ -68,4 +68,4 @@ def readers_are_forked():
         import pymavlink.mavutil  # noqa: F401
     except ImportError:  # an extra
         pass
-    opened.subprocess, opened.LEAST_TIME = Started, SHORT
+    isolated.subprocess, isolated.LEAST_TIME = Started, SHORT

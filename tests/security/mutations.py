@@ -13,7 +13,7 @@ from pathlib import Path
 import documents
 import forked
 
-from airflock import doors
+from airflock import untrusted
 from airflock.errors import AirflockError, ScenarioError
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "0.1"
@@ -173,7 +173,7 @@ def scenarios():
     """Documents of all presets, of the golden scenario, and of every section."""
     from airflock.scenarios.files import presets
 
-    shipped = [doors.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
+    shipped = [untrusted.read_toml(path) for path in (*presets().values(), GOLDEN / "scenario.toml")]
     return shipped + [*documents.SCENARIOS] * (len(shipped) // len(documents.SCENARIOS))  # half of all cases
 
 
@@ -182,7 +182,7 @@ def studies():
     """Documents of all studies and of the golden one, with a preset for its scenario."""
     from airflock.evolve.study import shipped
 
-    found = [doors.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
+    found = [untrusted.read_toml(path) for path in (*shipped().values(), GOLDEN / "study.toml")]
     named = [document for document in found if "scenario" in document]
     rest = [document for document in found if "scenario" not in document]
     preset = "vasarhelyi_2018/4ms"

@@ -15,7 +15,7 @@ import mutations
 import numpy as np
 from mutations import GOLDEN, damage, mutate, toml
 
-from airflock import doors
+from airflock import untrusted
 from airflock.errors import AirflockError
 
 sys.path.insert(0, str(GOLDEN.parents[1]))  # modules that tests share
@@ -210,13 +210,13 @@ def _damaged(rng, kind, content):
         document = _without_dates(document)
         return json.dumps({**document, "hash": hash_of(document)}).encode()
     if kind == "certificate" and rng.random() < 0.8:
-        document = _without_dates(mutate(rng, doors.toml(content.decode())))
+        document = _without_dates(mutate(rng, untrusted.toml(content.decode())))
         document["seal"] = hashlib.sha256(repr(document).encode()).hexdigest()
         return "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in document.items()).encode()
     if kind in ("geojson", "steps", "memory") and rng.random() < 0.6:
         return json.dumps(_without_dates(mutate(rng, json.loads(content)))).encode()
     if kind in ("faults", "plan") and rng.random() < 0.6:
-        document = mutate(rng, doors.toml(content.decode()))
+        document = mutate(rng, untrusted.toml(content.decode()))
         return "".join(f"{json.dumps(key)} = {toml(value)}\n" for key, value in document.items()).encode()
     if kind == "log" and rng.random() < 0.6:
         lines = content.decode().splitlines()
@@ -289,13 +289,13 @@ def _memory(path):
 
 
 def _plan(path):
-    from airflock.tune.kept import read_plan
+    from airflock.tune.folder import read_plan
 
     read_plan(path)
 
 
 def _hardening(path):
-    from airflock.tune.kept import read_steps
+    from airflock.tune.folder import read_steps
 
     read_steps(path)
 

@@ -7,7 +7,7 @@ import fuzz
 import mutations
 import pytest
 
-from airflock.recordings import opened
+from airflock.recordings import isolated
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ from airflock.recordings import opened
 )
 def test_no_input_leaves_a_foreign_exception_a_hang_or_other_numbers(what, count, seed, tmp_path, monkeypatch):
     for name in ("subprocess", "LEAST_TIME"):
-        monkeypatch.setattr(opened, name, getattr(opened, name))  # given back at the end
+        monkeypatch.setattr(isolated, name, getattr(isolated, name))  # given back at the end
     mutations.warm(what)
     failures, _ = fuzz.attack(fuzz.CASES[what], count, seed, folder=tmp_path, hang=fuzz.PATIENCE.get(what, fuzz.HANG))
     assert failures == [], f"repeat with: python tests/security/fuzz.py {what} --seed {seed} --only NUMBER"

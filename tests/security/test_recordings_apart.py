@@ -14,7 +14,7 @@ from mutations import GOLDEN
 import airflock
 from airflock.errors import RecordingError
 from airflock.recordings.flights import flown_document
-from airflock.recordings.opened import Opening
+from airflock.recordings.isolated import Opening
 
 
 def test_what_another_process_opens_is_what_xarray_opens():

@@ -11,7 +11,6 @@ import pytest
 from shapely.geometry import Polygon
 
 import airflock
-from airflock.doors import TextError, xml
 from airflock.errors import ScenarioError
 from airflock.mavlink.coordinates import Site
 from airflock.recordings.scores import scenario_of
@@ -19,6 +18,7 @@ from airflock.scenarios import geometry
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.scenes.outlines import ground_of
+from airflock.untrusted import TextError, xml
 
 FIELDS = Path(__file__).parents[1] / "fields"
 FEW = {"agents": 4, "start.separation": 4.0, "duration": 1.0}

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock.certify.asked import campaign_of
+from airflock.certify.request import campaign_of
 from airflock.certify.seeds import identity
 from airflock.cli.options import time_of
 from airflock.errors import RecordingError, ScenarioError, StudyError
@@ -21,7 +21,7 @@ from airflock.evolve.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
-from airflock.tune.kept import MOST_SEEDS
+from airflock.tune.folder import MOST_SEEDS
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
 from airflock.tune.reach import out_of_reach
 from airflock.tune.run import tune, usual_limits

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
-from airflock.doors import TextError, json_object, read_text
 from airflock.errors import AirflockError
+from airflock.untrusted import TextError, json_object, read_text
 from airflock_papers import PAPERS, breaks
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find

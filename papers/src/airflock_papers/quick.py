@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from airflock import atomic
-from airflock.doors import TextError, json_object, read_text
 from airflock.machine import kind
+from airflock.untrusted import TextError, json_object, read_text
 from airflock_papers import PAPERS
 from airflock_papers import committed as tables
 from airflock_papers.catalogue import find

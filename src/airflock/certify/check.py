@@ -11,13 +11,13 @@ from airflock.certify.campaign import Campaign
 from airflock.certify.certificate import FORMAT, digest, seal
 from airflock.certify.flights import score_of
 from airflock.certify.seeds import COUNT, seed
-from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.folder import versions
 from airflock.limits.bounds import look
 from airflock.limits.limit import read_all
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import from_outside, read_toml
 
 
 @dataclass(frozen=True)

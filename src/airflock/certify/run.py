@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.certify.asked import asked, campaign_of, check_options
 from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import Certificate
 from airflock.certify.counting import Count, Watch, count
 from airflock.certify.executing import executor_for, folder_of, planned
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.maps import bounds_over, sound_axes
+from airflock.certify.request import asked, campaign_of, check_options
 from airflock.evolve.folder import open_folder, sweep, versions, write
 from airflock.evolve.run import Interrupted
 from airflock.evolve.store import Store

@@ -11,8 +11,8 @@ import airflock
 from airflock.atomic import write
 from airflock.cache import cache_trouble, usual_folder
 from airflock.checking.annotations import TypedCopy, typed_copy
-from airflock.doors import from_outside, read_text
 from airflock.errors import RuleError
+from airflock.untrusted import from_outside, read_text
 
 PACKAGE = Path(airflock.__file__).parent
 SCALAR = ("core/maths.py",)  # every function of these takes and gives plain numbers

@@ -99,8 +99,8 @@ def certify(
         options.refuse([f"--check: flies again what the certificate holds; leave out {left_out}"] if left_out else [])
         _check(scenario, threads, trust, as_json)
         return
-    from airflock.certify.asked import asked, campaign_of, check_options
     from airflock.certify.maps import sound_axes
+    from airflock.certify.request import asked, campaign_of, check_options
     from airflock.cli.sweep import axis
     from airflock.scenarios.files import load
 

@@ -8,9 +8,9 @@ import typer
 from typer.core import TyperGroup
 
 from airflock.cli import options, tables
-from airflock.doors import is_file
 from airflock.errors import CardError, ScenarioError
 from airflock.spelling import meant
+from airflock.untrusted import is_file
 
 DATAGRAM = 95  # bytes of a signed status packet
 OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64

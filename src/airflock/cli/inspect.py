@@ -5,8 +5,8 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.doors import from_outside, is_file, read_text
 from airflock.errors import AirflockError
+from airflock.untrusted import from_outside, is_file, read_text
 
 
 def presets(

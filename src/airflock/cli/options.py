@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.doors import from_outside, toml_value
 from airflock.errors import ScenarioError
 from airflock.errors import gathering as gathering  # verbs say options.gathering
 from airflock.suffixes import suffix_fault
+from airflock.untrusted import from_outside, toml_value
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
@@ -152,7 +152,7 @@ def compiling_told() -> Iterator[None]:
     from numba.core.event import install_listener
 
     from airflock.cli.tables import say
-    from airflock.heeding import Telling
+    from airflock.compile_events import Telling
 
     with install_listener("numba:run_pass", Telling(lambda: say(COMPILING))):
         yield

@@ -123,7 +123,7 @@ def score(
 
     Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """
-    from airflock.recordings.opened import Opening
+    from airflock.recordings.isolated import Opening
 
     options.writable((series, TABLES))
     changed = options.settings(changes)

@@ -17,8 +17,8 @@ from numba.core.imputils import RegistryLoader, builtin_registry
 from numba.core.typed_passes import NativeLowering, NativeParforLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.untyped_passes import InlineClosureLikes
 
+from airflock.engine.compile_shortcuts import sparing
 from airflock.engine.libraries import SPREAD, DriverLibrary, InlinedLibrary
-from airflock.engine.sparing import sparing
 
 LATER = ("make_function", "build_list", "build_set", "build_map")  # what closures and arrays out of lists begin with
 ARRAY_VALUED = ("unary", "binop", "inplace_binop", "call")  # what is rewritten where its value is a whole array

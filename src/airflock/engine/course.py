@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airflock import __version__
 from airflock.engine import cpu, failure
-from airflock.engine.aside import compile_aside
+from airflock.engine.background_compile import compile_aside
 from airflock.engine.carry import carry
 from airflock.engine.drivers import flying, is_compiled
 from airflock.engine.moments import Snapshot, Window

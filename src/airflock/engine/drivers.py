@@ -48,7 +48,7 @@ def compiling(model: str) -> Iterator[None]:
     from numba.core.errors import NumbaError
     from numba.core.event import install_listener
 
-    from airflock.heeding import Heeding
+    from airflock.compile_events import Heeding
 
     try:
         with install_listener("numba:run_pass", Heeding()):

@@ -7,7 +7,7 @@ from typing import Any
 from numba.core.codegen import Codegen, JITCodeLibrary
 from numba.core.runtime import rtsys  # type: ignore[attr-defined]  # Numba has no types, here and below
 
-from airflock.engine.sparing import KNOWN
+from airflock.engine.compile_shortcuts import KNOWN
 
 # what Numba calls the body of a loop over threads, what unpacks its arguments, and what hands its parts to threads
 OF_LOOPS = ("__numba_parfor_gufunc", "<numba.np.ufunc.wrappers.", "parallelgufuncwrapper")

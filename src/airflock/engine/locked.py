@@ -14,7 +14,7 @@ from typing import Any
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
-from airflock.engine.sparing import implementations, seldom_collected
+from airflock.engine.compile_shortcuts import implementations, seldom_collected
 from airflock.engine.waiting import waiting_briefly
 
 NAME = "lock"

@@ -30,7 +30,7 @@ def load_driver(text: str, label: str) -> ModuleType:
 
 
 def _import(name: str, digest: str, text: str, label: str) -> ModuleType:
-    from airflock.engine.sealed import seal
+    from airflock.engine.checksums import seal
 
     try:
         path = _written(cache_folder() / DRIVERS / digest, label, text)

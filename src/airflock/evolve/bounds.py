@@ -12,12 +12,12 @@ from functools import lru_cache
 from typing import Any
 
 from airflock.core.parameters import Quantity, number_names
-from airflock.doors import read_toml
 from airflock.evolve.space import Axis, Space, declared, full_space, usual_scale
 from airflock.evolve.space_table import read_space
 from airflock.scenarios.files import load
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import read_toml
 
 AROUND = 10.0  # factor about a scenario's own value, where no study is shipped
 SCALED = {"m": 1, "m/s": 1}  # units that grow with the speed; times and rates stay

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from airflock import __version__, atomic
-from airflock.doors import from_outside, read_toml
 from airflock.errors import StudyError
 from airflock.evolve.study import same_or_refuse
 from airflock.machine import processor
+from airflock.untrusted import from_outside, read_toml
 
 STUDY = "study.toml"
 PACKAGES = ("numpy", "numba", "cma", "pymoo")

@@ -6,12 +6,12 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import is_file
 from airflock.errors import RuleError, ScenarioError
 from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
 from airflock.limits.limit import Limit, read_all
 from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import is_file
 
 KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
 

@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import is_file
 from airflock.errors import ScenarioError, bounded
 from airflock.evolve.bounds import usual_space
 from airflock.evolve.space import Space, declared
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import is_file
 
 OVER_SCENARIOS = ("mean", "worst")
 KEYS = ("scenario", "set")  # of an entry that is a table

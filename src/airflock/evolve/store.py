@@ -16,9 +16,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.doors import FormatError, from_outside, json_object, json_value
 from airflock.errors import StudyError
 from airflock.executors import Landed
+from airflock.untrusted import FormatError, from_outside, json_object, json_value
 
 FILE, LOCK = "evaluations.sqlite", "writer.lock"
 SCHEMA = """

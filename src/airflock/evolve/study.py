@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from airflock import __version__
-from airflock.doors import TextError, from_outside, is_file, read_toml
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_limits, read_objectives
@@ -22,6 +21,7 @@ from airflock.limits.limit import Limit
 from airflock.scenarios import formats, schema
 from airflock.scenarios.files import presets, tells_of_study
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import TextError, from_outside, is_file, read_toml
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
 LAYOUT = 1  # of the study folder; raised whenever an older folder could not be continued

@@ -8,9 +8,9 @@ from typing import Any
 import pandas as pd
 
 from airflock import atomic
-from airflock.doors import FormatError, from_outside, json_value
 from airflock.errors import StudyError
 from airflock.evolve.store import Store, values_of
+from airflock.untrusted import FormatError, from_outside, json_value
 
 DURATION = "duration"  # key of the scenario that short flights set, column of their table
 FLOWN = "duration_flown"  # that column beside `duration`, the time that a flight took

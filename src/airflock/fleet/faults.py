@@ -5,8 +5,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import from_outside, read_toml
 from airflock.errors import ScenarioError
+from airflock.untrusted import from_outside, read_toml
 
 KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",

@@ -18,7 +18,6 @@ from airflock.core.contract import Model
 from airflock.core.hearing import Hearing
 from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.doors import from_outside, json_value, read_text
 from airflock.errors import AirflockError, CardError
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
@@ -29,6 +28,7 @@ from airflock.onboard.safety import Safety
 from airflock.spelling import meant
 from airflock.topology import parameters as topologies
 from airflock.topology.registry import TOPOLOGIES
+from airflock.untrusted import from_outside, json_value, read_text
 from airflock.world import arena
 from airflock.world.place import Place, Shapes, polygon_fault
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airflock.doors import FormatError, TextError, from_outside, json_object, json_value, read_text
 from airflock.errors import LinkError
 from airflock.onboard.card import Card
 from airflock.onboard.node import Memory, Node, Out
+from airflock.untrusted import FormatError, TextError, from_outside, json_object, json_value, read_text
 
 VERSION = 1
 MOST_RADIOS = 16

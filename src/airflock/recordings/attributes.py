@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from airflock.doors import from_outside, json_object
 from airflock.errors import RecordingError, bounded
 from airflock.faults.registry import KINDS
 from airflock.scenarios.laws import MODELS
+from airflock.untrusted import from_outside, json_object
 
 FORMAT = 2
 FORMAT_KEY, CHECKSUM, LAW = "airflock_format", "airflock_checksum", "airflock_law"

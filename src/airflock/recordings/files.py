@@ -11,15 +11,14 @@ import xarray as xr
 
 from airflock import atomic
 from airflock.body.registry import BODIES
-from airflock.doors import from_outside
 from airflock.errors import RecordingError
 from airflock.machine import processor
 from airflock.metrics.registry import SETS
 from airflock.radios.registry import RADIOS
 from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
+from airflock.recordings.isolated import Opening
 from airflock.recordings.layout import check
-from airflock.recordings.opened import Opening
 from airflock.scenarios.families import Given
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
@@ -27,6 +26,7 @@ from airflock.scenarios.own_code import law_hash
 from airflock.sensors.registry import SENSORS
 from airflock.suffixes import RECORDINGS, suffix_fault
 from airflock.topology.registry import TOPOLOGIES
+from airflock.untrusted import from_outside
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:

@@ -16,7 +16,6 @@ from airflock.core.maths import FAR
 from airflock.core.parameters import Parameters, declarations, number_names
 from airflock.core.radio import Packets
 from airflock.core.vocabulary import Own, asks
-from airflock.doors import from_outside
 from airflock.engine import measure_frames, plan_of
 from airflock.errors import RecordingError
 from airflock.executors.scores import scores
@@ -34,6 +33,7 @@ from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
 from airflock.sensors.registry import SENSORS
 from airflock.topology.registry import TOPOLOGIES
+from airflock.untrusted import from_outside
 
 
 def score(

@@ -7,8 +7,8 @@ from typing import Any
 from airflock.core.parameters import number_names
 from airflock.core.radio import Packets
 from airflock.core.vectors import overruled
-from airflock.doors import is_file
 from airflock.errors import ScenarioError
+from airflock.untrusted import is_file
 
 LONGEST = 10  # files in a chain of extends
 # sections in which another kind means other keys

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core.fault import Fault, fault
-from airflock.doors import from_outside, is_file, read_toml
 from airflock.errors import ScenarioError
 from airflock.scenarios import formats
 from airflock.scenarios.extends import extended
@@ -19,6 +18,7 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
+from airflock.untrusted import from_outside, is_file, read_toml
 
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
     ".py": "code, not a scenario; a law flies a scenario: airflock run PRESET --law FILE.py (in Python: law=)",

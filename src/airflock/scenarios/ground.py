@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import is_file
 from airflock.errors import ScenarioError
 from airflock.scenes.outlines import ground_of
+from airflock.untrusted import is_file
 
 FROM_FILE = ("world.file", "world.simplify")
 GIVEN = ("corners", "obstacles", "heights")  # what the file says, and the scenario cannot say as well

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import is_file
 from airflock.errors import ParameterError, ScenarioError
 from airflock.scenarios import (
     checks,
@@ -30,6 +29,7 @@ from airflock.scenarios.gathering import Gathered, gathered
 from airflock.scenarios.ground import file_faults
 from airflock.scenarios.scenario import Scenario, start_separation
 from airflock.scenarios.sections import SECTIONS, Flight
+from airflock.untrusted import is_file
 
 
 def make(

@@ -13,8 +13,8 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 
 from airflock.core.contract import Model
-from airflock.doors import is_file
 from airflock.errors import RuleError, ScenarioError, bounded
+from airflock.untrusted import is_file
 
 
 def own_code(key: str, name: str, folder: Path | None = None, *, trust: bool) -> ModuleType:

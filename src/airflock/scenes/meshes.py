@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.doors import from_outside
 from airflock.errors import SceneError
 from airflock.scenes.headers import check_header
 from airflock.scenes.tree import segments, triangles
+from airflock.untrusted import from_outside
 from airflock.world import scenery
 from airflock.world.shapes import CLOSED
 

@@ -1,6 +1,6 @@
 """Outlines of fields as people have them: polygons of GeoJSON and KML files, in local metres.
 
-A file is untrusted: it is read through `doors`, and everything that is wrong with it is told at once.
+A file is untrusted: it is read through `untrusted`, and everything that is wrong with it is told at once.
 """
 
 import math
@@ -12,9 +12,9 @@ from typing import Any
 from shapely.geometry import Polygon
 from shapely.validation import explain_validity
 
-from airflock.doors import Element, FormatError, from_outside, json_object, read_text, xml
 from airflock.errors import ScenarioError, bounded
 from airflock.mavlink.coordinates import Site
+from airflock.untrusted import Element, FormatError, from_outside, json_object, read_text, xml
 
 MOST_CORNERS = 100_000  # of all polygons of a file
 MOST_KEPT = 500  # of one polygon that is flown in: each decision looks along lines of sight past all of them

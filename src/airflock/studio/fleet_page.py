@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.fleet.observer import Observer
-from airflock.studio.asked import Asked
 from airflock.studio.fleet_drawing import FOLLOWED, LINKS, WAYS, FleetDrawing
 from airflock.studio.fleet_tables import about, faults_of, members_table, notes_of, trouble_of
 from airflock.studio.measures import KEPT, Pairs
+from airflock.studio.requests import Asked
 from airflock.studio.room import note
 from airflock.studio.view import View
 

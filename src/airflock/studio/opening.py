@@ -4,11 +4,11 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING
 
 from airflock import atomic
-from airflock.doors import MOST_BYTES, FormatError, TextError, toml
 from airflock.errors import AirflockError, StudioError
 from airflock.scenarios.files import presets
 from airflock.studio.room import Room, note
 from airflock.studio.saving import free
+from airflock.untrusted import MOST_BYTES, FormatError, TextError, toml
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

@@ -6,10 +6,10 @@ from typing import Any
 
 from airflock.engine import Snapshot
 from airflock.errors import AirflockError
-from airflock.studio.asked import Asked
 from airflock.studio.flights import Flights
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
+from airflock.studio.requests import Asked
 
 MOST_BUSY = 0.05  # s of real time flown at most before the page is answered again
 

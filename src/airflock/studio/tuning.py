@@ -4,7 +4,6 @@ import html
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airflock.doors import from_outside, toml_value
 from airflock.errors import AirflockError, ScenarioError
 from airflock.evolve.bounds import studied
 from airflock.scenarios.scenario import Scenario
@@ -15,6 +14,7 @@ from airflock.studio.player import Player
 from airflock.studio.room import Room, note
 from airflock.studio.saving import free
 from airflock.studio.side import value_of
+from airflock.untrusted import from_outside, toml_value
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page

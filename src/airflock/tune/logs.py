@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from airflock import atomic
-from airflock.doors import from_outside, json_object, read_text
 from airflock.errors import RecordingError, StudyError
 from airflock.evolve.folder import write
 from airflock.identify.run import Identified, identify, read_heard
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import from_outside, json_object, read_text
 
 SCENARIO, TOLD = "identified.toml", "identified.json"
 Paths = Sequence[str | os.PathLike[str]]

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airflock.certify.asked import campaign_of
+from airflock.certify.request import campaign_of
 from airflock.errors import ScenarioError, StudyError
 from airflock.evolve.bounds import usual_space
 from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
-from airflock.tune.kept import keep_plan, kept_plan
+from airflock.tune.folder import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import plan_of
 from airflock.tune.reach import out_of_reach

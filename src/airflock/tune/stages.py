@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from airflock import atomic
-from airflock.certify.asked import campaign_of
 from airflock.certify.campaign import FOLDER
 from airflock.certify.certificate import Certificate
 from airflock.certify.executing import executor_for
+from airflock.certify.request import campaign_of
 from airflock.certify.run import run as certified
 from airflock.errors import ScenarioError
 from airflock.evolve.folder import open_folder, write
@@ -23,7 +23,7 @@ from airflock.evolve.study import make_study
 from airflock.evolve.winner import Result
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
-from airflock.tune.kept import document, read_steps
+from airflock.tune.folder import document, read_steps
 from airflock.tune.plan import Plan
 from airflock.tune.tuned import CERTIFICATE, STEPS, STUDY, TUNED
 

@@ -6,8 +6,8 @@ from importlib import import_module
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+from airflock.engine.cuda.compile_shortcuts import sparing
 from airflock.engine.cuda.kernel import ARGUMENTS
-from airflock.engine.cuda.sparing import sparing
 
 # dimensions and kind of every argument: r real, i 64-bit and s 32-bit whole numbers, u words
 KINDS = dict(zip(ARGUMENTS, (

@@ -11,7 +11,7 @@ import numpy as np
 
 from airflock.errors import RecordingError
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
-from airflock.recordings.opened import Opening
+from airflock.recordings.isolated import Opening
 from airflock.recordings.reader import PARTS
 
 GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970

@@ -10,7 +10,7 @@ from airflock.errors import RecordingError, gathering
 from airflock.recordings.imports import headers
 from airflock.recordings.imports.arrays import read_idtracker
 from airflock.recordings.imports.track import COMMAND, VELOCITY, Findings, Options, Track
-from airflock.recordings.opened import Opening
+from airflock.recordings.isolated import Opening
 
 OLD = {"keypoints": "keypoint", "individuals": "individual"}  # until movement 0.16
 

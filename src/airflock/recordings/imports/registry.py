@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from airflock.doors import from_outside
 from airflock.errors import RecordingError
 from airflock.recordings.imports import arrays, dataflash, movement, tables, ulog
 from airflock.recordings.imports.track import Findings, Options, Track
+from airflock.untrusted import from_outside
 
 Reader = Callable[[Path, Options, Findings], list[Track]]
 READERS: dict[str, tuple[str, Reader]] = {

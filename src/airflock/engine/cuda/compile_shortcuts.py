@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-from airflock.engine.sparing import Spared, call_type, exchanging, processed, rewritten
+from airflock.engine.compile_shortcuts import Spared, call_type, exchanging, processed, rewritten
 
 TRIED = (0, 30), (0, 30)  # first and last version of numba-cuda of which this was tried
 

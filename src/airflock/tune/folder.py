@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from airflock.certify.seeds import identity
-from airflock.doors import from_outside, json_object, read_text
 from airflock.errors import StudyError
 from airflock.evolve.folder import read, write
 from airflock.evolve.steps import Measured
@@ -13,6 +12,7 @@ from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.plan import Plan
 from airflock.tune.tuned import PLAN, START
+from airflock.untrusted import from_outside, json_object, read_text
 
 MOST_SEEDS = 1_000_000  # of each step of hardening
 

@@ -16,8 +16,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from airflock.doors import from_outside, is_file
 from airflock.errors import RecordingError
+from airflock.untrusted import from_outside, is_file
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # times as long it may take where processors are busy with other things

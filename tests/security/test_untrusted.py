@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airflock
-from airflock import doors
+from airflock import untrusted
 from airflock.errors import AirflockError, ScenarioError, bounded
 from airflock.evolve.study import load_study
 
@@ -31,15 +31,15 @@ from airflock.evolve.study import load_study
     ],
 )
 def test_text_beyond_bounds_is_refused(text, words):
-    with pytest.raises(doors.TextError) as fault:
-        doors.toml(text)
+    with pytest.raises(untrusted.TextError) as fault:
+        untrusted.toml(text)
     assert words in str(fault.value) and len(str(fault.value)) < 300
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 5000, "1" * 5000, "[1", "5e", None, b"{}", '{"a": 1e'])
 def test_json_beyond_bounds_or_damaged_is_refused(text):
-    with pytest.raises(doors.TextError):
-        doors.json_object(text)
+    with pytest.raises(untrusted.TextError):
+        untrusted.json_object(text)
 
 
 @given(st.text(alphabet="ab.=[]{}\"'#\\\n 01_,", max_size=80))
@@ -47,15 +47,15 @@ def test_within_bounds_the_door_reads_what_the_standard_parser_reads(text):
     try:
         wanted = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
-        with pytest.raises(doors.FormatError):
-            doors.toml(text)
+        with pytest.raises(untrusted.FormatError):
+            untrusted.toml(text)
     else:
-        assert doors.toml(text) == wanted
+        assert untrusted.toml(text) == wanted
 
 
 def test_brackets_dots_and_digits_inside_strings_and_comments_do_not_count():
     text = f'a = "{"[" * 99}{"." * 99}"  # {"{" * 99} {"1" * 999}\nb = """{"[" * 99}\n{"9" * 999}"""\n' + "c = '[[.'\n"
-    assert doors.toml(text)["c"] == "[[."
+    assert untrusted.toml(text)["c"] == "[[."
 
 
 @pytest.mark.parametrize(
