@@ -1,4 +1,4 @@
-"""Endings of the files that are written: the name of a file says its format."""
+"""Suffixes of the files that are written: the name of a file says its format."""
 
 import os
 from pathlib import Path

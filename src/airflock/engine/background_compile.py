@@ -1,4 +1,4 @@
-"""Aside: a driver compiled by another process, so that this one flies on without a halt.
+"""Background compile: a driver compiled by another process, so that this one flies on without a halt.
 
 Numba compiles under the interpreter's lock and keeps it for a tenth of a second at a time: a flight beside it would
 stand still as long. The other process keeps the driver in the cache, under its seal, and this one loads it from there.

@@ -1,4 +1,4 @@
-"""Asked: what other threads want done by the thread that flies, in the order in which they asked."""
+"""Requests: what other threads want done by the thread that flies, in the order in which they asked."""
 
 from collections.abc import Callable
 from queue import Empty, SimpleQueue

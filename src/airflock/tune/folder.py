@@ -1,4 +1,4 @@
-"""Kept: the plan of a tuning and its steps of hardening, as its folder keeps them."""
+"""Folder: the plan of a tuning and its steps of hardening, as its folder keeps them."""
 
 from collections.abc import Mapping
 from pathlib import Path
