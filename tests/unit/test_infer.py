@@ -61,7 +61,7 @@ def brief(monkeypatch):
     for module, name, value in (
         (search, "DRAWN", 5), (search, "RACE", ((4, 3), (2, 5))), (search, "SWEEPS", 0), (bootstrap, "ROUNDS", (2, 5)),
         (flights, "LADDER", (-1.0, 0.0, 1.0)), (bootstrap, "STEPS", 3), (select, "LONG", 6), (ridges, "WORST", 1),
-        (ridges, "BESIDE", 0), (noise, "FLOWN", 24),
+        (ridges, "WALKED", 1), (noise, "FLOWN", 24),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
 

@@ -1,4 +1,4 @@
-"""One driver compiled and kept by a process of its own; `engine.aside` starts it. Nobody imports this file.
+"""One driver compiled and kept by a process of its own; `engine.background_compile` starts it. No module imports it.
 
 What it is asked for comes by its standard input: the text of a driver, which holds every rule, so that no file of
 anybody's is run. The input stays open; its end means that whoever asked has gone.

@@ -2,7 +2,7 @@
 
 The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler and the
 processor. What runs is always the text that was generated, never a file's; compiled code is loaded only under a seal
-(`engine.sealed`), from a folder that belongs to the user alone (`airflock.cache`).
+(`engine.checksums`), from a folder that belongs to the user alone (`airflock.cache`).
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""A process of its own that opens one file and hands over plain arrays; run as a script by `recordings.opened`.
+"""A process of its own that opens one file and hands over plain arrays; run as a script by `recordings.isolated`.
 
 HDF5 is a large library in C that a damaged file can stop, crash or keep busy for ever, and it cannot be interrupted;
 readers of ArduPilot's logs go round and round in some. So they work here, on borrowed time and memory, and whoever

@@ -89,7 +89,7 @@ def _pickled(path: Path) -> str:
 def read_idtracker(file: xr.Dataset, path: Path, options: Options, findings: Findings) -> list[Track]:
     """Tracks of trajectories.h5 of idtracker.ai (its documented keys), or of any HDF5 file with such a dataset.
 
-    file : its arrays and attributes, as `recordings.opened` hands them over
+    file : its arrays and attributes, as `recordings.isolated` hands them over
     """
     if "trajectories" not in file:
         shown = ", ".join([str(name) for name in file.variables][:8]) or "nothing"
