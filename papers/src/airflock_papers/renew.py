@@ -94,6 +94,9 @@ def renew(
             each for each in str(header.get("renewed", "")).split("; ") if each and each.split(":")[0] not in parts
         ]
         told["renewed"] = "; ".join([*before, *(f"{part}: {texts()}" for part in parts)])
+        flown = {each.split(":")[0] for each in told["renewed"].split("; ")}
+        if table == "claims.toml" and set(paper.parts) <= flown:
+            told["texts"] = "of each part, below"
     page.write(
         folder, header["paper"], header["command"], claims, sections, above(text), header["seeds"], (table, file), told
     )

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.infer.candidates import Candidate
 from airflock.infer.fit import FINE, Fit, climb, closed_end, loss_at, open_ends, settle, spread
 from airflock.infer.flights import Flights, Noise, first_noise
+from airflock.infer.given_up import ways_beside
 from airflock.infer.likelihood import Model
 from airflock.infer.noise import Ends, own_noise
-from airflock.infer.ridges import ridges
+from airflock.infer.ridges import Ridges, ridges
 
 Array = NDArray[np.float64]
 ROUNDS = (3, 10)  # flights of each round, and of the last, which gives the intervals
@@ -58,10 +60,12 @@ def levels(numbers: int) -> tuple[float, float]:
     return 0.5 + 0.5 * SURE, 0.5 + 0.5 * SURE ** (1.0 / max(numbers, 1))
 
 
-def again(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] = lambda: None) -> Again:
+def again(
+    law: Candidate, model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] = lambda: None
+) -> Again:
     """Put a fit right by flights of its own law, and tell how sure it is.
 
-    spans : on which it was fitted
+    law : with all its numbers, also those that the model does without; spans : on which it was fitted
     """
     from scipy.stats import norm as normal
     from scipy.stats import t as student
@@ -71,6 +75,7 @@ def again(model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] 
     shares = levels(len(named) + (kinds[0].column >= 0))
     deepest = 0.5 * WIDER[1] * float(normal.ppf(shares[1])) ** 2
     fit, ways = ridges(model, fit, spans, deepest, say)
+    ways = Ridges((*ways.ways, *ways_beside(law, model, fit, spans, deepest, say)))
     fitted = fit.place
     flights = Flights(model, fitted, spans)
     curved, (below, above) = spread(model, fit, spans), open_ends(model, fit, spans)

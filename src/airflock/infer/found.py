@@ -135,12 +135,19 @@ def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
     missed = (
         f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""
     )
-    if len(laws) > 1:
-        ahead = laws[1].surprise - best.surprise
-        error = float(np.sqrt(len(ahead)) * ahead.std(ddof=1))
-        if ahead.sum() < APART * error:
-            return best, f"{best.name} explains the tracks best, but {laws[1].name} cannot be told from it{missed}"
+    if beside := rivals(laws)[:1]:
+        return best, f"{best.name} explains the tracks best, but {beside[0].name} cannot be told from it{missed}"
     return best, f"{best.name} explains the tracks best{missed}"
+
+
+def rivals(laws: list[Law]) -> list[Law]:
+    """Laws that cannot be told from the first, which explains the tracks best, by what each foretells."""
+    found = []
+    for law in laws[1:]:
+        ahead = law.surprise - laws[0].surprise
+        if ahead.sum() < APART * float(np.sqrt(len(ahead)) * ahead.std(ddof=1)):
+            found.append(law)
+    return found
 
 
 def tell(found: Inferred, model: Model, sure: Again) -> None:

@@ -85,14 +85,10 @@ def ridges(
 
 def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool) -> tuple[list[Way], Array | None]:
     """Ways along all ridges; and, where it may be left for it, a better place."""
-    curved = [curvature(model, fit, spans, way) for way in (WIDE, BOTH)]
-    covariances = [np.linalg.inv(each) for each in curved]
+    view = View(model, fit, spans, drop)
     named = [k for k, f in enumerate(fit.free) if f < model.named]
-    reach = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
-    alike = _alike(curved[1])
-    near = {k: [g for g in np.argsort(-alike[k]).tolist() if g in named and alike[k, g] > ALIKE] for k in named}
-    worst = [k for k in sorted(named, key=lambda k: -reach[k]) if reach[k] >= SHORTEST][:WORST]
-    tied = [k for k in sorted(named, key=lambda k: -alike[k, named].max()) if alike[k, named].max() > TIED]
+    worst = [k for k in sorted(named, key=lambda k: -view.reach[k]) if view.reach[k] >= SHORTEST][:WORST]
+    tied = [k for k in sorted(named, key=lambda k: -view.alike[k, named].max()) if view.alike[k, named].max() > TIED]
     ways: list[Way] = []
     for k, end in ((fit.free[k], end) for k in named for end in (0.0, 1.0)):
         found, fell = at_end(model, fit, spans, k, end)
@@ -101,17 +97,37 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
         if fell <= drop:
             ways.append(((found, max(fell, 0.0)), (found, max(fell, 0.0))))
     for k in list(dict.fromkeys([*worst, *tied]))[:WALKED]:
-        slope = np.zeros(len(fit.place))
-        slope[fit.free] = covariances[1][k] / covariances[1][k, k]
-        follow = [fit.free[g] for g in near[k]]
         for side in (-1.0, 1.0):
-            way, better = _walk(
-                model, fit, spans, fit.free[k], follow, side * slope, FIRST * float(reach[k]), drop, leave
-            )
+            way, better = view.walk(k, side, leave)
             if better is not None:
                 return ways, better
             ways.append(way)
     return ways, None
+
+
+class View:
+    """What the curvature about a fit says of the ways along its numbers; they are told by their places among the free.
+
+    reach : how far each goes by the curvature until the likelihood has fallen by `drop`
+    alike : how much any two act alike
+    """
+
+    def __init__(self, model: Model, fit: Fit, spans: Sequence[int], drop: float):
+        curved = [curvature(model, fit, spans, way) for way in (WIDE, BOTH)]
+        covariances = [np.linalg.inv(each) for each in curved]
+        self.model, self.fit, self.spans, self.drop = model, fit, spans, drop
+        self.covariance, self.alike = covariances[1], _alike(curved[1])
+        self.reach: Array = np.sqrt(2.0 * drop * np.maximum(*(np.diag(each) for each in covariances)))
+
+    def walk(self, k: int, side: float, leave: bool) -> tuple[Way, Array | None]:
+        """One way along the ridge of a number, down (-1) or up (1); and a better place, where it may be left for it."""
+        fit, covariance = self.fit, self.covariance
+        slope = np.zeros(len(fit.place))
+        slope[fit.free] = covariance[k] / covariance[k, k]
+        near = [g for g in np.argsort(-self.alike[k]).tolist() if self.alike[k, g] > ALIKE]
+        follow = [fit.free[g] for g in near if fit.free[g] < self.model.named]
+        first = FIRST * float(self.reach[k])
+        return _walk(self.model, fit, self.spans, fit.free[k], follow, side * slope, first, self.drop, leave)
 
 
 def at_end(model: Model, fit: Fit, spans: Sequence[int], number: int, end: float) -> tuple[Array, float]:

@@ -13,7 +13,7 @@ from airflock.infer import select
 from airflock.infer.bootstrap import again
 from airflock.infer.candidates import Candidate, candidate, scenarios_of
 from airflock.infer.fit import Fit
-from airflock.infer.found import Inferred, Law, Number, tell, verdict_of
+from airflock.infer.found import Inferred, Law, Number, rivals, tell, verdict_of
 from airflock.infer.leftover import left_over
 from airflock.infer.likelihood import Model
 from airflock.infer.maps import maps
@@ -93,10 +93,12 @@ def infer(
     )  # fmt: skip
     if best is None:
         return found
-    model, laws[0] = comparison.deeper(best, by_name[best.name])
+    comparison.contest(laws, by_name)
     found.best, found.verdict = verdict_of(laws)
     if found.best is not None:
-        sure = again(model, found.best.fit, comparison.spans, _teller(say, f"{best.name}, flown again"))
+        best, model = found.best, by_name[found.best.name]
+        teller = _teller(say, f"{best.name}, flown again")
+        sure = again(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
         tell(found, model, sure)
         if check:
             found.check = posterior(model, sure.place, sure.noise, check, _teller(say, "check"))
@@ -133,11 +135,23 @@ class _Comparison:
         laws.sort(key=lambda law: -law.gain)
         return laws, models
 
-    def deeper(self, best: Law, model: Model) -> tuple[Model, Law]:
-        """The best law after more searching, and without numbers that the others make up for; judged anew."""
-        say = _teller(self.say, f"{best.name}, simplified")
-        model, fit = select.simpler(self.laws[best.name], model, best.fit, say)
-        return model, self.judged(best.name, model, fit, say)
+    def contest(self, laws: list[Law], models: dict[str, Model]) -> None:
+        """Search deeper for the best law, and for each that cannot be told from it; laws are sorted anew.
+
+        A law may lose for want of searching alone: a short search ends on another hill now and then.
+        """
+        searched: set[str] = set()
+        while waiting := [law for law in (laws[0], *rivals(laws)) if law.name not in searched]:
+            law = waiting[0]
+            models[law.name], deeper = self.deeper(law, models[law.name])
+            laws[:] = sorted((deeper if each is law else each for each in laws), key=lambda each: -each.gain)
+            searched.add(law.name)
+
+    def deeper(self, law: Law, model: Model) -> tuple[Model, Law]:
+        """A law after more searching, and without numbers that the others make up for; judged anew."""
+        say = _teller(self.say, f"{law.name}, simplified")
+        model, fit = select.simpler(self.laws[law.name], model, law.fit, say)
+        return model, self.judged(law.name, model, fit, say)
 
     def judged(self, name: str, model: Model, fit: Fit, say: Callable[[], None]) -> Law:
         """How well a fitted law foretells what it has not seen."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
 from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
+from airflock.infer.given_up import taken_back
 from airflock.infer.hills import hills
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, scan
@@ -102,7 +103,8 @@ def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -
     other = profile(model, climb(model, found.place, found.free, model.few(), slopes=(WIDE,)), model.few(), say)
     other = settle(model, climb(model, other.place, other.free, sample(model), LONG), sample(model))
     found = hills(model, min(found, other, key=lambda each: each.loss), model.few(), sample(model), say)
-    return first_names(law, *without_spare(model, found, say), say)
+    model, found = first_names(law, *without_spare(model, found, say), say)
+    return taken_back(law, model, found, sample(model), say)
 
 
 def first_names(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:

@@ -33,7 +33,7 @@ def telling(model: Model, start: Array, begin: Array, spans: Sequence[int]) -> l
         u = start.copy()
         u[: model.named] = x
         places.append(u)
-    alive = [k for k in range(model.named) if k == model.usual or _acts(model, places, k, spans)]
+    alive = [k for k in range(model.named) if k == model.usual or acts(model, places, k, spans)]
     flat = np.concatenate([_slopes(model, u, alive, spans) for u in places])
     kept: list[int] = []
     basis = np.zeros((len(flat), 0))
@@ -49,7 +49,7 @@ def telling(model: Model, start: Array, begin: Array, spans: Sequence[int]) -> l
     return kept
 
 
-def _acts(model: Model, places: Sequence[Array], number: int, spans: Sequence[int]) -> bool:
+def acts(model: Model, places: Sequence[Array], number: int, spans: Sequence[int]) -> bool:
     """Whether a number changes the loss anywhere along its range."""
     for u in places:
         here = model.score(u, spans).loss()

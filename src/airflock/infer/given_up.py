@@ -1,0 +1,97 @@
+"""Given up: what numbers whose defaults explain the tracks as well mean for the intervals of the others."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airflock.infer.candidates import Candidate, Number
+from airflock.infer.fit import BOTH, FINE, Fit, by_powers, climb, curvature, followed, loss_at
+from airflock.infer.likelihood import Model
+from airflock.infer.ridges import View, Way
+from airflock.infer.told import acts
+
+AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
+DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
+EXACT = 0.05  # change of the log-likelihood by such a move, below which they do
+
+
+def taken_back(
+    law: Candidate, model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None]
+) -> tuple[Model, Fit]:
+    """The model with those numbers again that explain something far from their defaults, the others elsewhere.
+
+    A number is given up where no climb from the fit says anything for it. A walk may lead higher all the same.
+
+    law : with all its numbers
+    """
+    for number, fuller, i in fuller_models(law, model):
+        for side in (-1.0, 1.0):
+            view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
+            if view is None:
+                break
+            better = view.walk(view.fit.free.index(i), side, True)[1]
+            say()
+            if better is not None:
+                higher = climb(fuller, better, view.fit.free, spans, slopes=(FINE, BOTH))
+                return taken_back(law, fuller, higher, spans, say)
+    return model, fit
+
+
+def ways_beside(
+    law: Candidate, model: Model, fit: Fit, spans: Sequence[int], drop: float, say: Callable[[], None]
+) -> tuple[Way, ...]:
+    """Ways of a fit's numbers on which one that was given up leaves its default, and all others follow.
+
+    law : with all its numbers; drop : fall of the log-likelihood at which a way ends
+    """
+    found: list[Way] = []
+    for number, fuller, i in fuller_models(law, model):
+        ways = ways_of(fuller, fit, i, number.place(number.default), spans, drop)
+        found += [tuple((np.delete(place, i), fell) for place, fell in way) for way in ways]
+        say()
+    return tuple(found)
+
+
+def fuller_models(law: Candidate, model: Model) -> Iterator[tuple[Number, Model, int]]:
+    """Numbers that the model does without, the model with each, and its index there."""
+    assert model.law is not None
+    kept = model.law.numbers
+    for number in law.numbers:
+        if number not in kept:
+            several = tuple(other for other in law.numbers if other in kept or other == number)
+            yield number, Model(replace(law, numbers=several), model.tracks, model.scale), several.index(number)
+
+
+def ways_of(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float) -> list[Way]:
+    """Ways on which a number leaves a place; none where that would say nothing about the others.
+
+    They say nothing of a number that changes nothing; nor of one that the others make up for exactly, such as the unit
+    of all weights: no tracks could tell it, and its default is what the others are told in.
+
+    model : with the number; fit : without it
+    """
+    view = _view(model, fit, number, place, spans, drop)
+    return [] if view is None else [view.walk(view.fit.free.index(number), side, False)[0] for side in (-1.0, 1.0)]
+
+
+def _view(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float) -> View | None:
+    """The view from a fit along a number that it does without; None where that would say nothing about the others."""
+    u = np.insert(fit.place, number, place)
+    free = sorted([number, *(f + (f >= number) for f in fit.free)])
+    beside = Fit(u, free, fit.score, loss_at(model, u, free, spans))
+    far = model.score(u, spans).loss() > fit.score.loss() + drop  # its default lies beyond what is sought
+    if far or not acts(model, [u], number, spans) or exact(model, beside, number, spans):
+        return None
+    return View(model, beside, spans, drop)
+
+
+def exact(model: Model, fit: Fit, number: int, spans: Sequence[int]) -> bool:
+    """Whether the others make up for a number exactly, by powers of it or along a line."""
+    x = float(fit.place[number])
+    moved = followed(fit, curvature(model, fit, spans, BOTH), number, x + (AWAY if x < 0.5 else -AWAY))
+    here = model.score(fit.place, spans).loss()
+    return any(
+        abs(model.score(u, spans).loss() - here) < EXACT
+        for u in (np.clip(moved, 0.0, 1.0), by_powers(model, fit, moved, number, spans))
+    )
