@@ -18,9 +18,9 @@ def presets(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """List the presets, show one as TOML, or derive a starting set for any speed.
+    """List the presets, show one as TOML, or derive a starting set for a speed (--for-speed 12 > mine.toml).
 
-    Example: airflock presets --for-speed 12 > mine.toml
+    Example: airflock presets vasarhelyi_2018/4ms
     """
     from airflock.scenarios import files
 

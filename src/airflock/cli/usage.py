@@ -7,6 +7,7 @@ from typing import Any
 from airflock.spelling import meant
 
 PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
+ONE_SEED = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
 
 
 def usage_fault(fault: Any, words: Sequence[str]) -> str:
@@ -26,6 +27,8 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
         known = [name for one in context.command.params for name in one.opts] if context is not None else []
         same = [name for name in PLACES if name in known and fault.option_name in (*PLACES, "--output")]
         hint = f"; did you mean {same[0]}?" if same else _near(fault.option_name, [*known, "--help"], context)
+        if fault.option_name == ONE_SEED and "--first-seed" in known:
+            hint = "; did you mean --first-seed (of one flight), or --seeds (how many flights)?"
         return f"{fault.option_name}: unknown option{hint}"
     unknown = re.match(r"No such command '(.*?)'", message)
     if unknown is not None:
@@ -40,7 +43,9 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
         return f"{fault.option_name} needs a value"
     extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
     if extra is not None:
-        return f"unexpected {extra[1]}{_example(context)}"
+        takes = [_name(one) for one in context.command.params if one.param_type_name == "argument"]
+        more = f"; it takes {' '.join(takes)} and options" if takes else "; it takes options alone"
+        return f"unexpected {extra[1]}{more}{_example(context)}"
     return str(fault.format_message()).strip().rstrip(".") + _example(context)
 
 
