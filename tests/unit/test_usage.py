@@ -1,6 +1,8 @@
 """A wrong command line ends with one line in the words of every other fault, and with status 2."""
 
 import re
+from bdb import BdbQuit
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
@@ -59,6 +61,31 @@ def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys
     assert ended.value.code == 2 and told.out == ""
     assert told.err.startswith(f"airflock: {line}")
     assert len(told.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("after", [0, 30], ids=["in the probe", "in the flight"])
+def test_a_debugger_that_is_left_ends_the_command(after, tmp_path, monkeypatch, capsys):
+    stops = []
+
+    def leave():
+        stops.append(None)
+        if len(stops) > after:
+            raise BdbQuit
+
+    text = (
+        (Path(__file__).parents[2] / "examples" / "own_rule.py")
+        .read_text()
+        .replace("    away =", "    breakpoint()\n    away =")
+    )
+    (tmp_path / "mine.py").write_text(text)
+    monkeypatch.setattr("sys.breakpointhook", leave)
+    flight = ["--device", "python", "--agents", "12", "--duration", "4"]
+    monkeypatch.setattr(
+        "sys.argv", ["airflock", "run", "vasarhelyi_2018/4ms", "--law", str(tmp_path / "mine.py"), *flight]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2 and capsys.readouterr().err.splitlines()[-1] == "airflock: interrupted"
 
 
 def test_the_nearest_choice_is_told():

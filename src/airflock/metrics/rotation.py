@@ -1,4 +1,7 @@
-"""Rotation about a point, the arena's centre (Vásárhelyi et al. 2018, Eq. 1): 1 counter-clockwise, -1 clockwise, 0 neither."""
+"""Rotation about the arena's centre (Vásárhelyi et al. 2018, Eq. 1): 1 counter-clockwise, -1 clockwise, 0 neither.
+
+The centre is the point metrics.centre_x, centre_y, the origin unless it is given.
+"""
 
 from typing import NamedTuple
 

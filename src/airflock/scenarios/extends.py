@@ -22,7 +22,8 @@ def extended(document: Mapping[str, Any], where: str, folder: Path | None, read:
     """A document with everything of the file that it extends, and which file that was ("" for none).
 
     Keys of the document go before those of the file. Where it names another kind of model, body, sensor, radio, scene,
-    goals or start, that section's other keys are not taken over. Neither is what a paper published of the file, nor its title.
+    goals or start, that section's other keys are not taken over. Neither is what a paper published of the file, nor
+    its title.
 
     where  : name of the document, for faults
     folder : where the names of files are looked for
