@@ -78,10 +78,10 @@ def _outside(short: Mapping[str, tuple[str, float]]) -> list[str]:
     """What lies outside its range of --agents and --duration, each as it is written and as a number."""
     if not short:
         return []
-    from airflock.core.parameters import declarations, quantity_fault
+    from airflock.core.parameters import Quantity, declarations, quantity_fault
     from airflock.scenarios.sections import Flight
 
-    known = {name: declared for name, declared, _ in declarations(Flight)}
+    known = {name: declared for name, declared, _ in declarations(Flight) if isinstance(declared, Quantity)}
     return [
         f"--{key} {written} lies outside {known[key].span}"
         for key, (written, number) in short.items()
