@@ -145,4 +145,4 @@ def _print(result: Any) -> None:
         console.print(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})", highlight=False, markup=False)
     if result.dead:
         return
-    console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False)
+    console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False, soft_wrap=True)
