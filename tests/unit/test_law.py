@@ -161,10 +161,7 @@ def decide(own, p):
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        (
-            {},
-            "lacks Parameters (a record of its numbers, derived from airflock.Parameters), COMMAND (what decide returns",
-        ),
+        ({}, "lacks Parameters (a record of its numbers, derived from airflock.Parameters), COMMAND (what"),
         ({"Parameters": Parameters, "COMMAND": "velocity"}, "lacks decide (the rule itself)"),
         ({"Parameters": Parameters, "COMMAND": "thrust", "decide": decide}, "'thrust' is none of velocity"),
         (

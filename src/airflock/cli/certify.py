@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
 Where = Annotated[
@@ -107,17 +108,17 @@ def certify(
     faults: list[str] = []
     seconds, campaign = 1.0, None
     also: dict[str, Any] = {}
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
-    with options.gathering(faults):
+    with gathering(faults):
         seconds = options.time_of(budget)
-    with options.gathering(faults):
+    with gathering(faults):
         found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
         campaign = campaign_of(found, limit or [], confidence, flights, **how)
         also = {"keys": asked(campaign, tolerance_of or tolerance, split), "split": split}
         also["axes"] = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
-    with options.gathering(faults):
+    with gathering(faults):
         check_options(seconds, timeout, scheduler, device)
     if resume and out is None:
         faults.append("--resume: name the certificate whose flights are to be continued with --out")

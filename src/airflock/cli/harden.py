@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import SCENARIOS
 
 NUMBER = 6  # columns that a number takes: a narrow terminal must not cut it off
@@ -59,11 +59,11 @@ def harden(
 
     faults: list[str] = []
     found: list[Any] = []
-    with options.gathering(faults):
+    with gathering(faults):
         found = _optima(scenario, options.settings(changes, None, duration), trust)
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(found) + 1))]
     for place in places:
-        with options.gathering(faults):
+        with gathering(faults):
             options.writable((place, SCENARIOS))
     again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):

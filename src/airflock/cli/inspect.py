@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, gathering
 from airflock.untrusted import from_outside, is_file, read_text
 
 
@@ -61,7 +61,7 @@ def validate(
     faults: list[str] = []
     for name in files:
         found: list[str] = []
-        with options.gathering(found):
+        with gathering(found):
             _validate(name, changed, law, trust)
         faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
     options.refuse(faults)

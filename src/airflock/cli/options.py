@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from airflock.errors import ScenarioError
-from airflock.errors import gathering as gathering  # verbs say options.gathering
+from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import suffix_fault
 from airflock.untrusted import from_outside, toml_value
 

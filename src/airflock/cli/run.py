@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS, TABLES
 
 
@@ -36,9 +37,9 @@ def run(
     from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((save, RECORDINGS), (plot, PICTURES))
-    with options.gathering(faults):
+    with gathering(faults):
         changed = options.settings(changes, agents, duration)
         found = load(scenario, changed, law, trust=trust)
     options.refuse(faults)
