@@ -26,6 +26,22 @@ def airflock(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help tells"),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--memeber", "3"], "unrecognized arguments: --memeber 3"),
+        (
+            ["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"],
+            "argument --member: invalid int value: 'x'",
+        ),
+    ],
+)
+def test_a_wrong_command_line_of_a_node_is_one_line(airflock, words, said):
+    code, out, lines = airflock("fly", "mission.json", "--member", "3", *words)
+    assert code == 2 and not out and len(lines) == 1 and lines[0].startswith(f"airflock: {said}")
+
+
 def test_a_mission_is_prepared_checked_and_never_overwritten(airflock, tmp_path):
     code, out, _ = airflock("fly", "prepare", REAL, *HERE, "--json")
     made = json.loads(out)

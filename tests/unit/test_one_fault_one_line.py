@@ -97,6 +97,7 @@ def test_a_file_without_a_law_says_what_to_write(tmp_path):
     [
         ("fish.csv", "is a table, not a scenario; airflock import makes a recording of it"),
         ("log.ulg", "is a flight log, not a scenario; airflock import"),
+        ("mission.json", "is JSON, not a scenario (TOML); airflock watch"),
         ("tracks.npy", "is arrays, not a scenario; airflock import"),
         ("mine.toml", "is not a scenario file (TOML): Expected '='"),
         ("mine.txt", "is not a scenario file (TOML): Expected '='"),

@@ -24,6 +24,7 @@ IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: 
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
     ".py": "code, not a scenario; a law flies a scenario: airflock run PRESET --law FILE.py (in Python: law=)",
     ".nc": "a recording, not a scenario; airflock score measures it (in Python: airflock.load_recording)",
+    ".json": "JSON, not a scenario (TOML); airflock watch shows the fleet of a flight card",
     **dict.fromkeys((".csv", ".tsv", ".parquet"), f"a table, {IMPORTED}"),
     **dict.fromkeys((".ulg", ".bin", ".tlog"), f"a flight log, {IMPORTED}"),
     **dict.fromkeys((".h5", ".hdf5", ".npy", ".npz"), f"arrays, {IMPORTED}"),
