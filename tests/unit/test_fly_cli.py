@@ -31,10 +31,8 @@ def airflock(monkeypatch, capsys, tmp_path):
     [
         ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help tells"),
         (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--memeber", "3"], "unrecognized arguments: --memeber 3"),
-        (
-            ["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"],
-            "argument --member: invalid int value: 'x'",
-        ),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"], "argument --member: invalid int value"),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--i-am"], "unrecognized arguments: --i-am; "),
     ],
 )
 def test_a_wrong_command_line_of_a_node_is_one_line(airflock, words, said):
