@@ -11,6 +11,8 @@ from airflock.cli.main import app, main
 from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
 from airflock.plots.picture import KINDS
+from airflock.recordings.sweeps import shown
+from airflock.scenarios.files import load
 
 
 @pytest.mark.parametrize(
@@ -86,6 +88,12 @@ def test_a_debugger_that_is_left_ends_the_command(after, tmp_path, monkeypatch, 
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2 and capsys.readouterr().err.splitlines()[-1] == "airflock: interrupted"
+
+
+def test_a_sweep_shows_what_flights_are_judged_by_and_else_their_order():
+    named = {"vasarhelyi_2018/4ms": "fitness", "zapotecatl_2016/best": "quality", "vicsek_1995/ordered": "polarisation"}
+    assert {name: shown(None, [load(name)]) for name in named} == named
+    assert shown(None, [load("vasarhelyi_2018/4ms", {"metrics.kind": "order"})]) == "polarisation"
 
 
 def test_the_nearest_choice_is_told():

@@ -44,7 +44,7 @@ def sweep(
     ] = None,
     show: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, or what comes nearest"),
+        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, quality or polarisation"),
     ] = None,
 ) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
