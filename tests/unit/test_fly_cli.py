@@ -131,3 +131,17 @@ def test_a_fleet_on_the_real_clock_tells_what_it_cost(airflock):
     code, out, _ = airflock("fleet", REAL, *short, "--mode", "tasks", "--body", "quadrotor", "--json")
     (run,) = json.loads(out)["runs"]
     assert code == 0 and run["load"]["ticks"] > 0 and run["load"]["cores"] > 0.0 and len(run["phases"]) == 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fly", "prepare", REAL, *HERE],
+        ["fleet", REAL, "--agents", "2", "--duration", "1", "--set", "world.side=120"],
+        ["plot", REAL, "--kind", "rules", "--out", "rules.png"],
+    ],
+    ids=["fly prepare", "fleet", "plot"],
+)
+def test_how_a_value_was_read_is_told(airflock, words):
+    code, _, lines = airflock(*words, "--set", "delay=400ms")
+    assert code == 0 and "note: radio.delay = 400 ms is 0.4 s" in lines

@@ -124,8 +124,7 @@ def certify(
         faults.append("--resume: name the certificate whose flights are to be continued with --out")
     options.refuse(faults)
     assert campaign is not None
-    for text in campaign.scenario.notes:
-        tables.say(f"note: {text}")
+    tables.say_notes(campaign.scenario.notes)
     if scheduler is None:
         options.compile_aloud(campaign.flown, precision, device)
     flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
@@ -217,8 +216,7 @@ def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     if as_json:
         tables.emit_json({"same": found.same, **vars(found)})
     else:
-        for note in found.notes:
-            tables.say(f"note: {note}")
+        tables.say_notes(found.notes)
         for fault in found.faults:
             tables.say(f"airflock: {path}: {fault}")
         said = "same bits, bounds computed again" if found.same else "does not hold"

@@ -102,8 +102,7 @@ def evolve(
     check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
-    for text in study.notes:
-        tables.say(f"note: {text}")
+    tables.say_notes([*(note for each in study.scenarios for note in each.notes), *study.notes])
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
     with options.searching(study, quiet or as_json) as (watch, note):

@@ -111,6 +111,7 @@ def fleet(
     if against not in (None, "simulator"):
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
+    tables.say_notes(found.notes)
     operator = _operator(ground)
     options.refuse(individuals.refused(found))
     stops = True if silence is None and not against else silence

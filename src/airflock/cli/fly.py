@@ -120,8 +120,9 @@ def prepare(
         for name, key, share in loads
         if share > SHARE
     ]
-    if faults:
+    if faults or found is None:
         raise CardError(faults)
+    tables.say_notes(found.notes)
     files = (out, out.with_suffix(".key"), out.with_suffix(".operator"))
     try:
         made = write_card(files[0], document)

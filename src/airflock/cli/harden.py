@@ -74,6 +74,7 @@ def harden(
     if again and limit:
         faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
     options.refuse(faults)
+    tables.say_notes(note for each in found for note in each.notes)
     numbers = range(first_seed, first_seed + seeds)
     if again:
         stricter = (r_coll or 1.0, delay or 1.0)

@@ -43,8 +43,7 @@ def run(
         changed = options.settings(changes, agents, duration)
         found = load(scenario, changed, law, trust=trust)
     options.refuse(faults)
-    for note in found.notes:
-        tables.say(f"note: {note}")
+    tables.say_notes(found.notes)
     numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     if scheduler is None:
         device = picked(flights, device, precision=precision, say=tables.say)

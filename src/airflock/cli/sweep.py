@@ -62,8 +62,7 @@ def sweep(
         fixed = options.settings(changes, agents, duration)
     keys, points = _grid(over, plot, faults)
     scenarios, show = _planned(scenario, points, fixed, law, trust, show, faults)
-    for note in alike(dict.fromkeys(note for found in scenarios for note in found.notes)):
-        tables.say(f"note: {note}")
+    tables.say_notes(alike(dict.fromkeys(note for found in scenarios for note in found.notes)))
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
     if scheduler is None:
         options.tell_time([found for found in scenarios for _ in numbers], threads, device)

@@ -71,6 +71,7 @@ def tune(
             found = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
     options.refuse(faults)
     assert found is not None
+    tables.say_notes(found.notes)
     options.compile_aloud(found, 32, "cpu")
     what: Any = found if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
