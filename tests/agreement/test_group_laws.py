@@ -167,7 +167,7 @@ def test_the_law_of_a_group_may_lie_in_a_file_or_be_given(wary, tmp_path):
         ({"kind": "viragh_2014", "p_repp": 1.0}, r"groups\[0\].model.p_repp: unknown key"),
         ({"kind": "viragh_2014", "p_rep": -1.0}, r"groups\[0\].model.p_rep = -1 .* lies outside"),
         ({"kind": "hawk.py"}, r"groups\[0\].model.kind = 'hawk.py': no such file"),
-        ({"kind": 3}, r"groups\[0\].model.kind = 3 is missing or not a name"),
+        ({"kind": 3}, r"groups\[0\].model.kind = 3 is not a name"),
     ],
 )
 def test_bad_laws_of_groups_are_one_line_each(model, said):

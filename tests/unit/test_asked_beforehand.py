@@ -59,7 +59,7 @@ def test_a_picture_of_three_keys_is_refused(grounded, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "shown"),
-    [(BEST, "quality"), ("vicsek_1995/transition", "phi_vel"), ("vasarhelyi_2018/4ms", "fitness")],
+    [(BEST, "quality"), ("vicsek_1995/transition", "polarisation"), ("vasarhelyi_2018/4ms", "fitness")],
 )
 def test_what_is_shown_by_default_is_reported(name, shown):
     key = {"vicsek_1995/transition": "model.eta"}.get(name, "agents")

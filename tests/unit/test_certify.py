@@ -100,6 +100,14 @@ def test_what_was_interrupted_ends_as_if_it_had_not_been(tmp_path):
     assert found == wanted
 
 
+def test_flights_of_a_folder_that_does_not_stay_are_not_said_to_be_kept(tmp_path):
+    def stopped(parameters, own):
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match=r"interrupted: 0 flights are not kept; with --out .* they are"):
+        flown(campaign(), tmp_path / "a", 0.0, score=stopped, kept=False)
+
+
 def test_a_folder_of_another_campaign_is_refused(tmp_path):
     flown(campaign(), tmp_path / "a", 0.0)
     with pytest.raises(StudyError, match="already holds this campaign; continue it with --resume"):

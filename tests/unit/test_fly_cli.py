@@ -26,6 +26,20 @@ def airflock(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "the following arguments are required: --autopilot, --radio; python -m airflock.onboard --help tells"),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--memeber", "3"], "unrecognized arguments: --memeber 3"),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--member", "x"], "argument --member: invalid int value"),
+        (["--autopilot", "udp:a:1", "--radio", "udp:a:2", "--i-am"], "unrecognized arguments: --i-am; "),
+    ],
+)
+def test_a_wrong_command_line_of_a_node_is_one_line(airflock, words, said):
+    code, out, lines = airflock("fly", "mission.json", "--member", "3", *words)
+    assert code == 2 and not out and len(lines) == 1 and lines[0].startswith(f"airflock: {said}")
+
+
 def test_a_mission_is_prepared_checked_and_never_overwritten(airflock, tmp_path):
     code, out, _ = airflock("fly", "prepare", REAL, *HERE, "--json")
     made = json.loads(out)
@@ -117,3 +131,17 @@ def test_a_fleet_on_the_real_clock_tells_what_it_cost(airflock):
     code, out, _ = airflock("fleet", REAL, *short, "--mode", "tasks", "--body", "quadrotor", "--json")
     (run,) = json.loads(out)["runs"]
     assert code == 0 and run["load"]["ticks"] > 0 and run["load"]["cores"] > 0.0 and len(run["phases"]) == 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fly", "prepare", REAL, *HERE],
+        ["fleet", REAL, "--agents", "2", "--duration", "1", "--set", "world.side=120"],
+        ["plot", REAL, "--kind", "rules", "--out", "rules.png"],
+    ],
+    ids=["fly prepare", "fleet", "plot"],
+)
+def test_how_a_value_was_read_is_told(airflock, words):
+    code, _, lines = airflock(*words, "--set", "delay=400ms")
+    assert code == 0 and "note: radio.delay = 400 ms is 0.4 s" in lines

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import toys
+from airflock.cli import harden as cli_harden
 from airflock.engine import score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import again, harden
 from airflock.evolve.sensitivity import sensitivity
 from airflock.evolve.space import with_parameters
+from airflock.evolve.steps import Measured
 from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
 from airflock.executors.in_process import InProcess
@@ -200,3 +202,21 @@ def test_sensitivity_finds_the_share_of_each_parameter(tmp_path):
             assert table["ST"].to_numpy() == pytest.approx([0.2, 0.8, 0.0], abs=0.05)
         else:
             assert table["mu_star"].to_numpy() == pytest.approx([1.0, 2.0, 0.0], abs=1e-9)
+
+
+def test_a_narrow_terminal_is_told_every_number(monkeypatch, capsys):
+    named = "half of: v_shill down, r0_shill up again"
+    steps = [
+        Measured(
+            name, "", {}, 0.7123, 33.75, 0.125, (0.01234, -0.005, 0.0295), (1.625, 1.125, 2.125), {"f_wall": 0.987},
+            1.0, -12.3, False, verdict,
+        )
+        for name, verdict in (("optimum", ""), (named, "undone: gains neither distance nor room at walls"))
+    ]  # fmt: skip
+    monkeypatch.setenv("COLUMNS", "80")
+    cli_harden._print("mine.toml", steps, 60)
+    told = capsys.readouterr().out
+    assert "…" not in told
+    for text in ("0.7123", "33.8", "0.125", "0.987", "100 %", "-12.3", "0.0123 (-0.005 to 0.0295)", "1.62 m (1.12 to"):
+        assert text in told, text
+    assert f"{named}: undone: gains neither distance nor room at walls; cost" in told

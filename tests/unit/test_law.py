@@ -161,8 +161,8 @@ def decide(own, p):
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ({}, "lacks Parameters"),
-        ({"Parameters": Parameters, "COMMAND": "velocity"}, "lacks decide"),
+        ({}, "lacks Parameters (a record of its numbers, derived from airflock.Parameters), COMMAND (what"),
+        ({"Parameters": Parameters, "COMMAND": "velocity"}, "lacks decide (the rule itself)"),
         ({"Parameters": Parameters, "COMMAND": "thrust", "decide": decide}, "'thrust' is none of velocity"),
         (
             {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": lambda dx: dx},

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import airflock
+from airflock.errors import RecordingError
 from airflock.metrics.registry import SETS
 from airflock.recordings.lengths import IN_BODIES, in_bodies
 from airflock.recordings.scores import measure, not_told, scenario_of
@@ -12,7 +13,7 @@ from processes import called
 
 GIVEN = {
     "r_coll": 1.0, "r_cluster": 3.0, "r_comm": 2.0, "r_b": 0.8, "r_flock": 5.0, "max_e": 20.0, "v_flock": 3.0,
-    "v_tol": 1.0, "r_body": 0.5, "r_tol": 2.0, "r_safe": 1.0,
+    "v_tol": 1.0, "r_body": 0.5, "r_tol": 2.0, "r_safe": 1.0, "centre_x": 26.0, "centre_y": 26.0,
 }  # fmt: skip
 
 
@@ -70,3 +71,18 @@ def test_the_command_says_what_to_give(tmp_path, seed):
     assert "n_coll" in called("score", file, "--body-length", "0.5").stdout
     wrong = called("score", file, "--body-length", "-1")
     assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1 and "body_length = -1 m" in wrong.stderr
+
+
+def test_a_rotation_is_told_where_its_centre_is(tmp_path, seed):
+    """Tracks moved elsewhere are the same motion: nothing told of them may change."""
+    recording = tracks(seed)
+    moved = recording.assign(position=recording["position"] + 500.0)
+    here, there = airflock.score(recording), airflock.score(moved)
+    assert list(here) == list(there) and here.attrs["not_told"]["phi_lap"] == ("centre_x", "centre_y")
+    for name in here:
+        assert here[name][0] == pytest.approx(there[name][0], rel=1e-3, nan_ok=True), name
+    about = [{"metrics.centre_x": place, "metrics.centre_y": place} for place in (26.0, 526.0)]
+    laps = [airflock.score(one, settings=at)["phi_lap"][0] for one, at in zip((recording, moved), about, strict=True)]
+    assert laps[0] == pytest.approx(laps[1], abs=1e-3)
+    with pytest.raises(RecordingError, match="mine: has no phi_lap, as tracks do not say"):
+        airflock.plots.rotations({"mine": recording})

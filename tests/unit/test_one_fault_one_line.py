@@ -80,3 +80,32 @@ def test_a_key_of_the_search_that_stands_at_the_top_of_a_study_is_told_its_place
         f"{file}: generations: unknown key; did you mean search.generations?",
         f"{file}: titel: unknown key; did you mean title?",
     ]
+
+
+def test_a_file_without_a_law_says_what_to_write(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("agents = 5\n[world]\narena = 'square'\n")
+    with pytest.raises(ScenarioError) as told:
+        airflock.load(file)
+    (line,) = told.value.faults
+    written = 'write a law under [model], for instance kind = "vasarhelyi_2018", or begin the file with extends ='
+    assert f"model.kind is missing; {written}" in line and "couzin_2002" in line and "None" not in line
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("fish.csv", "is a table, not a scenario; airflock import makes a recording of it"),
+        ("log.ulg", "is a flight log, not a scenario; airflock import"),
+        ("mission.json", "is JSON, not a scenario (TOML); airflock watch"),
+        ("tracks.npy", "is arrays, not a scenario; airflock import"),
+        ("mine.toml", "is not a scenario file (TOML): Expected '='"),
+        ("mine.txt", "is not a scenario file (TOML): Expected '='"),
+    ],
+)
+def test_what_is_no_scenario_says_what_takes_it(tmp_path, name, line):
+    (tmp_path / name).write_text("frame,fish,x,y\n0,1,2.5,3.5\n")
+    for take in (airflock.load, airflock.validate):
+        with pytest.raises(ScenarioError) as told:
+            take(tmp_path / name)
+        assert told.value.faults[0].startswith(f"{tmp_path / name}: {line}") and len(told.value.faults) == 1

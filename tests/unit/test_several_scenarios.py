@@ -183,7 +183,8 @@ def test_all_faults_of_scenarios_are_told_together():
         ({"scenarios": ["vasarhelyi_2018/6ms", "vicsek_1995/ordered"]}, "one set of numbers needs one law"),
         ({"scenario": "vasarhelyi_2018/6ms", "over_scenarios": "best"}, "'best' is none of mean, worst"),
         ({"scenario": "vasarhelyi_2018/6ms", "set": 3}, "set = 3 is not a table"),
-        ({}, "scenario = None is missing or not a name"),
+        ({}, 'scenario is missing; write scenario = "NAME", of a preset or a scenario file'),
+        ({"scenario": 3}, "scenario = 3 is not a name; write"),
     ],
 )
 def test_each_fault_of_several_scenarios_is_one_line(document, words):

@@ -29,7 +29,7 @@ def test_a_file_that_only_extends_flies_what_it_extends(tmp_path):
     mine, base = load(written(tmp_path, f'extends = "{NAME}"\n')), load(NAME)
     for section in ("parameters", "body", "sensors", "radio", "wind", "world", "start", "metrics", "flight", "scene"):
         assert getattr(mine, section) == getattr(base, section), section
-    assert not mine.published and "extends" not in mine.document
+    assert not mine.published and not {"extends", "title"} & set(mine.document)  # its title tells of other drones
     assert mine.notes[0].startswith(f"extends {NAME}")
 
 
@@ -125,7 +125,18 @@ def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path)
     assert any("a factor of 354" in note for note in blind.notes)
     held = load("vasarhelyi_2018/4ms", {**plain, "world.edges": "periodic", "world.side": 10.0}, law="vicsek_1995")
     assert not any("walls" in note or "factor" in note for note in held.notes)
-    words = ("no rule for walls", "hardly meant", "are its set")
+    field = {
+        "world.walls": "every_edge",
+        "world.arena": "polygon",
+        "world.corners": [[0, 0], [300, 0], [300, 150], [150, 150], [150, 300], [0, 300]],
+    }
+    beside = load("vasarhelyi_2018/4ms", {**field, "agents": 12})
+    assert any(
+        note.startswith("phi_lap tells the rotation about (0, 0) m, which does not lie") for note in beside.notes
+    )
+    about = load("vasarhelyi_2018/4ms", {**field, "agents": 12, "metrics.centre_x": 75.0, "metrics.centre_y": 75.0})
+    assert not any("phi_lap" in note for note in about.notes)
+    words = ("no rule for walls", "hardly meant", "are its set", "phi_lap")
     for name in presets():
         assert not any(word in note for note in load(name).notes for word in words), name
 

@@ -15,12 +15,14 @@ import airflock
 from airflock.certify.request import campaign_of
 from airflock.certify.seeds import identity
 from airflock.cli.options import time_of
+from airflock.engine import score_flights
 from airflock.errors import RecordingError, ScenarioError, StudyError
 from airflock.evolve.race import ROUNDS
 from airflock.evolve.store import Store
 from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
+from airflock.tune.assumed import defaults
 from airflock.tune.folder import MOST_SEEDS
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
 from airflock.tune.reach import out_of_reach
@@ -102,6 +104,36 @@ def test_the_folder_holds_what_to_fly_what_was_shown_and_a_report(done):
         assert text.replace("<", "&lt;").replace(">", "&gt;") in page or text in page
     assert 'src="data:image/png' in page and "http" not in page
     assert (folder / "figures.pdf").read_bytes().startswith(b"%PDF")
+    for row in (
+        ("radio.delay", "0.4 s"),
+        ("duration", "20.0 s"),
+        ("world.side", "120.0 m"),
+        ("model.v_flock", "6.0 m/s"),
+    ):
+        assert "<tr><td>{}</td><td>{}</td>".format(*row) in page
+
+
+@pytest.mark.parametrize(
+    ("settings", "are", "are_not"),
+    [
+        ({}, {"body.tau", "sensors.scale"}, {"radio.near", "wind.gust_time"}),
+        ({"radio.kind": "links", "wind.gust": 1.0}, {"radio.near", "wind.gust_time"}, {"radio.loss_at", "wind.at_6m"}),
+        ({"radio.loss": 0.1, "wind.kind": "dryden"}, {"radio.loss_at", "wind.at_6m"}, {"wind.gust_time", "radio.far"}),
+    ],
+)
+def test_only_numbers_that_a_flight_reads_are_assumed(settings, are, are_not):
+    """Brute force: what is left out changes no bit of a flight when it is changed."""
+    scenario = make(MINE, "mine", {"duration": 2.0, **settings})
+    told = {key for key, _, _ in defaults(scenario)}
+    assert are <= told and not are_not & told
+    others = [make(MINE, "mine", {"duration": 2.0, **settings, key: 12.5}) for key in are_not]
+    flown, *same = score_flights([scenario, *others], [1] * 3, device="python")
+    assert same == [flown] * 2
+
+
+def test_numbers_of_groups_are_assumed():
+    grouped = make({**MINE, "groups": [{"agents": 2, "body": {"tau": 2.0}}]}, "mine")
+    assert {"body.tau", "body.a_max", "sensors.noise"} <= {key for key, _, _ in defaults(grouped)}
 
 
 def test_it_continues_stage_by_stage_to_the_same_end(done, tmp_path, monkeypatch):

@@ -1,6 +1,8 @@
 """A wrong command line ends with one line in the words of every other fault, and with status 2."""
 
 import re
+from bdb import BdbQuit
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
@@ -9,6 +11,8 @@ from airflock.cli.main import app, main
 from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
 from airflock.plots.picture import KINDS
+from airflock.recordings.sweeps import shown
+from airflock.scenarios.files import load
 
 
 @pytest.mark.parametrize(
@@ -30,8 +34,21 @@ from airflock.plots.picture import KINDS
         ("run x --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
         ("run x --seeds", "--seeds needs a value"),
         ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),
-        ("run a b c", "run: unexpected b c; for instance: airflock run"),
+        ("run a b c", "run: unexpected b c; it takes PRESET|FILE and options; for instance: airflock run"),
+        ("doctor a", "doctor: unexpected a; it takes options alone; for instance: airflock doctor"),
+        (
+            "presets show vicsek_1995/ordered",
+            "presets: unexpected vicsek_1995/ordered; it takes PRESET and options; for instance: airflock presets v",
+        ),
+        ("run x --seed 3", "run: --seed: unknown option; did you mean --first-seed (of one flight), or --seeds"),
+        ("run x --agents -3", "--agents -3 lies outside [1, 1e+07]"),
+        ("watch x --agents 0", "--agents 0 lies outside [1, 1e+07]"),
         ("run x --trust=yes", "--trust takes no value; write it alone"),
+        ("evolve x --budget 10s", "evolve: --budget: unknown option; airflock evolve --help lists them"),
+        ("watch x --duration 1h", "watch: --duration: unknown option; airflock watch --help lists them"),
+        ("run x --timesteps 3", "run: --timesteps: unknown option; airflock run --help lists them"),
+        ("run x --agent 3", "run: --agent: unknown option; did you mean --agents?"),
+        ("sweep x --plots a.png", "sweep: --plots: unknown option; did you mean --plot?"),
         ("evolve a", "evolve: --out is missing; for instance: airflock evolve"),
         ("plot a --kind serie", "plot: --kind serie is none of trajectories, exposure, series, rules, transfer, scene"),
         ("fly prepar", "fly: prepar: unknown command; did you mean prepare?"),
@@ -46,6 +63,37 @@ def test_what_typer_refuses_is_told_in_one_line(words, line, monkeypatch, capsys
     assert ended.value.code == 2 and told.out == ""
     assert told.err.startswith(f"airflock: {line}")
     assert len(told.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("after", [0, 30], ids=["in the probe", "in the flight"])
+def test_a_debugger_that_is_left_ends_the_command(after, tmp_path, monkeypatch, capsys):
+    stops = []
+
+    def leave():
+        stops.append(None)
+        if len(stops) > after:
+            raise BdbQuit
+
+    text = (
+        (Path(__file__).parents[2] / "examples" / "own_rule.py")
+        .read_text()
+        .replace("    away =", "    breakpoint()\n    away =")
+    )
+    (tmp_path / "mine.py").write_text(text)
+    monkeypatch.setattr("sys.breakpointhook", leave)
+    flight = ["--device", "python", "--agents", "12", "--duration", "4"]
+    monkeypatch.setattr(
+        "sys.argv", ["airflock", "run", "vasarhelyi_2018/4ms", "--law", str(tmp_path / "mine.py"), *flight]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2 and capsys.readouterr().err.splitlines()[-1] == "airflock: interrupted"
+
+
+def test_a_sweep_shows_what_flights_are_judged_by_and_else_their_order():
+    named = {"vasarhelyi_2018/4ms": "fitness", "zapotecatl_2016/best": "quality", "vicsek_1995/ordered": "polarisation"}
+    assert {name: shown(None, [load(name)]) for name in named} == named
+    assert shown(None, [load("vasarhelyi_2018/4ms", {"metrics.kind": "order"})]) == "polarisation"
 
 
 def test_the_nearest_choice_is_told():

@@ -173,8 +173,10 @@ def run(
                 tolerances = tolerance(campaign, store, executor, counted, keys, left(0.5 if axes else 1.0), note)
             cells = bounds_over(campaign, store, executor, axes, left(), note) if axes else {}
         except KeyboardInterrupt as stop:
-            told = f"{store.count('count'):,} flights are stored in {folder}; continue with --resume"
-            raise Interrupted(f"interrupted: {told}") from stop
+            done = f"interrupted: {store.count('count'):,} flights"
+            if kept:
+                raise Interrupted(f"{done} are stored in {folder}; continue with --resume") from stop
+            raise Interrupted(f"{done} are not kept; with --out (in Python: folder=) they are, for --resume") from stop
     return Certificate(
         campaign, tuple(counted.verdicts), hazards(campaign, counted), counted.rows, versions(),
         time.monotonic() - began, counted.rate, tolerances, rare, cells, where,

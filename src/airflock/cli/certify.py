@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
 Where = Annotated[
@@ -107,24 +108,23 @@ def certify(
     faults: list[str] = []
     seconds, campaign = 1.0, None
     also: dict[str, Any] = {}
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
-    with options.gathering(faults):
+    with gathering(faults):
         seconds = options.time_of(budget)
-    with options.gathering(faults):
+    with gathering(faults):
         found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
         campaign = campaign_of(found, limit or [], confidence, flights, **how)
         also = {"keys": asked(campaign, tolerance_of or tolerance, split), "split": split}
         also["axes"] = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
-    with options.gathering(faults):
+    with gathering(faults):
         check_options(seconds, timeout, scheduler, device)
     if resume and out is None:
         faults.append("--resume: name the certificate whose flights are to be continued with --out")
     options.refuse(faults)
     assert campaign is not None
-    for text in campaign.scenario.notes:
-        tables.say(f"note: {text}")
+    tables.say_notes(campaign.scenario.notes)
     if scheduler is None:
         options.compile_aloud(campaign.flown, precision, device)
     flying = {"scheduler": scheduler, "threads": threads, "timeout": timeout}
@@ -216,8 +216,7 @@ def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     if as_json:
         tables.emit_json({"same": found.same, **vars(found)})
     else:
-        for note in found.notes:
-            tables.say(f"note: {note}")
+        tables.say_notes(found.notes)
         for fault in found.faults:
             tables.say(f"airflock: {path}: {fault}")
         said = "same bits, bounds computed again" if found.same else "does not hold"

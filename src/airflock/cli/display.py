@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS
 
 
@@ -35,13 +36,13 @@ def display(
     from airflock.display.show import fly_show
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((save, RECORDINGS), (plot, PICTURES))
     settings: dict[str, Any] = {}
-    with options.gathering(faults):
+    with gathering(faults):
         settings = options.settings(changes)
     found = []
-    with options.gathering(faults):
+    with gathering(faults):
         found = plan(shapes, drones, failing, failure, points, spacing, settings, "--")
     options.refuse(faults)
     show = fly_show(found, drones, failing, failure, seed, settings)

@@ -102,8 +102,7 @@ def evolve(
     check_timeout(timeout)
     study = on_device(study, device, scheduler)
     open_folder(out, study, resume=resume)
-    for text in study.notes:
-        tables.say(f"note: {text}")
+    tables.say_notes([*(note for each in study.scenarios for note in each.notes), *study.notes])
     begin = time.perf_counter()
     executor = executor_for(study, scheduler, threads, timeout)
     with options.searching(study, quiet or as_json) as (watch, note):
@@ -145,4 +144,4 @@ def _print(result: Any) -> None:
         console.print(f"in {name}: {mean:.4f} ({low:.4f} … {high:.4f})", highlight=False, markup=False)
     if result.dead:
         return
-    console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False)
+    console.print(f"fly it: airflock run {result.folder / 'best.toml'}", highlight=False, markup=False, soft_wrap=True)

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.spelling import meant
 from airflock.suffixes import RECORDINGS
 
@@ -92,9 +93,9 @@ def fleet(
     from airflock.scenarios.files import load
 
     wrong: list[str] = []
-    with options.gathering(wrong):
+    with gathering(wrong):
         options.writable((save, RECORDINGS), (card_file, (".json",)))
-    with options.gathering(wrong):
+    with gathering(wrong):
         given = options.settings(changes, agents, duration)
         found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
         period = found.sensors.period or found.flight.dt
@@ -110,6 +111,7 @@ def fleet(
     if against not in (None, "simulator"):
         wrong.append(f"--against {against}: only simulator can be compared with")
     options.refuse(wrong)
+    tables.say_notes(found.notes)
     operator = _operator(ground)
     options.refuse(individuals.refused(found))
     stops = True if silence is None and not against else silence

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock.cli import options, tables
-from airflock.errors import CardError, ScenarioError
+from airflock.errors import CardError, ScenarioError, gathering
 from airflock.spelling import meant
 from airflock.untrusted import is_file
 
@@ -90,15 +90,15 @@ def prepare(
 
     faults: list[str] = []
     where, systems = _site("--site", site, faults), _members(members, faults)
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((out, (".json",)))
     for path in (out, out.with_suffix(".key"), out.with_suffix(".operator")):
         if path.exists():
             faults.append(f"{path}: exists; a mission is never overwritten")
     found, safety, known = None, {}, []  # type: ignore[var-annotated]
-    with options.gathering(faults):
+    with gathering(faults):
         found = load(scenario, options.settings(changes), trust=trust)
-    with options.gathering(faults):
+    with gathering(faults):
         safety = options.settings(limits)
         known = [name for name, _, _ in declarations(Safety)]
         for name in (name for name in safety if name not in known):
@@ -106,7 +106,7 @@ def prepare(
     private, public = new_keys()
     document: dict[str, Any] = {}
     if found is not None:
-        with options.gathering(faults):
+        with gathering(faults):
             document = card_document(
                 found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
                 expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
@@ -120,8 +120,9 @@ def prepare(
         for name, key, share in loads
         if share > SHARE
     ]
-    if faults:
+    if faults or found is None:
         raise CardError(faults)
+    tables.say_notes(found.notes)
     files = (out, out.with_suffix(".key"), out.with_suffix(".operator"))
     try:
         made = write_card(files[0], document)
@@ -182,11 +183,11 @@ def order(
     if (do == "goto") != (point is not None):
         faults.append("--point LAT,LON,ALT belongs to goto, and goto needs it")
     where = _site("--point", point, faults) if point else (0.0, 0.0, 0.0)
-    with options.gathering(faults):
+    with gathering(faults):
         found = read_card(card_file)
         if target and target not in found.members:
             faults.append(f"--target {target}: the card's members are {', '.join(map(str, found.members))}")
-    with options.gathering(faults):
+    with gathering(faults):
         key, private = read_key(card_file.with_suffix(".key")), read_key(card_file.with_suffix(".operator"))
     options.refuse(faults)
     assert what is not None

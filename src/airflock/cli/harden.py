@@ -6,8 +6,10 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import SCENARIOS
+
+NUMBER = 6  # columns that a number takes: a narrow terminal must not cut it off
 
 
 def harden(
@@ -57,11 +59,11 @@ def harden(
 
     faults: list[str] = []
     found: list[Any] = []
-    with options.gathering(faults):
+    with gathering(faults):
         found = _optima(scenario, options.settings(changes, None, duration), trust)
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(found) + 1))]
     for place in places:
-        with options.gathering(faults):
+        with gathering(faults):
             options.writable((place, SCENARIOS))
     again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
@@ -72,6 +74,7 @@ def harden(
     if again and limit:
         faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
     options.refuse(faults)
+    tables.say_notes(note for each in found for note in each.notes)
     numbers = range(first_seed, first_seed + seeds)
     if again:
         stricter = (r_coll or 1.0, delay or 1.0)
@@ -135,22 +138,25 @@ def _space(where: str, scenario: Any) -> Any:
 
 
 def _print(name: str, steps: list[Any], seeds: int) -> None:
+    """A table of what each step flies like, and below it a line for each: what it costs and gains, and its verdict."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     table = Table(title=f"{name}: {seeds} paired flights a step", box=box.SIMPLE_HEAD, title_justify="left")
-    told = ("step", "fitness", "cost (95 %)", "r_min, m", "gain, m (95 %)")
-    for column in (*told, "n_coll", "f_wall", "contacts", "clearance, m", ""):
-        table.add_column(column, justify="left" if column in ("step", "") else "right")
+    table.add_column("step")
+    for column in ("fitness", "r_min, m", "n_coll", "f_wall", "contacts", "clearance, m"):
+        table.add_column(column, justify="right", min_width=NUMBER)
     for step in steps:
-        cost, gain = (f"{m:.3g} ({low:.3g} … {high:.3g})" for m, low, high in (step.cost, step.gain))
-        first = step is steps[0]
         walls = f"{step.parts['f_wall']:.3g}" if "f_wall" in step.parts else ""
         contacts = f"{100.0 * step.contacts:.0f} %" if step.contacts == step.contacts else ""
         room = f"{step.clearance:.3g}" if step.clearance == step.clearance else ""
         table.add_row(
-            step.name, f"{step.fitness:.4f}", "" if first else cost, f"{step.r_min:.3g}", "" if first else gain,
-            f"{step.n_coll:.3g}", walls, contacts, room, step.verdict,
-        )  # fmt: skip
-    Console().print(table)
+            step.name, f"{step.fitness:.4f}", f"{step.r_min:.3g}", f"{step.n_coll:.3g}", walls, contacts, room
+        )
+    console = Console()
+    console.print(table)
+    for step in steps[1:]:
+        (cost, least, most), (gain, low, high) = step.cost, step.gain
+        told = f"cost {cost:.3g} ({least:.3g} to {most:.3g}), gain {gain:.3g} m ({low:.3g} to {high:.3g}), 95 %"
+        console.print(f"{step.name}: {step.verdict}; {told}", highlight=False, markup=False, soft_wrap=True)

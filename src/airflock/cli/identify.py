@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import imports, options, tables
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
 
@@ -56,15 +56,15 @@ def identify(
     from airflock.scenarios.files import load
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
-    with options.gathering(faults):
+    with gathering(faults):
         scenario = load(like, options.settings(changes))
-    with options.gathering(faults):
+    with gathering(faults):
         how = imports.mapped(map)
-    with options.gathering(faults):
+    with gathering(faults):
         ground = _span(standing)
-    with options.gathering(faults):
+    with gathering(faults):
         packets = None if heard is None else read_heard(heard)
     if conservative is not None and not 0.0 < conservative < 1.0:
         faults.append(f"--conservative {conservative:g} lies outside (0, 1); 0.95 is usual")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import RecordingError
+from airflock.errors import RecordingError, gathering
 from airflock.suffixes import RECORDINGS
 
 Files = Annotated[
@@ -90,11 +90,11 @@ def import_tracks(
     from airflock.recordings.imports.load import load_tracks
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((save, RECORDINGS))
-    with options.gathering(faults):
+    with gathering(faults):
         how = mapped(map)
-    with options.gathering(faults):
+    with gathering(faults):
         place = _origin(origin)
     options.refuse(faults)
     notes: list[str] = []

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, gathering
 from airflock.suffixes import PICTURES, SCENARIOS
 
 LAWS = "couzin_2002,reynolds_1987,vicsek_1995,vasarhelyi_2018"
@@ -51,10 +51,10 @@ def infer(
     from airflock.infer.run import infer as find
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((out, SCENARIOS), (plot, PICTURES))
     settings: dict[str, Any] = {}
-    with options.gathering(faults):
+    with gathering(faults):
         settings = options.settings(changes)
     laws = [name.strip() for name in models.split(",") if name.strip()]
     if not laws:

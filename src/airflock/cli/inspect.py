@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, gathering
 from airflock.untrusted import from_outside, is_file, read_text
 
 
@@ -18,9 +18,9 @@ def presets(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """List the presets, show one as TOML, or derive a starting set for any speed.
+    """List the presets, show one as TOML, or derive a starting set for a speed (--for-speed 12 > mine.toml).
 
-    Example: airflock presets --for-speed 12 > mine.toml
+    Example: airflock presets vasarhelyi_2018/4ms
     """
     from airflock.scenarios import files
 
@@ -61,7 +61,7 @@ def validate(
     faults: list[str] = []
     for name in files:
         found: list[str] = []
-        with options.gathering(found):
+        with gathering(found):
             _validate(name, changed, law, trust)
         faults += [fault if name in fault else f"{name}: {fault}" for fault in found]
     options.refuse(faults)

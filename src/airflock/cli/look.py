@@ -55,10 +55,17 @@ def plot(
     options.writable((out, PICTURES))
     from airflock.plots.picture import plot as picture
     from airflock.plots.save import save_figure
+    from airflock.scenarios.files import load
 
     settings = options.settings(changes, agents, duration)
+    window: dict[str, Any] = {"start": begin, "stop": end}
     with options.compiling_told():
-        figure = picture(what, kind, seed=seed, start=begin, stop=end, settings=settings, law=law, trust=trust)
+        if what.lower().endswith(".nc"):
+            figure = picture(what, kind, settings=settings, law=law, trust=trust, **window)
+        else:
+            scenario = load(what, settings, law, trust=trust)
+            tables.say_notes(scenario.notes)
+            figure = picture(scenario, kind, seed=seed, **window)
     save_figure(figure, out)
     tables.say(f"saved {out}")
 
@@ -105,6 +112,7 @@ def video(
             recording = flight_of(what, seed, settings, law, trust=trust)
         else:
             scenario = load(what, settings, law, trust=trust)
+            tables.say_notes(scenario.notes)
             check_chart(chart, courses(scenario) if chart else [], scenario.name)
             recording = flight_of(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
@@ -145,6 +153,7 @@ def replay(
             recording = flight_of(what, seed, settings, law, trust=trust)
         else:
             scenario = load(what, settings, law, trust=trust)
+            tables.say_notes(scenario.notes)
             check_colour(scenario, colour)
             recording = flight_of(scenario, seed)
     made = make_replay(recording, rate=rate, colour=colour)

@@ -6,6 +6,7 @@ import sys
 import threading
 import traceback
 import warnings
+from bdb import BdbQuit
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
@@ -144,7 +145,7 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
-    except KeyboardInterrupt as stop:  # while the verb was still being looked up, or after it
+    except (KeyboardInterrupt, BdbQuit) as stop:  # while the verb is looked up, or after it; a debugger that is left
         _end("interrupted", stop)
     except OSError as fault:
         _end(f"{fault.filename or 'output'}: {reason(fault)}", fault)

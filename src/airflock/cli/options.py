@@ -2,15 +2,14 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from airflock.errors import ScenarioError
-from airflock.errors import gathering as gathering  # verbs say options.gathering
+from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import suffix_fault
 from airflock.untrusted import from_outside, toml_value
 
@@ -63,13 +62,30 @@ def settings(
             found[key.strip()] = value(text, f"{option} {key.strip()}")
         except ScenarioError as fault:
             faults += fault.faults
-    if faults:
-        raise ScenarioError(faults)
+    short: dict[str, tuple[str, float]] = {}
     if agents is not None:
-        found["agents"] = agents
+        short["agents"] = (str(agents), agents)
     if duration is not None:
-        found["duration"] = time_of(duration, "--duration")
-    return found
+        with gathering(faults):
+            short["duration"] = (duration, time_of(duration, "--duration"))
+    faults += _outside(short)
+    refuse(faults)
+    return found | {key: number for key, (_, number) in short.items()}
+
+
+def _outside(short: Mapping[str, tuple[str, float]]) -> list[str]:
+    """What lies outside its range of --agents and --duration, each as it is written and as a number."""
+    if not short:
+        return []
+    from airflock.core.parameters import Quantity, declarations, quantity_fault
+    from airflock.scenarios.sections import Flight
+
+    known = {name: declared for name, declared, _ in declarations(Flight) if isinstance(declared, Quantity)}
+    return [
+        f"--{key} {written} lies outside {known[key].span}"
+        for key, (written, number) in short.items()
+        if quantity_fault(float(number), known[key])
+    ]
 
 
 def time_of(text: str, option: str = "--budget") -> float:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS, TABLES
 
 
@@ -36,14 +37,13 @@ def run(
     from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((save, RECORDINGS), (plot, PICTURES))
-    with options.gathering(faults):
+    with gathering(faults):
         changed = options.settings(changes, agents, duration)
         found = load(scenario, changed, law, trust=trust)
     options.refuse(faults)
-    for note in found.notes:
-        tables.say(f"note: {note}")
+    tables.say_notes(found.notes)
     numbers, flights = sound_seeds(range(first_seed, first_seed + seeds)), [found] * seeds
     if scheduler is None:
         device = picked(flights, device, precision=precision, say=tables.say)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import PICTURES, TABLES
 
 MOST_VALUES = 100_000  # of one key, and points of a whole grid
@@ -44,7 +44,7 @@ def sweep(
     ] = None,
     show: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, or what comes nearest"),
+        typer.Option(metavar="NAME", help="Order parameter to show.", show_default="fitness, quality or polarisation"),
     ] = None,
 ) -> None:
     """Fly a scenario over a grid of values and tabulate the order parameters.
@@ -55,15 +55,14 @@ def sweep(
     from airflock.scenarios.seeds import sound_seeds
 
     faults: list[str] = []
-    with options.gathering(faults):
+    with gathering(faults):
         options.writable((table, TABLES), (plot, PICTURES))
     fixed: dict[str, Any] = {}
-    with options.gathering(faults):
+    with gathering(faults):
         fixed = options.settings(changes, agents, duration)
     keys, points = _grid(over, plot, faults)
     scenarios, show = _planned(scenario, points, fixed, law, trust, show, faults)
-    for note in alike(dict.fromkeys(note for found in scenarios for note in found.notes)):
-        tables.say(f"note: {note}")
+    tables.say_notes(alike(dict.fromkeys(note for found in scenarios for note in found.notes)))
     numbers = sound_seeds(range(first_seed, first_seed + seeds))
     if scheduler is None:
         options.tell_time([found for found in scenarios for _ in numbers], threads, device)
@@ -84,9 +83,9 @@ def _grid(over: list[str], plot: Path | None, faults: list[str]) -> tuple[list[s
 
     axes = []
     for text in over:
-        with options.gathering(faults):
+        with gathering(faults):
             axes.append(axis(text))
-    with options.gathering(faults):
+    with gathering(faults):
         distinct([key for key, _ in axes], plot)
     size = math.prod(len(values) for _, values in axes)
     if size > MOST_VALUES:
@@ -102,9 +101,9 @@ def _planned(
     from airflock.recordings.sweeps import scenarios_at, shown
 
     scenarios: list[Any] = []
-    with options.gathering(faults):
+    with gathering(faults):
         scenarios = scenarios_at(scenario, points, fixed, law, trust=trust)
-    with options.gathering(faults):
+    with gathering(faults):
         show = shown(show, scenarios)
     options.refuse(faults)
     return scenarios, str(show)

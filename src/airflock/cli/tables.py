@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
@@ -104,6 +104,12 @@ def clean(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value.item() if hasattr(value, "item") else value
+
+
+def say_notes(notes: Iterable[str]) -> None:
+    """What is read otherwise than it is written or hardly meant, once each; before anything is flown or written."""
+    for text in dict.fromkeys(notes):
+        say(f"note: {text}")
 
 
 def say(text: str) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from airflock.cli import options, tables
+from airflock.errors import gathering
 
 
 def tune(
@@ -59,17 +60,18 @@ def tune(
 
     faults: list[str] = []
     seconds, found = 1.0, None
-    with options.gathering(faults):
+    with gathering(faults):
         seconds = options.time_of(budget)
     if like is None and (len(scenario) > 1 or heard is not None):
         faults.append(f"{', '.join(scenario)}: one scenario is tuned; of logs, give --like PRESET")
     elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
         faults.append(f"{scenario[0]}: is not a scenario file (.toml); of logs, give --like PRESET")
     else:
-        with options.gathering(faults):
+        with gathering(faults):
             found = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
     options.refuse(faults)
     assert found is not None
+    tables.say_notes(found.notes)
     options.compile_aloud(found, 32, "cpu")
     what: Any = found if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}

@@ -7,6 +7,8 @@ from typing import Any
 from airflock.spelling import meant
 
 PLACES = ("--out", "--save", "--html")  # where what came out goes: a folder or table, a recording, a page
+ALIKE = 0.75  # of options, as in `spelling.meant`: both begin with --, and --budget is not --quiet
+ONE_SEED = "--seed"  # written for the seed of a flight, one letter from --seeds, which says how many fly
 
 
 def usage_fault(fault: Any, words: Sequence[str]) -> str:
@@ -25,7 +27,9 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
     if kind == "NoSuchOption":
         known = [name for one in context.command.params for name in one.opts] if context is not None else []
         same = [name for name in PLACES if name in known and fault.option_name in (*PLACES, "--output")]
-        hint = f"; did you mean {same[0]}?" if same else _near(fault.option_name, [*known, "--help"], context)
+        hint = f"; did you mean {same[0]}?" if same else _near(fault.option_name, [*known, "--help"], context, ALIKE)
+        if fault.option_name == ONE_SEED and "--first-seed" in known:
+            hint = "; did you mean --first-seed (of one flight), or --seeds (how many flights)?"
         return f"{fault.option_name}: unknown option{hint}"
     unknown = re.match(r"No such command '(.*?)'", message)
     if unknown is not None:
@@ -40,7 +44,9 @@ def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
         return f"{fault.option_name} needs a value"
     extra = re.match(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", message)
     if extra is not None:
-        return f"unexpected {extra[1]}{_example(context)}"
+        takes = [_name(one) for one in context.command.params if one.param_type_name == "argument"]
+        more = f"; it takes {' '.join(takes)} and options" if takes else "; it takes options alone"
+        return f"unexpected {extra[1]}{more}{_example(context)}"
     return str(fault.format_message()).strip().rstrip(".") + _example(context)
 
 
@@ -53,8 +59,8 @@ def _path(context: Any) -> str:
     return " ".join(["airflock", *reversed(names)])
 
 
-def _near(name: str, known: Sequence[str], context: Any) -> str:
-    return meant(name, known, f"; {_path(context)} --help lists them", lead="; ")
+def _near(name: str, known: Sequence[str], context: Any, cutoff: float = 0.5) -> str:
+    return meant(name, known, f"; {_path(context)} --help lists them", lead="; ", cutoff=cutoff)
 
 
 def _example(context: Any) -> str:

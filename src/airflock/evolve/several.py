@@ -44,8 +44,8 @@ def read_scenarios(
     if "scenarios" not in document:
         entries: Any = [document.get("scenario")]
         if not isinstance(entries[0], str):
-            wrong = f"scenario = {bounded(repr(entries[0]), 80)} is missing or not a name"
-            return (), (), [f"{wrong}; give a preset or a scenario file"]
+            given = f" = {bounded(repr(entries[0]), 80)} is not a name" if "scenario" in document else " is missing"
+            return (), (), [f'scenario{given}; write scenario = "NAME", of a preset or a scenario file']
     else:
         entries = document["scenarios"]
         if "scenario" in document:

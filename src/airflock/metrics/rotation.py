@@ -1,12 +1,15 @@
-"""Rotation about the arena's centre (Vásárhelyi et al. 2018, Eq. 1): 1 counter-clockwise, -1 clockwise, 0 neither."""
+"""Rotation about the arena's centre (Vásárhelyi et al. 2018, Eq. 1): 1 counter-clockwise, -1 clockwise, 0 neither.
+
+The centre is the point metrics.centre_x, centre_y, the origin unless it is given.
+"""
 
 from typing import NamedTuple
 
 from airflock.core.maths import norm
 
 REPORTS = {
-    "phi_lap": ("", "rotation, counter-clockwise positive"),
-    "phi_lap_abs": ("", "rotation, either way"),
+    "phi_lap": ("", "rotation about metrics.centre_x, centre_y; counter-clockwise positive"),
+    "phi_lap_abs": ("", "rotation about metrics.centre_x, centre_y; either way"),
 }
 
 VIOLATES = {

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple, NoReturn, TextIO
 
 from airflock import atomic
 from airflock.errors import AirflockError, CardError, LinkError
@@ -28,11 +28,19 @@ once. A person with a transmitter must be able to take over each drone at any ti
 SAVE = 1.0  # s between two writes of what outlives a restart
 
 
+class Arguments(argparse.ArgumentParser):
+    """Arguments whose faults are one line, as all others are."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and end with status 2."""
+        self.exit(2, f"airflock: {message}; {self.prog} --help tells all options\n")
+
+
 def parser() -> argparse.ArgumentParser:
     """Arguments of the command."""
-    found = argparse.ArgumentParser(
+    found = Arguments(
         prog="python -m airflock.onboard", description=HELP, epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False,
     )  # fmt: skip
     found.add_argument("card", type=Path, help="flight card, written by `airflock fly prepare`")
     found.add_argument("--member", type=int, required=True, help="system id of this drone")

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, RecordingError
 from airflock.plots import style
 from airflock.plots.flight import details_of, name_of, window
 from airflock.recordings.attributes import faults
@@ -140,6 +140,8 @@ def rotations(
     figure, axes = style.place(ax, 7.0, 2.6, layout="constrained")
     for number, (label, recording) in enumerate(flights.items()):
         course = _window(over_time(recording), start, stop)
+        if "phi_lap" not in course:
+            raise RecordingError(f"{label}: has no phi_lap, as tracks do not say about which point they turn")
         _rotation(axes, course, style.LINES[number % len(style.LINES)], label, Pen(course, 0.0))
     style.legend(axes, columns=len(flights), above=True)
     return figure

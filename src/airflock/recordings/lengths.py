@@ -2,7 +2,7 @@
 
 A simulated recording brings its scenario. Tracks and logs bring none, so that what counts as near, as apart or as the
 speed that is wanted must be said; what depends on a number that nobody said is not told, nor is an excursion where
-nobody said out of what.
+nobody said out of what, nor a rotation where nobody said about which point: the origin is a corner of a picture.
 """
 
 from collections.abc import Iterable, Mapping
@@ -27,6 +27,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "crowding": ("r_safe",),
     "f_speed": ("v_flock",),
     "f_wall": ("r_tol",),
+    **dict.fromkeys(("phi_lap", "phi_lap_abs"), ("centre_x", "centre_y")),
 }
 FITNESSES = {"vasarhelyi": FITNESS, "kidger": ("r_coll", "r_flock"), "dimock": ("r_coll",)}
 IN_BODIES = {"r_coll": 0.5, "r_body": 0.5, "r_b": 0.5, "r_safe": 1.0, "r_cluster": 5.0, "r_comm": 5.0}
@@ -76,4 +77,4 @@ def told(found: Mapping[str, tuple[str, ...]]) -> str:
         "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
         " ".join(f"--set {key if '.' in key else f'metrics.{key}'}=..." for key in keys),
     )))  # fmt: skip
-    return f"not told, as tracks do not say what is near or fast: {', '.join(found)}; give {lengths}"
+    return f"not told, as tracks do not say what is near, fast or the middle: {', '.join(found)}; give {lengths}"

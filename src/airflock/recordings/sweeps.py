@@ -15,6 +15,8 @@ from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
 from airflock.spelling import meant
 
+ORDER = "polarisation"  # shown where nothing judges flights: the first that a set reports may be a constant speed
+
 
 def sweep(
     what: Scenario | str | os.PathLike[str],
@@ -127,7 +129,8 @@ def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:
     each = [numbers_of(found.measures, found.metrics, found.goals.kind in ("points", "scene")) for found in scenarios]
     known = [name for name in (each[0] if each else ()) if all(name in names for names in each)]
     if asked is None:
-        usual = [name for name in (found.measures.best for found in scenarios) if name in known]
+        judged = (*(found.measures.best for found in scenarios), ORDER)
+        usual = [name for name in judged if name in known]
         return str((usual + known + [""])[0])
     if each and asked not in known:
         hint = meant(asked, known, f"known: {', '.join(known)}")

@@ -2,6 +2,7 @@
 
 import math
 import traceback
+from bdb import BdbQuit
 from collections.abc import Callable, Mapping
 from functools import cache
 from inspect import signature
@@ -146,10 +147,13 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
         raise RuleError(f"{_place(rule)}: {owner}.{kind} asks for {missing[0]}, which this model does not provide")
     try:
         answer = rule(*(given[name] for name in names))
+    except BdbQuit:  # the reader left the debugger: no fault of the rule
+        raise
     except Exception as fault:  # a user's rule may fail in any way; show where
         frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/rules/probe" not in f.filename]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
-        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {type(fault).__name__}: {fault}") from fault
+        told = f"{type(fault).__name__}: {fault}".removesuffix(": ")
+        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {told}") from fault
     numbers = answer if isinstance(answer, tuple) else (answer,)
     for number in numbers:
         if isinstance(number, (int, float)) and not math.isfinite(number):

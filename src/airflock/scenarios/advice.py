@@ -1,17 +1,21 @@
 """Notes on scenarios that are valid but hardly meant; nothing here stops a flight."""
 
 from airflock.core.parameters import Quantity, declarations
+from airflock.metrics.registry import METRICS
 from airflock.scenarios.geometry import largest_extension
 from airflock.scenarios.scenario import Scenario
+from airflock.world.place import edge_rows
+from airflock.world.polygon import obstacle
 
 APART = 100.0  # factor between the lengths of a law and of its arena above which one of them is hardly meant
+ON_EDGE = 1e-3  # m inside an arena up to which a point counts as on its edge: `obstacle` rounds by 1e-6 there
 SEES_WALLS = {"ray", "cast"}
 
 
 def advice(scenario: Scenario) -> list[str]:
     """What a person should know before flying a scenario."""
-    notes = (_speed_alone(scenario), _no_walls(scenario), _lengths(scenario), _all_met(scenario), _unsent(scenario))
-    return [note for note in notes if note]
+    asked = (_speed_alone, _no_walls, _lengths, _all_met, _unsent, _about_an_edge)
+    return [note for note in (ask(scenario) for ask in asked) if note]
 
 
 def _speed_alone(scenario: Scenario) -> str:
@@ -53,6 +57,21 @@ def _lengths(scenario: Scenario) -> str:
     return (
         f"agents of {model.name} interact within {reach:.3g} m in an arena {2.0 * size:.3g} m across, a factor of "
         f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are hardly meant"
+    )
+
+
+def _about_an_edge(scenario: Scenario) -> str:
+    """A rotation about a point that the flock cannot fly round: a corner of the field, or outside of it."""
+    world, q = scenario.world, scenario.metrics
+    measured = METRICS["rotation"] in scenario.order_parameters and hasattr(q, "centre_x")
+    if world.arena != "polygon" or not measured:
+        return ""
+    edges, corners = edge_rows(world)[:2]
+    if obstacle(q.centre_x, q.centre_y, 0.0, edges, 0, corners).distance < -ON_EDGE:
+        return ""
+    return (
+        f"phi_lap tells the rotation about ({q.centre_x:g}, {q.centre_y:g}) m, which does not lie inside the arena; "
+        "metrics.centre_x and metrics.centre_y say another point"
     )
 
 

@@ -10,6 +10,7 @@ from airflock.core.vectors import overruled
 from airflock.errors import ScenarioError
 from airflock.untrusted import is_file
 
+OF_ITS_OWN = ("published", "title")  # what a paper published of a file and what the file is called: not of another
 LONGEST = 10  # files in a chain of extends
 # sections in which another kind means other keys
 KINDS = ("model", "body", "sensors", "radio", "scene", "goals", "start")
@@ -21,7 +22,8 @@ def extended(document: Mapping[str, Any], where: str, folder: Path | None, read:
     """A document with everything of the file that it extends, and which file that was ("" for none).
 
     Keys of the document go before those of the file. Where it names another kind of model, body, sensor, radio, scene,
-    goals or start, that section's other keys are not taken over. What a paper published of the file is not either.
+    goals or start, that section's other keys are not taken over. Neither is what a paper published of the file, nor
+    its title.
 
     where  : name of the document, for faults
     folder : where the names of files are looked for
@@ -46,7 +48,8 @@ def _extended(
     except ScenarioError as fault:
         raise ScenarioError([f"{where}: extends = {name!r}: {line}" for line in fault.faults]) from fault
     base, _ = _extended(_with_paths(base, place), name, place, read, (*chain, name))
-    base.pop("published", None)
+    for key in OF_ITS_OWN:
+        base.pop(key, None)
     return {**base, **{key: _section(key, base.get(key), value) for key, value in own.items()}}, name
 
 

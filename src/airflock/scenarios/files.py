@@ -18,11 +18,16 @@ from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
-from airflock.untrusted import from_outside, is_file, read_toml
+from airflock.untrusted import FormatError, from_outside, is_file, read_toml
 
+IMPORTED = "not a scenario; airflock import makes a recording of it (in Python: airflock.load_tracks)"
 NO_SCENARIO = {  # files that stand beside scenarios, by their ending: what they are, and what takes them
     ".py": "code, not a scenario; a law flies a scenario: airflock run PRESET --law FILE.py (in Python: law=)",
     ".nc": "a recording, not a scenario; airflock score measures it (in Python: airflock.load_recording)",
+    ".json": "JSON, not a scenario (TOML); airflock watch shows the fleet of a flight card",
+    **dict.fromkeys((".csv", ".tsv", ".parquet"), f"a table, {IMPORTED}"),
+    **dict.fromkeys((".ulg", ".bin", ".tlog"), f"a flight log, {IMPORTED}"),
+    **dict.fromkeys((".h5", ".hdf5", ".npy", ".npz"), f"arrays, {IMPORTED}"),
 }
 
 
@@ -149,7 +154,10 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     if path.suffix.lower() in NO_SCENARIO:
         raise ScenarioError([f"{name}: is {NO_SCENARIO[path.suffix.lower()]}"])
     with from_outside(name):
-        document = read_toml(path)
+        try:
+            document = read_toml(path)
+        except FormatError as fault:
+            raise ScenarioError([f"{name}: is not a scenario file (TOML): {fault}"]) from fault
     if tells_of_study(document) and not {"model", "extends"} & set(document):
         raise ScenarioError([f"{name}: is a study, not a scenario; check it with airflock validate, or evolve it"])
     return {**formats.current(document, name), formats.KEY: formats.FORMAT}, path.parent

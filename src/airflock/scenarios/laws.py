@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from airflock.core.contract import Model, model
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, bounded
 from airflock.scenarios.own_code import own_code
 from airflock.spelling import meant
 
@@ -19,8 +19,13 @@ MODELS = (
 
 def find_model(kind: Any, folder: Path | None = None, *, told: str = "model.kind", trust: bool = False) -> Model:
     """Model by name, or from a user's own Python file (relative to the scenario file), which runs only with `trust`."""
+    if kind is None:
+        section, _, key = told.rpartition(".")
+        how = f'write a law under [{section}], for instance {key} = "{MODELS[0]}"'
+        others = f"known: {', '.join(MODELS)}, or a file that ends in .py"
+        raise ScenarioError([f'{told} is missing; {how}, or begin the file with extends = "PRESET"; {others}'])
     if not isinstance(kind, str):
-        raise ScenarioError([f"{told} = {kind!r} is missing or not a name; known: {', '.join(MODELS)}"])
+        raise ScenarioError([f"{told} = {bounded(repr(kind), 80)} is not a name; known: {', '.join(MODELS)}"])
     if kind in MODELS:
         return model(import_module(f"airflock.models.{kind}"), kind)
     if kind.endswith(".py"):

@@ -89,6 +89,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return given, "", ""
     long = isinstance(given, Mapping) and "value" in given
     value, unit = (given["value"], given.get("unit", "")) if long else (given, "")
+    written = f"{value} {unit}" if long else given
     if isinstance(value, str) and not unit:
         match = NUMBER.fullmatch(value)
         if match is None:
@@ -102,12 +103,8 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     if times is None:
         others = ", ".join(UNITS.get(declared.unit, ()))
         if declared.unit in ("", "1"):
-            return None, "", f"{name} = {value} {unit}: has no unit{f'; give a number, or {others}' if others else ''}"
-        return (
-            None,
-            "",
-            f"{name} = {value} {unit}: the unit is {declared.unit}{f', or one of {others}' if others else ''}",
-        )
+            return None, "", f"{name} = {written}: has no unit{f'; give a number, or {others}' if others else ''}"
+        return None, "", f"{name} = {written}: the unit is {declared.unit}{f', or one of {others}' if others else ''}"
     scaled = _times(value, times)
     if scaled is None:
         return given, "", ""

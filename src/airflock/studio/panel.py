@@ -111,11 +111,6 @@ class Panel:
             axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
         ))  # fmt: skip
 
-    def download(self, name: str, content: bytes) -> None:
-        """Send a file to every open page."""
-        for client in self.server.get_clients().values():
-            client.send_file_download(name, content)
-
     def say(self, title: str, body: str, bad: bool = False) -> None:
         """A notice on every open page."""
         for client in self.server.get_clients().values():

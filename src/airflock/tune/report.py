@@ -19,7 +19,7 @@ from airflock.identify.run import UNITS
 from airflock.plots.certificate import certificate
 from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
-from airflock.scenarios.scenario import Scenario
+from airflock.tune.assumed import defaults, said
 from airflock.tune.next_flight import card, replays
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str], shows
         f'<p class="verdict{"" if made.shown else " no"}">{verdict}</p>',
         _list(made.statements),
         "<h2>What was assumed</h2>",
-        _table(("key", "value", "source"), [*_assumed(found.start.document), *_defaults(found.start)]),
+        _table(("key", "value", "source"), [*said(found.start, r.parameters), *defaults(found.start)]),
         _list([*found.notes, *found.start.notes]),
         *_identified(found.identified),
         "<h2>What was found</h2>",
@@ -164,37 +164,6 @@ def _identified(told: Mapping[str, Any]) -> list[str]:
         _table(("number", "value", "95 % interval", "from"), rows),
         _list([str(note) for note in told["notes"]]),
     ]
-
-
-def _assumed(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Key, value and source of everything that the scenario's file says but the numbers of its law."""
-    rows = []
-    for section, table in document.items():
-        if section in ("model", "published", "title", "format"):
-            continue
-        single = not isinstance(table, dict) or "value" in table
-        for name, entry in (("", table),) if single else table.items():
-            key = f"{section}.{name}".rstrip(".")
-            if isinstance(entry, dict):
-                value = with_unit(str(entry.get("value")), str(entry.get("unit", "")))
-                rows.append((key, value, str(entry.get("source", ""))))
-            else:
-                text = str(entry)
-                rows.append((key, text if len(text) < 80 else f"{text[:77]}...", ""))
-    return rows
-
-
-def _defaults(scenario: Scenario) -> list[tuple[str, str, str]]:
-    """Numbers of drones, radio and wind that the file leaves as they are, and that are not zero."""
-    rows = []
-    for key, (how, value) in declared(scenario).items():
-        section, _, name = key.partition(".")
-        given = scenario.document.get(section, {})
-        if section in ("body", "sensors", "radio", "wind") and value and name not in given:
-            rows.append(
-                (key, with_unit(f"{value:.4g}", how.unit), f"default: {how.source}" if how.source else "default")
-            )
-    return rows
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

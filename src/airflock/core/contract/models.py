@@ -9,6 +9,12 @@ from airflock.core.parameters import declarations
 from airflock.core.vocabulary import COMMANDS, REDUCTIONS, asks
 from airflock.errors import RuleError
 
+NEEDED = {  # what each law brings, and what it is
+    "Parameters": "a record of its numbers, derived from airflock.Parameters",
+    "COMMAND": f"what decide returns, one of {', '.join(COMMANDS)}",
+    "decide": "the rule itself",
+}
+
 
 @dataclass(frozen=True)
 class Model:
@@ -101,9 +107,8 @@ def model(namespace: Any, name: str = "") -> Model:
     'velocity'
     """
     found, name = names_of(namespace, name)
-    for needed in ("Parameters", "COMMAND", "decide"):
-        if needed not in found:
-            raise RuleError(f"model {name} lacks {needed}")
+    if missing := [f"{needed} ({what})" for needed, what in NEEDED.items() if needed not in found]:
+        raise RuleError(f"model {name} lacks {', '.join(missing)}")
     if found["COMMAND"] not in COMMANDS:
         raise RuleError(f"model {name}: COMMAND = {found['COMMAND']!r} is none of {', '.join(COMMANDS)}")
     for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):

@@ -123,11 +123,11 @@ def _recognised(found: Layout, columns: Sequence[str], options: Options) -> None
     if faults:
         raise RecordingError("\n".join(faults))
     if unsaid:
-        tracker = [c for c in columns if headers.split(c)[0] in OF_A_TRACKER]
-        if tracker:
-            raise RecordingError(
-                f"{found.where}: column {unsaid[0]} has no unit, and {tracker[0]} tells of a tracker; {headers.GIVE}"
-            )
+        tells = [f"{c} tells of a tracker" for c in columns if headers.split(c)[0] in OF_A_TRACKER]
+        if "t" not in found.trees and "frame" in found.trees:
+            tells.append(f"{found.labels['frame']} tells of a camera")
+        if tells:
+            raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {tells[0]}; {headers.GIVE}")
         found.notes.append(f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; otherwise --unit mm")
 
 

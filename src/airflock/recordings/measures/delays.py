@@ -30,9 +30,14 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
 
 
 def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, slowest: float = 0.0) -> pd.DataFrame:
-    """For each pair the delay of largest correlation, s, and that correlation; positive: the leader is first.
+    """One row for each ordered pair: leader, follower, delay (s) and correlation (-1 to 1) where that is largest.
 
-    least : correlation below which a pair is left out
+    A positive delay says that the leader is first; each pair stands there twice, with both signs.
+
+    longest : largest delay that is tried, s
+    least   : correlation below which a pair is left out
+    slowest : headings at this speed (m/s) or less do not count
+    Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
     table = delay_correlation(recording, longest, slowest)
     rows = []
