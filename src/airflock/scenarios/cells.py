@@ -32,7 +32,6 @@ def takes_all_cores(scenario: Scenario) -> bool:
         and scenario.silence.rule == "fly_on"
         and scenario.flight.update == "synchronous"
         and not any({"sense", "tell", "radio", "clock"} & set(kind.rules) for kind in scenario.fault_kinds)
-        and not any(letter == "p" for letter, _ in scenario.varied)
         and has_room(scenario)
     )
 
@@ -51,8 +50,10 @@ def group_notes(scenario: Scenario) -> list[str]:
 
 
 def by_cells(scenario: Scenario) -> bool:
-    """Whether cells as wide as the law's reach hold all who decide whom an agent meets."""
+    """Whether cells as wide as the law's reach hold all who decide whom an agent meets; all agents have that reach."""
     if len(scenario.laws) > 1 or (scenario.groups and scenario.laws[0].asks_for_groups):
+        return False
+    if any(letter == "p" for letter, _ in scenario.varied):
         return False
     kind = scenario.meets
     walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
