@@ -17,6 +17,7 @@ import airflock
 from airflock.recordings.scores import over_time
 from airflock.scenarios.files import load
 from airflock_papers import zapotecatl_2016
+from airflock_papers.breaks import in_words
 from airflock_papers.dimock_2003.controller import STARTS
 from airflock_papers.dimock_2003.flights import Birds, Task
 from airflock_papers.dimock_2003.units import BEST, FT_LBF
@@ -180,7 +181,7 @@ def fitness(seeds: int = 1) -> None:
             for all_of, begun in zip(flown, before, strict=True)
             if not all_of.collided
         ]
-        name = ", ".join(f"{key} {value}" for key, value in keys.items()) or "as the page"
+        name = in_words(keys) or "as the page"
         if not pairs:
             tell(name, "all collide")
             continue

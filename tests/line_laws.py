@@ -1,5 +1,6 @@
 """Laws of one line, whose likelihood is known everywhere: on them the searches of `infer` are tried."""
 
+from copy import copy
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,16 +14,39 @@ STEPS, NOISE = 400, 0.05
 class Line(Model):
     """A law of one line: what is seen is a function of the numbers' places and of a known input, with noise."""
 
-    def __init__(self, law, names, truth, defaults=None, usual_numbers=()):
+    def __init__(self, law, names, truth, defaults=None, usual_numbers=(), log=()):
         defaults = defaults or dict.fromkeys(names, 0.5)
-        self.numbers = [Number(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name]) for name in names]
+        self.numbers = [
+            Number(f"model.{name}", -1, "1", 1.0, 10.0, True, 10.0 ** defaults[name]) if name in log
+            else Number(f"model.{name}", -1, "m", 0.0, 1.0, False, defaults[name])
+            for name in names
+        ]  # fmt: skip
         self.named, self.usual, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
+        self.own_speed, self.tracks, self.scale = True, (), None
         flags = {name: defaults[name] for name in usual_numbers}
-        self.law = SimpleNamespace(scenario=SimpleNamespace(model=SimpleNamespace(usual=flags)))
+        scenario = SimpleNamespace(model=SimpleNamespace(usual=flags))
+        self.law = SimpleNamespace(numbers=tuple(self.numbers), scenario=scenario)
         generator = np.random.default_rng(4)
         self.input = generator.uniform(0.0, 1.0, STEPS)
         self.rule, self.noise = law, generator.normal(0.0, NOISE, (STEPS, 2))
         self.seen = law(self.input, *truth)
+
+    def told_by(self, numbers):
+        chosen, whole = list(numbers), self.whole
+
+        def rule(x, *places):
+            given = dict(zip(chosen, places, strict=True))
+            return whole.rule(x, *(given.get(n, n.place(n.default)) for n in whole.numbers))
+
+        twin = copy(self)
+        twin.numbers, twin.named, twin.rule, twin.origin = chosen, len(chosen), rule, whole
+        twin.law = SimpleNamespace(numbers=tuple(chosen), scenario=self.law.scenario)
+        return twin
+
+    @property
+    def whole(self):
+        """The law with all its numbers."""
+        return getattr(self, "origin", self)
 
     def differences(self, u, spans=None):
         u = [n.place(n.default) if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
@@ -34,7 +58,7 @@ class Line(Model):
         return [0]
 
     def start(self):
-        return np.array([n.default for n in self.numbers])
+        return np.array([n.place(n.default) for n in self.numbers])
 
 
 def quietly():

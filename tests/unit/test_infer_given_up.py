@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airflock.infer import given_up
 from airflock.infer.fit import FINE, climb
-from airflock.infer.given_up import ways_of
+from airflock.infer.given_up import taken_back, ways_of
 from airflock.infer.ridges import Ridges
 from airflock.infer.run import _Comparison
 from line_laws import Line, quietly
@@ -19,8 +18,7 @@ def fitted(law, names, truth, number, default):
     """A model, and its fit by all numbers but one that stays at its default."""
     model = Line(law, names, truth, dict.fromkeys(names, 0.5) | {names[number]: default})
     rest = [k for k in range(len(names)) if k != number]
-    without = Line(lambda x, *places: law(x, *np.insert(places, number, default)), [names[k] for k in rest], (0.5, 0.5))
-    without.seen = model.seen
+    without = model.told_by([model.numbers[k] for k in rest])
     return model, climb(without, np.array([truth[k] for k in rest]), [0, 1], steps=200, slopes=(FINE,))
 
 
@@ -44,13 +42,10 @@ def test_the_others_lie_within_intervals_that_know_of_a_number_that_was_given_up
 
 
 def test_what_others_make_up_for_exactly_is_a_name_and_widens_nothing():
-    model, fit = fitted(
-        lambda x, force, free, unit: (force + unit) * x + free * x**2,
-        ("force", "free", "unit"),
-        (0.5, 0.6, 0.4),
-        2,
-        0.3,
-    )
+    def law(x, force, free, unit):
+        return (force + unit) * x + free * x**2
+
+    model, fit = fitted(law, ("force", "free", "unit"), (0.5, 0.6, 0.4), 2, 0.3)
     assert fit.place[0] == pytest.approx(0.6, abs=0.05)
     assert ways_of(model, fit, 2, 0.3, [0], DROP) == []
 
@@ -60,27 +55,22 @@ def test_what_changes_nothing_widens_nothing():
     assert ways_of(model, fit, 2, 0.3, [0], DROP) == []
 
 
-def test_a_number_is_taken_back_where_a_walk_leads_higher_than_any_climb(monkeypatch):
+def test_a_number_is_taken_back_where_a_walk_leads_higher_than_any_climb():
     def law(x, b, a):  # a and b make up for each other along a parabola, on which nothing but a slight slope leads on
         return 30.0 * x * (b - (a - 0.1) ** 2) + 0.2 * x**2 * a
 
     truth = (0.64, 0.9)
     model = Line(law, ("b", "a"), truth, {"b": 0.5, "a": 0.45})
-    without = Line(lambda x, b: law(x, b, 0.45), ("b",), (0.5,))
-    without.seen = model.seen
+    without = model.told_by(model.numbers[:1])
     fit = climb(without, np.array([0.1225]), [0], steps=200, slopes=(FINE,))
     best, beside = (climb(model, np.array(u), [0, 1], steps=40) for u in (truth, (fit.place[0], 0.45)))
     assert beside.loss > best.loss + 8.0
 
-    def fuller(_, present):
-        return [] if present is model else [(model.numbers[1], model, 1)]
-
-    monkeypatch.setattr(given_up, "fuller_models", fuller)
-    found, higher = given_up.taken_back(None, without, fit, [0], quietly)
-    assert found is model and higher.place == pytest.approx(truth, abs=0.05)
-    without.seen = model.seen = law(model.input, 0.1225, 0.45)  # nothing but the default flew
+    found, higher = taken_back(model.law, without, fit, [0], quietly)
+    assert found.law.numbers == model.law.numbers and higher.place == pytest.approx(truth, abs=0.05)
+    without.seen = law(model.input, 0.1225, 0.45)  # nothing but the default flew
     fit = climb(without, np.array([0.1225]), [0], steps=200, slopes=(FINE,))
-    assert given_up.taken_back(None, without, fit, [0], quietly)[0] is without
+    assert taken_back(model.law, without, fit, [0], quietly)[0] is without
 
 
 def law_that(name, gain, surprise, every):

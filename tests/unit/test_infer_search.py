@@ -1,14 +1,12 @@
 """Search of infer: on laws of one line, whose highest hill is known, it is found, and what cannot be told is left."""
 
-from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from airflock.infer import noise as noises
-from airflock.infer import select, told
+from airflock.infer import select
 from airflock.infer.candidates import Number
 from airflock.infer.fit import (
     FINE,
@@ -68,84 +66,58 @@ def test_a_valley_is_crossed_where_the_others_follow():
     assert profile(model, wrong, [0], quietly).loss < best.loss + 1.0
 
 
-@dataclass(frozen=True)
-class Several:
-    """A law of one line with some of its numbers."""
-
-    numbers: tuple[Any, ...]
-    scenario: Any
-
-
-def with_some_numbers(monkeypatch, where, law, truth, defaults, log=()):
-    """A maker of models of a law of one line, as the module `where` makes them, and its candidate with all numbers."""
-    names = list(truth)
-    ranges = {name: Number(f"model.{name}", -1, "1", 1.0, 10.0, True, 10.0 ** defaults[name]) for name in log}
-    numbers = [ranges.get(n.key[6:], n) for n in Line(law, names, tuple(truth.values()), defaults).numbers]
-
-    def lines(several, tracks=(), scale=None):
-        chosen = [number.key[6:] for number in several.numbers]
-        rule = lambda x, *u: law(x, **{**defaults, **dict(zip(chosen, u, strict=True))})  # noqa: E731
-        model = Line(rule, chosen, [truth[name] for name in chosen], defaults)
-        model.numbers, model.seen = list(several.numbers), law(model.input, **truth)
-        model.law, model.own_speed, model.tracks, model.scale = several, True, (), None
-        return model
-
-    monkeypatch.setattr(where, "Model", lines)
-    return lines, Several(tuple(numbers), None)
-
-
 def test_a_number_that_was_given_up_and_explains_something_at_the_fit_is_fitted_after_all(monkeypatch):
     truth = {"a": 0.7, "mass": 0.5, "dead": 0.5, "bend": 0.9}
 
     def law(x, a, mass, dead, bend):
         return x * (a - mass) + 0.0 * dead + bend * x**2
 
-    lines, whole = with_some_numbers(monkeypatch, select, law, truth, dict.fromkeys(truth, 0.5))
+    whole = Line(law, truth, truth.values())
     monkeypatch.setattr(select, "sample", lambda model: [0])
-    model = lines(Several(whole.numbers[:1], None))
+    model = whole.told_by(whole.numbers[:1])
     found = climb(model, model.start(), [0])
-    fuller, better = select.regained(whole, model, found, quietly)
+    fuller, better = select.regained(whole.law, model, found, quietly)
     assert [number.key for number in fuller.law.numbers] == ["model.a", "model.bend"]
     assert better.place == pytest.approx([0.7, 0.9], abs=0.03) and better.loss < found.loss - 10.0
 
 
-def test_a_weight_that_was_given_up_does_not_come_back_as_the_unit_of_all_weights(monkeypatch):
+def test_a_weight_that_was_given_up_does_not_come_back_as_the_unit_of_all_weights():
     truth = {"apart": 0.9, "together": 0.8, "unit": 0.3}
     defaults = {"apart": 0.5, "together": 0.5, "unit": 0.3}
 
     def law(x, apart, together, unit):  # powers of ten, as places of a logarithmic range are
         return 10.0 ** (unit + together) * x - 10.0 ** (unit + apart) * x**3
 
-    lines, whole = with_some_numbers(monkeypatch, told, law, truth, defaults, log=tuple(truth))
-    model = lines(Several(whole.numbers[1:], None))  # without the weight of keeping apart
+    whole = Line(law, truth, truth.values(), defaults, log=truth)
+    model = whole.told_by(whole.numbers[1:])  # without the weight of keeping apart
     found = climb(model, np.array([0.5, 0.5]), [0, 1])
     assert found.place == pytest.approx([0.4, 0.7], abs=0.02)  # the unit makes up for it
-    in_order, place = exchanged(whole, model, found, quietly)
+    in_order, place = exchanged(whole.law, model, found, quietly)
     assert [number.key for number in in_order.law.numbers] == ["model.apart", "model.together"]
     assert place == pytest.approx([0.9, 0.8], abs=0.02)
 
 
-def test_a_radius_is_told_by_its_own_name_and_not_by_that_of_a_later_one_that_takes_its_part(monkeypatch):
+def test_a_radius_is_told_by_its_own_name_and_not_by_that_of_a_later_one_that_takes_its_part():
     truth, defaults = {"radius": 0.62, "weight": 0.7, "floor": 0.0}, {"radius": 0.1, "weight": 0.7, "floor": 0.0}
 
     def law(x, radius, weight, floor):  # who is within either acts
         return weight * (x < max(radius, floor))
 
-    lines, whole = with_some_numbers(monkeypatch, told, law, truth, defaults)
-    model = lines(Several(whole.numbers[1:], None))
+    whole = Line(law, truth, truth.values(), defaults)
+    model = whole.told_by(whole.numbers[1:])
     found = climb(model, np.array([0.7, 0.62]), [0, 1])
-    in_order, place = exchanged(whole, model, found, quietly)
+    in_order, place = exchanged(whole.law, model, found, quietly)
     assert [number.key for number in in_order.law.numbers] == ["model.radius", "model.weight"]
     assert place == pytest.approx([0.62, 0.7], abs=0.02)
-    again, same = exchanged(whole, in_order, climb(in_order, place, [0, 1]), quietly)
+    again, same = exchanged(whole.law, in_order, climb(in_order, place, [0, 1]), quietly)
     assert again is in_order and same == pytest.approx(place, abs=0.02)
 
 
-def test_a_later_number_stays_where_the_earlier_one_does_not_take_its_part(monkeypatch):
+def test_a_later_number_stays_where_the_earlier_one_does_not_take_its_part():
     truth, defaults = {"slope": 0.2, "bend": 0.8}, {"slope": 0.2, "bend": 0.5}
-    lines, whole = with_some_numbers(monkeypatch, told, lambda x, slope, bend: slope * x + bend * x**2, truth, defaults)
-    model = lines(Several(whole.numbers[1:], None))
-    in_order, place = exchanged(whole, model, climb(model, np.array([0.5]), [0]), quietly)
+    whole = Line(lambda x, slope, bend: slope * x + bend * x**2, truth, truth.values(), defaults)
+    model = whole.told_by(whole.numbers[1:])
+    in_order, place = exchanged(whole.law, model, climb(model, np.array([0.5]), [0]), quietly)
     assert in_order is model and place == pytest.approx([0.8], abs=0.02)
 
 

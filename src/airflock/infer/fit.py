@@ -58,6 +58,14 @@ def loss_at(model: Model, u: Array, free: Sequence[int], spans: Sequence[int] | 
     return model.score(u, spans).loss() + prior(u, free)
 
 
+def beside(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int] | None) -> Fit:
+    """A fit with one more number, which stands at a place; model : with the number, fit : without it."""
+    u = np.insert(fit.place, number, place)
+    free = sorted([number, *(f + (f >= number) for f in fit.free)])
+    score = model.score(u, spans)
+    return Fit(u, free, score, score.loss() + prior(u, free))
+
+
 def jacobian(
     model: Model,
     u: Array,

@@ -1,12 +1,12 @@
 """Given up: what numbers whose defaults explain the tracks as well mean for the intervals of the others."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from airflock.infer.candidates import Candidate, Number
-from airflock.infer.fit import BOTH, FINE, Fit, by_powers, climb, curvature, followed, loss_at
+from airflock.infer.fit import BOTH, FINE, Fit, beside, by_powers, climb, curvature, followed
 from airflock.infer.likelihood import Model
 from airflock.infer.ridges import View, Way
 from airflock.infer.told import acts
@@ -25,11 +25,12 @@ def taken_back(
 
     law : with all its numbers
     """
-    for number, fuller, i in fuller_models(law, model):
+    for number in _missing(law, model):
+        fuller, i = model.with_number(law, number)
+        view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
+        if view is None:
+            continue
         for side in (-1.0, 1.0):
-            view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
-            if view is None:
-                break
             better = view.walk(view.fit.free.index(i), side, True)[1]
             say()
             if better is not None:
@@ -46,21 +47,18 @@ def ways_beside(
     law : with all its numbers; drop : fall of the log-likelihood at which a way ends
     """
     found: list[Way] = []
-    for number, fuller, i in fuller_models(law, model):
+    for number in _missing(law, model):
+        fuller, i = model.with_number(law, number)
         ways = ways_of(fuller, fit, i, number.place(number.default), spans, drop)
         found += [tuple((np.delete(place, i), fell) for place, fell in way) for way in ways]
         say()
     return tuple(found)
 
 
-def fuller_models(law: Candidate, model: Model) -> Iterator[tuple[Number, Model, int]]:
-    """Numbers that the model does without, the model with each, and its index there."""
+def _missing(law: Candidate, model: Model) -> list[Number]:
+    """Numbers of a law that the model does without."""
     assert model.law is not None
-    kept = model.law.numbers
-    for number in law.numbers:
-        if number not in kept:
-            several = tuple(other for other in law.numbers if other in kept or other == number)
-            yield number, Model(replace(law, numbers=several), model.tracks, model.scale), several.index(number)
+    return [number for number in law.numbers if number not in model.law.numbers]
 
 
 def ways_of(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float) -> list[Way]:
@@ -77,13 +75,11 @@ def ways_of(model: Model, fit: Fit, number: int, place: float, spans: Sequence[i
 
 def _view(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float) -> View | None:
     """The view from a fit along a number that it does without; None where that would say nothing about the others."""
-    u = np.insert(fit.place, number, place)
-    free = sorted([number, *(f + (f >= number) for f in fit.free)])
-    beside = Fit(u, free, fit.score, loss_at(model, u, free, spans))
-    far = model.score(u, spans).loss() > fit.score.loss() + drop  # its default lies beyond what is sought
-    if far or not acts(model, [u], number, spans) or exact(model, beside, number, spans):
+    full = beside(model, fit, number, place, spans)
+    far = full.score.loss() > fit.score.loss() + drop  # its default lies beyond what is sought
+    if far or not acts(model, [full.place], number, spans) or exact(model, full, number, spans):
         return None
-    return View(model, beside, spans, drop)
+    return View(model, replace(full, score=fit.score), spans, drop)  # falls are counted from the fit
 
 
 def exact(model: Model, fit: Fit, number: int, spans: Sequence[int]) -> bool:

@@ -6,7 +6,7 @@ Differences along and across the heading are normal, their two variances are tho
 import math
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,17 @@ class Model:
         twin = copy(self)
         twin.held = frozenset({*self.held, *numbers})
         return twin
+
+    def told_by(self, numbers: Sequence[Number]) -> "Model":
+        """The same law on the same tracks, told by other numbers of it."""
+        assert self.law is not None
+        return Model(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
+
+    def with_number(self, law: Candidate, number: Number) -> tuple["Model", int]:
+        """The model with one more number, and its index there; law : with all its numbers, in their order."""
+        assert self.law is not None
+        several = [other for other in law.numbers if other in self.law.numbers or other == number]
+        return self.told_by(several), several.index(number)
 
     def first(self) -> Array:
         """A place to begin with: defaults, usual gains, and of speeds what was seen."""

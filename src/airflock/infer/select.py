@@ -62,7 +62,7 @@ def fit(
     begin = drawn(model, _begin(model, gains), model.few(), seed)
     kept = telling(model, _begin(model, gains), begin, model.few())
     say()
-    model = Model(replace(law, numbers=tuple(law.numbers[k] for k in kept)), tracks, scale)
+    model = model.told_by([law.numbers[k] for k in kept])
     found = race(model, _begin(model, gains), begin[:, kept], free(model), model.few(), say)
     found = polish(model, found.place)
     say()
@@ -76,19 +76,17 @@ def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) 
     the fit the answer may differ. law : with all its numbers
     """
     assert model.law is not None
-    few, kept = model.few(), {number.key for number in model.law.numbers}
+    few, kept = model.few(), model.law.numbers
     best = climb(model, found.place, found.free, few, slopes=(WIDE,))
-    for number in [number for number in law.numbers if number.key not in kept]:
-        several = tuple(other for other in law.numbers if other.key in {*kept, number.key})
-        fuller = Model(replace(law, numbers=several), model.tracks, model.scale)
-        k = several.index(number)
+    for number in [number for number in law.numbers if number not in kept]:
+        fuller, k = model.with_number(law, number)
         places = [np.insert(best.place, k, x) for x in (number.place(number.default), *ELSEWHERE)]
         places.sort(key=lambda u, fuller=fuller: loss_at(fuller, u, free(fuller), few))  # type: ignore[misc]
         tried = [climb(fuller, u, free(fuller), few, REGAIN, slopes=(WIDE,)) for u in places[:2]]
         say()
         with_it = min(tried, key=lambda each: each.loss)
         if with_it.loss < best.loss - WORSE:
-            model, best, kept = fuller, with_it, {*kept, number.key}
+            model, best = fuller, with_it
     if len(model.numbers) == len(found.place):
         return model, found
     return model, polish(model, best.place, LONG)
@@ -120,8 +118,7 @@ def without_spare(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Mo
         return model, found
     rest = [k for k in range(len(model.numbers)) if k not in gone]
     assert model.law is not None
-    numbers = tuple(n for k, n in enumerate(model.law.numbers) if k not in gone)
-    without = Model(replace(model.law, numbers=numbers), model.tracks, scale=model.scale)
+    without = model.told_by([n for k, n in enumerate(model.law.numbers) if k not in gone])
     less = _nearest(without, place[rest], carried[rest])
     if less.loss >= found.loss + 2.0 * len(gone):
         return model, found

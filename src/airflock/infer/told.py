@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import EVEN, WIDE, WORSE, Fit, by_powers, climb, curvature, followed, jacobian, loss_at
+from airflock.infer.fit import EVEN, WIDE, WORSE, Fit, beside, by_powers, climb, curvature, followed, jacobian, loss_at
 from airflock.infer.likelihood import Model
 from airflock.infer.search import scan
 
@@ -81,26 +81,22 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
     place, lowest = fit.place, climb(model, fit.place, fit.free, few, slopes=(WIDE,)).loss
     for earlier in law.numbers:
         assert model.law is not None
-        kept = model.law.numbers
-        if earlier in kept:
+        if earlier in model.law.numbers:
             continue
-        several = tuple(number for number in law.numbers if number in kept or number == earlier)
-        fuller, i = Model(replace(law, numbers=several), model.tracks, model.scale), several.index(earlier)
-        u = np.insert(place, i, earlier.place(earlier.default))
-        free = sorted([i, *(f + (f >= i) for f in fit.free)])
-        beside = Fit(u, free, fuller.score(u, few), loss_at(fuller, u, free, few))
-        curved = curvature(fuller, beside, few, EVEN)
+        fuller, i = model.with_number(law, earlier)
+        full = beside(fuller, replace(fit, place=place), i, earlier.place(earlier.default), few)
+        curved = curvature(fuller, full, few, EVEN)
         for k in reversed(range(i + 1, fuller.named)):
-            if not (_may_go(fuller, k) and _away(fuller, beside, k)):
+            if not (_may_go(fuller, k) and _away(fuller, full, k)):
                 continue
-            without, rest = fuller.fixed([k]), [f for f in free if f != k]
-            start = _given_up(without, beside, curved, k, few)
-            if loss_at(without, start, rest, few) > beside.loss + UNLIKELY or abs(start[i] - u[i]) < APART:
+            without, rest = fuller.fixed([k]), [f for f in full.free if f != k]
+            start = _given_up(without, full, curved, k, few)
+            if loss_at(without, start, rest, few) > full.loss + UNLIKELY or abs(start[i] - full.place[i]) < APART:
                 continue
             found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
             if found.loss < lowest + WORSE:
-                numbers = tuple(number for f, number in enumerate(several) if f != k)
-                model, place = Model(replace(law, numbers=numbers), model.tracks, model.scale), np.delete(start, k)
+                model = fuller.told_by([number for f, number in enumerate(fuller.numbers[: fuller.named]) if f != k])
+                place = np.delete(start, k)
                 fit = replace(fit, free=[f - (f > k) for f in rest])
                 break
         say()
