@@ -177,14 +177,6 @@ def test_a_periodic_box_too_small_for_images_is_met_in_all_pairs():
     assert plan_of(crowd("periodic", 1.0), grid=True).grid
 
 
-def test_agents_with_numbers_of_the_law_of_their_own_are_met_in_all_pairs():
-    """Cells are as wide as one reach; whoever asks for them gets a flight all the same."""
-    groups = {"groups": [{"name": "far", "agents": 30, "model": {"r_s": 0.4}}]}
-    found = load("zapotecatl_2016/best", {"agents": 300, "update": "synchronous", **groups})
-    plan = plan_of(found, precision=64, grid=True)
-    assert not plan.grid
-
-
 def test_particles_are_ordered_at_low_noise_and_not_at_high():
     settings = {"agents": 300, "world.side": 8.66, "duration": 800.0}
     at = {eta: score_flight(load("vicsek_1995/transition", {"model.eta": eta, **settings})) for eta in (0.1, 2.0, 6.28)}

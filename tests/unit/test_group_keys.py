@@ -104,14 +104,9 @@ def test_each_group_has_sliders_of_its_own_numbers():
     assert fields({"groups.old.ones.model.p_rep": 0.2}) == "--set groups.old.ones.model.p_rep=0.2"
 
 
-@pytest.mark.parametrize(("model", "what"), [
-    ({"kind": "couzin_2005"}, "laws"), ({"dr_o": 3.0}, "numbers of the law"), ({}, ""),
-])  # fmt: skip
-def test_a_large_flock_that_groups_keep_from_cells_is_told_so_and_judged_so(model, what):
+@pytest.mark.parametrize("model", [{"kind": "couzin_2005"}, {"dr_o": 3.0}, {}])
+def test_the_groups_of_a_large_flock_cost_no_square_of_its_number(model):
     large = {"agents": 5000, "start.radius": 60.0, "groups": [{"name": "a", "agents": 9, "model": model}]}
     found, plain = load("couzin_2002/torus", large), load("couzin_2002/torus", {**large, "groups": []})
-    told = [note for note in found.notes if note.startswith("groups: where")]
-    assert told == ([note for note in told if f"where {what} differ" in note] if what else [])
-    assert bool(told) is bool(what) is (seconds_of(found) > 10.0 * seconds_of(plain))
-    few = load("couzin_2002/torus", {**large, "agents": 100})
-    assert not any(note.startswith("groups: where") for note in few.notes)
+    assert not any(note.startswith("groups: ") for note in found.notes)
+    assert seconds_of(found) < 2.0 * seconds_of(plain)

@@ -3,8 +3,11 @@
 And whether order parameters look at pairs by cells.
 """
 
+import math
 from dataclasses import replace
 
+from airflock.rules.reading import fields_read
+from airflock.scenarios.group_laws import Law
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.timing import clock
 from airflock.world.place import half_sizes
@@ -19,13 +22,11 @@ NEAR_FROM, NEAR_FROM_IN_A_BOX = 6000, 2000
 def takes_all_cores(scenario: Scenario) -> bool:
     """Whether one flight of a scenario uses all cores by itself, so that several side by side gain nothing.
 
-    Its neighbours are found by cells: many agents, a model of finite reach, perception as things are.
+    Its neighbours are found by cells: many agents, laws of finite reach, perception as things are.
     """
     perfect = not scenario.errs and clock(scenario)["delay"] == 0 and scenario.radio.loss == 0.0
     return (
         scenario.agents >= GRID_FROM
-        and scenario.model.reach is not None
-        and scenario.model.neighbour is not None
         and perfect
         and by_cells(scenario)
         and not scenario.transceiver.keeps
@@ -37,35 +38,55 @@ def takes_all_cores(scenario: Scenario) -> bool:
 
 
 def group_notes(scenario: Scenario) -> list[str]:
-    """A note where only the groups keep a large flock from being flown by cells."""
-    if not scenario.groups or scenario.agents < GRID_FROM or takes_all_cores(scenario):
+    """A note where only the laws of groups keep a large flock from being flown by cells."""
+    if not scenario.groups or takes_all_cores(scenario) or not takes_all_cores(replace(scenario, groups=())):
         return []
-    if not takes_all_cores(replace(scenario, groups=())):
-        return []
-    what = "laws" if len(scenario.laws) > 1 else "numbers of the law"
+    if not by_cells(scenario):
+        endless = next(law.model.name for law in scenario.laws if not _within_reach(law))
+        why = f"{endless} looks without end (it has no reach)"
+    else:
+        why = "the box is less than two of their reaches wide"
     return [
-        f"groups: where {what} differ, each of {scenario.agents} agents looks at all others, on one core, and not at "
-        "those in the cells around it, on all cores"
+        f"groups: {why}, so each of {scenario.agents} agents looks at all others, on one core, and not at those in the "
+        "cells around it, on all cores"
     ]
 
 
 def by_cells(scenario: Scenario) -> bool:
-    """Whether cells as wide as the law's reach hold all who decide whom an agent meets; all agents have that reach."""
-    if len(scenario.laws) > 1 or (scenario.groups and scenario.laws[0].asks_for_groups):
-        return False
-    if any(letter == "p" for letter, _ in scenario.varied):
+    """Whether cells as wide as a law's reach hold all who decide whom an agent of it meets."""
+    if not any(law.model.neighbour for law in scenario.laws) or not all(map(_within_reach, scenario.laws)):
         return False
     kind = scenario.meets
     walls = scenario.scene.kind != "none" or bool(scenario.world.obstacles)
     return kind is None or (kind.near and not (walls and kind.asks("hidden")))
 
 
+def _within_reach(law: Law) -> bool:
+    """Whether a law looks at nobody beyond a reach that it tells."""
+    return law.model.neighbour is None or law.model.reach is not None
+
+
 def has_room(scenario: Scenario) -> bool:
     """Whether a periodic box is two reaches wide, so that a neighbour is in reach at one image only."""
-    if scenario.world.edges != "periodic" or scenario.model.reach is None:
+    if scenario.world.edges != "periodic":
         return True
     halves = half_sizes(scenario.world)[: scenario.dimensions]
-    return min(halves) >= float(scenario.model.reach(scenario.parameters))
+    return min(halves) >= max(_widest_reach(scenario, law) for law in scenario.laws)
+
+
+def _widest_reach(scenario: Scenario, law: Law) -> float:
+    """The widest reach of those who fly by a law, m; without end where it is a matter of chance."""
+    if law.model.reach is None or law.model.neighbour is None:
+        return 0.0
+    read = fields_read(law.model.reach, "p")
+    found = [float(law.model.reach(law.parameters))]
+    for group in scenario.groups:
+        if set(group.agents) <= set(law.agents):
+            if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
+                return math.inf
+            own = {name: value for (letter, name), value in group.numbers.items() if letter == "p"}
+            found.append(float(law.model.reach(replace(law.parameters, **own))))
+    return max(found)
 
 
 def measured_by_cells(scenario: Scenario) -> bool:

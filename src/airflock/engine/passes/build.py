@@ -143,7 +143,7 @@ class Builder:
         apart : the rows that it reads once become arguments, which the compiler then knows to lie apart in memory
         """
         if not self.plan.sequential and not (apart and self.apart):
-            spread = self.plan.grid and name == "decide"
+            spread = self.plan.grid and name == f"decide{self.mark}"
             body = must_replace(body, "i in range(n)", "i in prange(n)") if spread else body
             self.function(f"{name}({arguments})", lines, body, f"return {answer}", parallel=spread)
             return

@@ -28,6 +28,9 @@ def neighbours(build: Builder) -> None:
         sums=sums, images=images,
     )  # fmt: skip
     if plan.grid:
+        if plan.varies("p"):
+            wide = specialise(build, meeting.widest)
+            build.function(f"widest{build.mark}(n, row, work)", wide.lines, f"return {wide.answer}")
         grid.neighbours(build, *_for_cells(build, made), [c for c, _ in sums])
         return
     arguments = ", ".join(["k_, n, m, time, late, row, whole, work, store, words", *more])
@@ -47,16 +50,21 @@ def _for_cells(
     found |= set(grid.FOUND)
     lines = [line for line in made.once if line.partition(" = ")[0] not in found]
     lines = list(dict.fromkeys([*(build.records("w") if build.plan.periodic else []), *lines]))
-    (agents,) = made.rest
+    *first, agents = made.rest
     assert isinstance(agents, ast.For)
-    at = next(k for k, statement in enumerate(agents.body) if isinstance(statement, ast.For))
-    candidates = agents.body[at]
+    body = agents.body
+    if plan.law is not None:  # who does not fly by this law is left out by the grid
+        (own,) = body
+        assert isinstance(own, ast.If)
+        body = own.body
+    at = next(k for k, statement in enumerate(body) if isinstance(statement, ast.For))
+    candidates = body[at]
     assert isinstance(candidates, ast.For)
-    before = lines_of(agents.body[:at])
+    before = lines_of([*first, *body[:at]])
     if plan.topology is None:
         return lines, before, lines_of(candidates.body), None
     made_of = specialise(build, meeting_whom.meet, m=argument("padded"))
-    again = agents.body[at + 2]
+    again = body[at + 2]
     assert isinstance(again, ast.For)
     lines += [line for line in made_of.bindings if " = work[" not in line]
     return lines, before, lines_of(again.body), (lines_of(candidates.body), lines_of(made_of.first))

@@ -11,7 +11,7 @@ loss; there it equals all pairs but for rounding and the order of sums.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ def memory(
         return ()
     real, whole = (np.float32, np.int32) if plan.bits == 32 else (np.float64, np.int64)
     components, most = 2 * plan.dimensions, CELLS * agents + SPARE
-    fields = len(getattr(plan.model.Sums, "_fields", ()))
+    fields = max(len(getattr(own.model.Sums, "_fields", ())) for own in plan.every)
     shapes = (
         ((most + 1,), np.int64), ((CHUNKS * most,), np.int32), ((agents,), np.int32),
         ((agents,), whole), ((agents, _width(plan)), real), ((components, agents + BLOCK), real),
@@ -72,13 +72,19 @@ def neighbours(
 
     met : where an agent meets but some of whom it hears, lines before `inner` that find out: of each candidate, at last
     """
-    for c, name in enumerate(build.plan.motion):
-        before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
+    plan, mark, law = build.plan, build.mark, build.plan.law
+    for c, name in enumerate(plan.motion):
+        if any(f"m{name}[i]" in line for line in before):  # not every rule asks how an agent itself moves
+            before = must_replace(before, f"m{name}[i]", f"packed[e, {c}]")
     who = any("integer(j) < ii" in line for line in inner)  # a rule asks who has the lower index
     before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
     if met is None:
         inner = must_replace(inner, "integer(j) != ii", OTHERS)
     inner = must_replace(inner, "integer(j) < ii", "who[j] < ii") if who else inner
+    carried = {"who": (f"np.int{plan.bits}", "ident[origin + s]", "integer(-1)")} if who else {}
+    if any("group[j]" in line for line in inner):
+        inner = must_replace(inner, "group[j]", "group_of[j]")
+        carried["group_of"] = ("work.dtype", "group[whose[origin + s]]", "ZERO")
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     if met is not None:
         meet += _found(*met)
@@ -87,6 +93,8 @@ def neighbours(
     meet += loop("q in range(padded)", ["j = first + np.uint64(q)", *inner])
     wide = max(1, len(sums))
     meet += ["slot = whose[e]", *[f"totals[slot, {k}] = total_{c}" for k, c in enumerate(sums)]]
+    if law is not None or any("[i]" in line for line in meet):
+        meet = ["i = whose[e]", *_of_law(law, meet)]
     cell = [
         "here = (oz * count[1] + oy) * count[0] + ox",
         *["if starts[here] == starts[here + 1]:", "    continue"],
@@ -96,20 +104,25 @@ def neighbours(
     ]
     found = re.findall(r"\w+", "\n".join(line for part in met or () for line in part))
     rows = [f"{name} = np.zeros(room + {2 * BLOCK}, work.dtype)" for name in FOUND if name in found]
-    body = [*_slabs(build, who), *rows, *loop("ox in range(count[0])", cell)]
-    lines = [*lines, *sort(build, "near", f"{CELLS} * n"), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
+    body = _line([*_slabs(build, carried), *rows, *loop("ox in range(count[0])", cell)], law)
+    near = f"widest{mark}(n, row, work)" if plan.varies("p") else "near"
+    lines = [*lines, *sort(build, near, f"{CELLS} * n"), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
     if who:
         number = "order[whose[e]]" if build.slots else "whose[e]"
         each = loop("e in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [f"ident[e] = {number}"])
         lines += [*build.order(), *loop("chunk in prange(CHUNKS)", each)]
     lines += loop("line in prange(count[1] * count[2])", body)
-    back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", [
-        f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)
-    ])  # fmt: skip
+    each = _of_law(law, [f"sum{c}[i] = totals[i, {k}]" for k, c in enumerate(sums)])
+    back = loop("i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)", each)
     lines += loop("chunk in prange(CHUNKS)", back)
     lines = must_replace(lines, "CHUNKS", str(CHUNKS))
     arguments = "k_, n, m, time, late, row, whole, work, store, words, cells"
-    build.function(f"neighbours({arguments})", lines, "return 0", parallel=True)
+    build.function(f"neighbours{mark}({arguments})", lines, "return 0", parallel=True)
+
+
+def _of_law(law: int | None, lines: list[str]) -> list[str]:
+    """Lines for agent i, where it flies by this law; for every agent where there is but one."""
+    return lines if law is None else branch(f"law[i] == {law}", lines)
 
 
 def sort(build: Builder, near: str, most: str) -> list[str]:
@@ -186,27 +199,30 @@ def _sorted(build: Builder) -> list[str]:
     return lines + loop("chunk in prange(CHUNKS)", loop(must_replace(part, "i in", "e in"), each))
 
 
-def _slabs(build: Builder, who: bool) -> list[str]:
-    """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins)."""
+def _slabs(build: Builder, carried: Mapping[str, tuple[str, str, str]]) -> list[str]:
+    """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins).
+
+    carried : what else of candidates is laid side by side, by name: kind of number, where it lies, and that of nobody
+    """
     axes, periodic = build.plan.axes, build.plan.periodic
     names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
     shifts = {f"h{a}": f"shift_{a}" for a in axes} if periodic else {}
     across = axes[1:]
-    lines = [f"wide = {STRIP} * count[2]; strip = line // wide; high = min({STRIP}, count[1] - strip * {STRIP})"]
-    lines += [f"oz = (line - strip * wide) // high; oy = strip * {STRIP} + (line - strip * wide) % high", "room = 0"]
+    lines = ["room = 0"]
     rows = ["base = " + ("(cz * count[1] + cy)" if "z" in axes else "cy") + " * count[0]"]
     span = ["room += starts[base + count[0]] - starts[base]"]
     ends = "room += starts[base + 1] - starts[base] + starts[base + count[0]] - starts[base + count[0] - 1]"
     span += [ends] * periodic
     lines += _around(build, across, rows + span, False)
     lines += [f"box = np.empty(({len(names)}, room + {2 * BLOCK}), work.dtype)"]
-    lines += [f"who = np.empty(room + {2 * BLOCK}, np.int{build.plan.bits})"] if who else []
+    lines += [f"{name} = np.empty(room + {2 * BLOCK}, {kind})" for name, (kind, _, _) in carried.items()]
     lines += [f"{name} = box[{c}]" for c, name in enumerate(names)]
     lines += ["slab = np.zeros(count[0] + 3, np.int64); middle = np.zeros(count[0] + 1, np.int64); found = 0"]
     copy = [
         f"copy_block(box, {c}, found + s, flat, origin + s, {shifts.get(name, 'ZERO')})" for c, name in enumerate(names)
     ]
-    ids = loop("s in range(inside)", ["who[found + s] = ident[origin + s]"]) * who
+    kept = [f"{name}[found + s] = {at}" for name, (_, at, _) in carried.items()]
+    ids = loop("s in range(inside)", kept) if kept else []
     own = "(qy == oy) & (qz == oz)" if "z" in axes else "qy == oy"
     each = [*rows, f"if {own}:", "    middle[min(max(qx, 0), count[0])] = found"]
     each += ["origin = starts[base + cx]; inside = starts[base + cx + 1] - origin"]
@@ -220,8 +236,20 @@ def _slabs(build: Builder, who: bool) -> list[str]:
     lines += loop(f"qx in range({first}, {last})", slab)
     lines += [f"slab[{'count[0] + 2' if periodic else 'count[0] + 1'}] = found"]
     lines += [] if periodic else ["slab[count[0] + 2] = found"]
-    rest = [f"h{a}[s] = AWAY; hv{a}[s] = ZERO" for a in axes] + ["who[s] = integer(-1)"] * who
+    rest = [f"h{a}[s] = AWAY; hv{a}[s] = ZERO" for a in axes]
+    rest += [f"{name}[s] = {nobody}" for name, (_, _, nobody) in carried.items()]
     return lines + loop(f"s in range(found, found + {BLOCK})", rest)
+
+
+def _line(body: list[str], law: int | None) -> list[str]:
+    """The work of a line of cells, at oy and oz; where laws differ, only where somebody in it flies by this one."""
+    lines = [f"wide = {STRIP} * count[2]; strip = line // wide; high = min({STRIP}, count[1] - strip * {STRIP})"]
+    lines += [f"oz = (line - strip * wide) // high; oy = strip * {STRIP} + (line - strip * wide) % high"]
+    if law is None:
+        return lines + body
+    lines += ["row_of = (oz * count[1] + oy) * count[0]", "some = False"]
+    lines += loop("e in range(starts[row_of], starts[row_of + count[0]])", [f"some |= law[whose[e]] == {law}"])
+    return lines + branch("some", body)
 
 
 def _around(build: Builder, across: tuple[str, ...], body: list[str], shifted: bool) -> list[str]:

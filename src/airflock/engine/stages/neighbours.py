@@ -22,9 +22,13 @@ from airflock.engine.stages.words import (
     ask,
     integer,
     least,
+    most,
+    real,
     totals,
     vector,
 )  # fmt: skip
+
+SMALLEST = 1e-3  # m; width of the cells of a law that nobody flies by
 
 
 def oneself(i: int, own: Any, v: Any, h: Any, true: Any, flock: Flock, *, plan: Plan) -> None:
@@ -47,6 +51,15 @@ def squared_reach(p: Any, *, plan: Plan, model: Model) -> Any:
     """Square of the law's reach with these numbers, m², as squares of distances are compared with it."""
     near = least(ask(model.reach, p=p), LIMIT)
     return near * near + TINY if plan.bits == 64 else near * near
+
+
+def widest(agents: Iterable[int], flock: Flock, numbers: Any, *, plan: Plan, model: Model) -> Any:
+    """The widest reach of those who fly by a law whose numbers differ among them, m."""
+    near = real(SMALLEST)
+    for i in agents:
+        own_p = numbers_of(i, "p", flock, numbers, plan=plan)
+        near = most(near, least(ask(model.reach, p=own_p), LIMIT))
+    return near
 
 
 def draw_words(i: int, flock: Flock, draw: Callable[[int], None], *, plan: Plan) -> None:
