@@ -107,9 +107,11 @@ def test_a_box_has_room_for_cells_where_it_is_two_of_the_widest_reaches_wide(rea
 def test_a_reach_of_chance_flies_by_cells_in_the_open_alone(soon):
     def drawn(name, **more):
         own = {"name": "a", "agents": 9, "model": {name: {"value": 0.5, "spread": 0.1}}}
-        return plan_of(load("couzin_2002/torus", {**SCHOOL, **more, "groups": [own]})).grid
+        return load("couzin_2002/torus", {**SCHOOL, **more, "groups": [own]})
 
-    assert drawn("r_r") and drawn("sigma", **BOX) and not drawn("r_r", **BOX)
+    assert plan_of(drawn("r_r")).grid and plan_of(drawn("sigma", **BOX)).grid
+    found = drawn("r_r", **BOX)
+    assert not plan_of(found).grid and any("their reach is drawn" in note for note in found.notes)
 
 
 def test_a_law_without_a_reach_keeps_a_large_flock_from_cells_and_a_note_says_so(wary):

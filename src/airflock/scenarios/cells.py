@@ -45,7 +45,8 @@ def group_notes(scenario: Scenario) -> list[str]:
         endless = next(law.model.name for law in scenario.laws if not _within_reach(law))
         why = f"{endless} looks without end (it has no reach)"
     else:
-        why = "the box is less than two of their reaches wide"
+        drawn = any(_widest_reach(scenario, law) == math.inf for law in scenario.laws)
+        why = "their reach is drawn, in a periodic box" if drawn else "the box is less than two of their reaches wide"
     return [
         f"groups: {why}, so each of {scenario.agents} agents looks at all others, on one core, and not at those in the "
         "cells around it, on all cores"
@@ -81,7 +82,7 @@ def _widest_reach(scenario: Scenario, law: Law) -> float:
     read = fields_read(law.model.reach, "p")
     found = [float(law.model.reach(law.parameters))]
     for group in scenario.groups:
-        if set(group.agents) <= set(law.agents):
+        if group.agents and set(group.agents) <= set(law.agents):
             if any(letter == "p" and (read is None or name in read) for letter, name in group.spread):
                 return math.inf
             own = {name: value for (letter, name), value in group.numbers.items() if letter == "p"}

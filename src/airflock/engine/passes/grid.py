@@ -12,7 +12,7 @@ loss; there it equals all pairs but for rounding and the order of sums.
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,14 @@ SPARE = 8  # cells of the smallest periodic box
 FOUND = ("square", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, where some are met
 OTHERS = "(integer(q) != me) & (integer(q) < many)"
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
+
+
+class Carried(NamedTuple):
+    """What of candidates is laid side by side: kind of number, where that of one at `origin + s` is, that of nobody."""
+
+    kind: str
+    at: str
+    nobody: str
 
 
 def memory(
@@ -80,11 +88,13 @@ def neighbours(
     before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
     if met is None:
         inner = must_replace(inner, "integer(j) != ii", OTHERS)
-    inner = must_replace(inner, "integer(j) < ii", "who[j] < ii") if who else inner
-    carried = {"who": (f"np.int{plan.bits}", "ident[origin + s]", "integer(-1)")} if who else {}
+    carried = {}
+    if who:
+        inner = must_replace(inner, "integer(j) < ii", "who[j] < ii")
+        carried["who"] = Carried(f"np.int{plan.bits}", "ident[origin + s]", "integer(-1)")
     if any("group[j]" in line for line in inner):
         inner = must_replace(inner, "group[j]", "group_of[j]")
-        carried["group_of"] = ("work.dtype", "group[whose[origin + s]]", "ZERO")
+        carried["group_of"] = Carried("work.dtype", "group[whose[origin + s]]", "ZERO")
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     if met is not None:
         meet += _found(*met)
@@ -199,10 +209,10 @@ def _sorted(build: Builder) -> list[str]:
     return lines + loop("chunk in prange(CHUNKS)", loop(must_replace(part, "i in", "e in"), each))
 
 
-def _slabs(build: Builder, carried: Mapping[str, tuple[str, str, str]]) -> list[str]:
+def _slabs(build: Builder, carried: Mapping[str, Carried]) -> list[str]:
     """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins).
 
-    carried : what else of candidates is laid side by side, by name: kind of number, where it lies, and that of nobody
+    carried : what else of candidates is laid side by side, by name
     """
     axes, periodic = build.plan.axes, build.plan.periodic
     names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
@@ -215,13 +225,13 @@ def _slabs(build: Builder, carried: Mapping[str, tuple[str, str, str]]) -> list[
     span += [ends] * periodic
     lines += _around(build, across, rows + span, False)
     lines += [f"box = np.empty(({len(names)}, room + {2 * BLOCK}), work.dtype)"]
-    lines += [f"{name} = np.empty(room + {2 * BLOCK}, {kind})" for name, (kind, _, _) in carried.items()]
+    lines += [f"{name} = np.empty(room + {2 * BLOCK}, {each.kind})" for name, each in carried.items()]
     lines += [f"{name} = box[{c}]" for c, name in enumerate(names)]
     lines += ["slab = np.zeros(count[0] + 3, np.int64); middle = np.zeros(count[0] + 1, np.int64); found = 0"]
     copy = [
         f"copy_block(box, {c}, found + s, flat, origin + s, {shifts.get(name, 'ZERO')})" for c, name in enumerate(names)
     ]
-    kept = [f"{name}[found + s] = {at}" for name, (_, at, _) in carried.items()]
+    kept = [f"{name}[found + s] = {each.at}" for name, each in carried.items()]
     ids = loop("s in range(inside)", kept) if kept else []
     own = "(qy == oy) & (qz == oz)" if "z" in axes else "qy == oy"
     each = [*rows, f"if {own}:", "    middle[min(max(qx, 0), count[0])] = found"]
@@ -237,7 +247,7 @@ def _slabs(build: Builder, carried: Mapping[str, tuple[str, str, str]]) -> list[
     lines += [f"slab[{'count[0] + 2' if periodic else 'count[0] + 1'}] = found"]
     lines += [] if periodic else ["slab[count[0] + 2] = found"]
     rest = [f"h{a}[s] = AWAY; hv{a}[s] = ZERO" for a in axes]
-    rest += [f"{name}[s] = {nobody}" for name, (_, _, nobody) in carried.items()]
+    rest += [f"{name}[s] = {each.nobody}" for name, each in carried.items()]
     return lines + loop(f"s in range(found, found + {BLOCK})", rest)
 
 
