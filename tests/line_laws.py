@@ -22,6 +22,7 @@ class Line(Model):
             for name in names
         ]  # fmt: skip
         self.named, self.usual, self.axes, self.spans, self.held = len(names), None, 2, [(0, 0)], frozenset()
+        self.soft = False
         self.own_speed, self.tracks, self.scale = True, (), None
         flags = {name: defaults[name] for name in usual_numbers}
         scenario = SimpleNamespace(model=SimpleNamespace(usual=flags))
@@ -48,7 +49,7 @@ class Line(Model):
         """The law with all its numbers."""
         return getattr(self, "origin", self)
 
-    def differences(self, u, spans=None):
+    def innovations(self, u, spans=None):
         u = [n.place(n.default) if k in self.held else x for k, (n, x) in enumerate(zip(self.numbers, u, strict=True))]
         e = self.noise.copy()
         e[:, 0] += self.seen - self.rule(self.input, *u)

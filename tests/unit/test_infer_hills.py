@@ -29,6 +29,15 @@ def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_ane
     assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
 
 
+def test_a_step_at_an_edge_does_not_part_numbers_that_act_together():
+    def law(x, a, b, slope):  # a and b act where x is small, and b at one step far more than at any other
+        edge = np.where(np.arange(len(x)) == 7, 20.0 * b, 0.0)
+        return np.where(x < 0.5, x * (a + b**2), slope * (x - 0.5)) + edge
+
+    model = Line(law, ("a", "b", "slope"), (0.8, 0.5, 0.6))
+    assert groups(model, climb(model, np.array([0.7, 0.5, 0.5]), [0, 1, 2]), [0]) == [[0, 1]]
+
+
 def test_a_narrow_ridge_is_gone_along_beyond_the_better_of_two_ends():
     def law(x, a, b):  # a and b make up for each other along a parabola, on which nothing but a slight slope leads on
         return 30.0 * x * (b - (a - 0.1) ** 2) + 0.5 * x**2 * a

@@ -1,5 +1,6 @@
 """Search of infer: on laws of one line, whose highest hill is known, it is found, and what cannot be told is left."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +24,7 @@ from airflock.infer.fit import (
     spread,
 )
 from airflock.infer.flights import Noise
+from airflock.infer.likelihood import SOFT, deviation, soft
 from airflock.infer.ridges import at_end, ridges
 from airflock.infer.search import drawn, profile, race, usual
 from airflock.infer.told import exchanged, simplify, telling
@@ -163,6 +165,37 @@ def test_standard_errors_are_those_of_least_squares():
     fit = climb(ridge, ridge.start(), [0, 1])
     moved = followed(fit, curvature(ridge, fit, [0]), 0, 0.8)
     assert moved[0] == 0.8 and moved[1] == pytest.approx(fit.place[1] + fit.place[0] - 0.8, abs=1e-3)
+
+
+def test_large_differences_count_by_their_size_and_normal_ones_keep_their_variance(seed):
+    z = 3.0 * np.random.default_rng(seed).normal(size=(200_000, 2))
+    assert soft(z).std(axis=0) == pytest.approx(3.0, rel=0.01)
+    size = deviation(z[:, 0])
+    assert size == pytest.approx(3.0, rel=0.01)
+    at = np.linspace(0.0, 40.0, 401)[:, None] * size
+    grown = soft(np.vstack([z[:, :1], at]))[len(z) :, 0] ** 2
+    near, far = at[:, 0] < 1.3 * size, at[:, 0] > 1.4 * size
+    assert np.diff(grown[near], 2) == pytest.approx(np.diff(grown[near], 2)[0])  # as squares
+    assert np.diff(grown[far], 2) == pytest.approx(0.0, abs=1e-3 * size**2)  # as sizes
+    lost = soft(np.vstack([z[:1000], [[np.nan, np.inf]]]))
+    assert np.isfinite(lost).all() and np.abs(lost[:-1]).max() < 20.0
+
+
+def test_the_deviation_solves_its_equation_whatever_is_wild(seed):
+    e = np.random.default_rng(seed).normal(size=500)
+    for wild in (0, 20, 200):
+        e[:wild] *= 50.0
+        z = np.abs(e) / deviation(e)
+        assert np.minimum(z * z, SOFT * z).mean() == pytest.approx(math.erf(SOFT / math.sqrt(2.0)))
+
+
+def test_a_number_is_told_beside_a_few_steps_that_went_another_way():
+    """One in twenty steps says what no number of the law does; all squares together would move one by many errors."""
+    model = Line(lambda x, a, b: a * x + b, ("a", "b"), (0.5, 0.5))
+    model.seen = model.seen + np.where(np.arange(STEPS) % 20 == 7, 1.0, 0.0)
+    plain, less = (abs(climb(each, each.start(), [0, 1]).place[1] - 0.5) for each in (model, model.softened()))
+    error = spread(model.softened(), climb(model.softened(), model.start(), [0, 1]), [0])[1]
+    assert plain > 4.0 * error > 2.0 * less
 
 
 def test_steps_of_a_likelihood_are_walked_down_which_have_no_slope():

@@ -8,13 +8,13 @@ narrower than the curvature of the likelihood says, nor than the ridges on which
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.infer.candidates import Candidate
-from airflock.infer.fit import FINE, Fit, climb, closed_end, loss_at, open_ends, settle, spread
+from airflock.infer.fit import BOTH, FINE, Fit, climb, closed_end, loss_at, open_ends, settle, spread
 from airflock.infer.flights import Flights, Noise, first_noise
 from airflock.infer.given_up import ways_beside
 from airflock.infer.likelihood import Model
@@ -33,6 +33,7 @@ BEYOND = (0.0075, 0.05)
 DOUBT = 0.5  # share of a correction that is not trusted
 ONE = 1.96  # standard errors that hold one number in 95 %
 APART = 0.05  # of a range: largest standard deviation by which the laws of the last flights are apart
+UNLIKELY = 20.0  # loss above the fit, beyond which another end is left
 SURE = 0.95  # of a number alone, and of all numbers together
 WIDER = (1.0, 3.0)  # least and largest variance of refitted numbers, in units of what the curvature says
 
@@ -70,6 +71,7 @@ def again(
     from scipy.stats import norm as normal
     from scipy.stats import t as student
 
+    model, fit = _softened(model, fit, spans)
     kinds = first_noise(model, fit.place, spans)
     named = [k for k in fit.free if k < model.named]
     shares = levels(len(named) + (kinds[0].column >= 0))
@@ -103,6 +105,16 @@ def again(
         noise, ends = _noise(flights, place, 0.5 * (found[0][1] - found[0][0]) / ONE, noise, fitted, shares)
         say()
     return Again(place, found[0], found[1], noise, (ends[0], ends[1]))
+
+
+def _softened(model: Model, fit: Fit, spans: Sequence[int]) -> tuple[Model, Fit]:
+    """The model in which large differences count less, and its fit, from that of all differences or another end."""
+    model = model.softened()
+    here = model.score(fit.place, spans).loss()
+    near = [u for u in fit.others if model.score(u, spans).loss() < here + UNLIKELY]
+    ends = [climb(model, u, fit.free, spans, slopes=(FINE, BOTH)) for u in (fit.place, *near)]
+    best = min(ends, key=lambda end: end.loss)
+    return model, replace(best, others=(*fit.others, *(end.place for end in ends if end is not best)))
 
 
 def _put_right(

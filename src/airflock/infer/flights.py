@@ -127,7 +127,8 @@ class Flights:
     def model_of(self, tracks: list[Tracks]) -> Model:
         """The same model on other tracks."""
         twin = Model(self.model.law, tracks, self.model.scale)
-        return twin.fixed(sorted(self.model.held))
+        twin = twin.fixed(sorted(self.model.held))
+        return twin.softened() if self.model.soft else twin
 
     def noise(self, place: Array, first: Noise, fitted: Array) -> tuple[Noise, float]:
         """Noise with which the flights' statistics are those of the tracks, and the misfit.

@@ -16,7 +16,7 @@ from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 TOGETHER = 4  # numbers that are drawn anew together, at most
-ALIKE = 0.5  # overlap of where two numbers act, from which they are
+ALIKE = 0.8  # overlap of where two numbers act, from which they are
 GROUPS = 3  # of them, those told worst first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
 ALONE, ALL, WHOLE = (16, 10), (10, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
@@ -93,7 +93,7 @@ def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
     """Groups of named numbers that act on the same steps, around those that are told worst."""
     named = [k for k in fit.free if k < model.named]
     slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
-    flat = slopes.reshape(-1, len(named))
+    flat = np.sqrt(slopes.reshape(-1, len(named)))  # a few steps at edges would outweigh all others
     sizes = np.maximum(np.linalg.norm(flat, axis=0), 1e-30)
     overlap = (flat.T @ flat) / np.outer(sizes, sizes)
     errors = np.diag(np.linalg.inv(curvature(model, fit, spans)))[[fit.free.index(k) for k in named]]

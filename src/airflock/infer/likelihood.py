@@ -16,11 +16,60 @@ from airflock.infer.tracks import COUNTED, Scale, Tracks
 from airflock.infer.walk import Gains, Walk
 
 Array = NDArray[np.float64]
+SOFT = 1.345  # of a standard deviation: where nothing is wild, numbers are told 0.95 as surely (Huber 1964)
+LOST, TINY = 1e6, 1e-15  # m; somebody who flew off, and less than any difference
+LOOKS = 100  # at most, for a standard deviation; about six do
+# with which normal differences keep their variance: 1 over the mean of twice Huber's function
+_DENSITY, _WITHIN = math.exp(-0.5 * SOFT**2) / math.sqrt(2.0 * math.pi), math.erf(SOFT / math.sqrt(2.0))
+SAME = (_WITHIN + 2.0 * SOFT * _DENSITY - SOFT**2 * (1.0 - _WITHIN)) ** -0.5
+AS_NORMAL = _WITHIN  # mean of min(z², SOFT |z|) of normal numbers
 FIRST_GAINS = (0.6, 0.3, 0.6, 0.3, 0.9)
 SMALL = 360  # frames on which is searched
 KP = Number("gain", -1, "1", 0.01, 0.999, False, 0.6)
 KV = Number("gain", -1, "1", 3e-4, 1.3, True, 0.3)
 KEEP = Number("keep", -1, "1", 0.0, 1.0, False, 0.9)
+
+
+def soft(e: Array) -> Array:
+    """Differences whose squares grow as their size alone where they are large (Huber 1964).
+
+    A law has edges: somebody just within a radius flies on otherwise than somebody just outside. Who is near an edge,
+    and is seen with noise, is now and then predicted on its wrong side, also by the numbers that flew. The square of
+    one such step would outweigh all that thousands of others say of a number. Normal differences keep their variance.
+
+    e : (step, component); differences up to `SOFT` of their `deviation` stay as they are but for a factor, the same for
+        all of a component
+    """
+    if not len(e):
+        return e
+    e = np.clip(np.nan_to_num(e, nan=LOST), -LOST, LOST)
+    size = np.array([deviation(component) for component in e.T])
+    far = np.abs(e) / size
+    rest = np.sqrt(np.maximum(2.0 * SOFT * far - SOFT * SOFT, 0.0))
+    found: Array = np.copysign(SAME * size * np.where(far < SOFT, far, rest), e)
+    return found
+
+
+def deviation(e: Array) -> float:
+    """Standard deviation of differences, by all of them, of which the large ones count less (Huber 1964, proposal 2).
+
+    It is that at which the mean of min(z², SOFT |z|) is what it is of normal numbers z. A median would do as well, but
+    hangs on one difference alone, and with it each slope.
+    """
+    sizes = np.sort(np.abs(e)) + TINY
+    square, linear = np.cumsum(sizes * sizes), np.cumsum(sizes)
+    last, found = -1, float(np.sqrt(square[-1] / len(sizes)))
+    for _ in range(LOOKS):
+        near = int(np.searchsorted(sizes, SOFT * found))
+        if near == last:
+            break
+        last = near
+        within = float(square[near - 1]) if near else 0.0
+        beyond = SOFT * float(linear[-1] - (linear[near - 1] if near else 0.0))
+        found = (beyond + math.sqrt(beyond * beyond + 4.0 * AS_NORMAL * len(sizes) * within)) / (
+            2.0 * AS_NORMAL * len(sizes)
+        )
+    return found
 
 
 @dataclass
@@ -69,6 +118,7 @@ class Model:
         self.usual = speeds[0] if self.own_speed else None
         self.spans = [(t, s) for t, each in enumerate(self.tracks) for s in range(len(each.spans))]
         self.held: frozenset[int] = frozenset()
+        self.soft = False
 
     def fixed(self, numbers: Sequence[int]) -> "Model":
         """The same model in which some numbers stay at their defaults, whatever the place says."""
@@ -79,7 +129,8 @@ class Model:
     def told_by(self, numbers: Sequence[Number]) -> "Model":
         """The same law on the same tracks, told by other numbers of it."""
         assert self.law is not None
-        return Model(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
+        found = Model(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
+        return found.softened() if self.soft else found
 
     def with_number(self, law: Candidate, number: Number) -> tuple["Model", int]:
         """The model with one more number, and its index there; law : with all its numbers, in their order."""
@@ -104,7 +155,18 @@ class Model:
         return by_column, Gains((kpa, kva), (kpb, kvb), keep), usual
 
     def differences(self, u: Array, spans: Sequence[int] | None = None) -> tuple[Array, NDArray[np.int64]]:
-        """Differences of counted steps (step, along and across), m, and the span of each."""
+        """What is fitted: innovations, of which large ones may count less (`softened`), and the span of each."""
+        e, owner = self.innovations(u, spans)
+        return (soft(e) if self.soft else e), owner
+
+    def softened(self) -> "Model":
+        """The same model, in which a few large differences count less."""
+        twin = copy(self)
+        twin.soft = True
+        return twin
+
+    def innovations(self, u: Array, spans: Sequence[int] | None = None) -> tuple[Array, NDArray[np.int64]]:
+        """Differences of counted steps (step, along and across), m, to where they were predicted; the span of each."""
         by_column, gains, usual = self.split(u)
         parts, owners = [], []
         first = dict(zip(self.spans, range(len(self.spans)), strict=True))
@@ -132,8 +194,8 @@ class Model:
     def tally(self, e: Array, owner: NDArray[np.int64]) -> Score:
         """Sums of squares by span of differences."""
         m = len(self.spans)
-        with np.errstate(over="ignore", invalid="ignore"):
-            squares = np.nan_to_num(e * e, nan=1e12, posinf=1e12)
+        with np.errstate(over="ignore"):
+            squares = np.minimum(e * e, 1e12)
         along = np.bincount(owner, squares[:, 0], m).astype(float)
         across = np.bincount(owner, squares[:, 1:].sum(axis=1), m).astype(float)
         return Score(np.bincount(owner, minlength=m).astype(float), along, across, self.axes)

@@ -184,7 +184,7 @@ def hold_out(model: Model, fitted: Fit, say: Callable[[], None]) -> Held:
         rest = [k for k in spans if k not in set(part)] or [k for k in range(len(model.spans)) if k not in set(part)]
         own = climb(model, fitted.place, fitted.free, rest, AGAIN, slopes=(WIDE,))
         along, across = own.score.variances()
-        e, owner = model.differences(own.place, part)
+        e, owner = model.innovations(own.place, part)
         z = e / np.sqrt([along, *[across] * (model.axes - 1)])
         constant = 0.5 * (np.log(along) + (model.axes - 1) * np.log(across))
         surprise[part] = np.bincount(owner, surprises(z).sum(axis=1) + constant, len(model.spans))[part]
