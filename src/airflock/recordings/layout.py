@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings.differences import velocities
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
 SHORTEST = 1e-6  # s between frames: the shortest motion step there is
@@ -101,7 +102,7 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     if "velocity" in found:
         velocity = found["velocity"].transpose(*order).isel(keypoint=0).values
     elif len(times) > 1:
-        velocity = _differentiated(position, times)
+        velocity = velocities(position, times)
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
@@ -114,18 +115,3 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     if not present.any():
         raise RecordingError(f"{where}: nobody is there at any instant: a position or velocity is always missing")
     return frames, period, present
-
-
-def _differentiated(position: NDArray[Any], times: NDArray[np.float64]) -> NDArray[Any]:
-    """Velocity (time, axis, agent) from positions, agent by agent within the stretches in which it is there."""
-    there = ~np.isnan(position).any(axis=1)
-    if there.all():
-        return np.asarray(np.gradient(position, times, axis=0))
-    velocity = np.full_like(position, np.nan)
-    for agent in range(position.shape[2]):
-        borders = np.flatnonzero(np.diff(there[:, agent], prepend=False, append=False))
-        for first, last in zip(borders[::2].tolist(), borders[1::2].tolist(), strict=True):
-            if last - first > 1:
-                stretch = slice(first, last)
-                velocity[stretch, :, agent] = np.gradient(position[stretch, :, agent], times[stretch], axis=0)
-    return velocity

@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings.differences import gradient
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
 from airflock.recordings.layout import DIMENSIONS, UNITS
@@ -126,7 +127,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
     edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
         if end - begin > 1:
-            found[begin:end] = np.gradient(rows[begin:end], times[begin:end], axis=0)
+            found[begin:end] = gradient(rows[begin:end], times[begin:end])
         else:
             found[begin:end] = np.nan
     return found
