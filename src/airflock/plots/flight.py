@@ -84,6 +84,7 @@ def window(times: Array, start: float | None, stop: float | None, last: float | 
 
 def flown_with(recording: xr.Dataset) -> Scenario | None:
     """Scenario that a recording was flown with; None for tracks."""
+    check(recording)
     return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
 
 

@@ -4,6 +4,7 @@ Dimensions (time, space, keypoint, individual) and the attributes fps, time_unit
 convention of `movement`; velocity and command are Airflock's own additions. Local east-north-up, SI units.
 """
 
+import os
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,20 @@ def dataset(
     return xr.Dataset(variables, coordinates, {**fixed, **attributes})
 
 
+def check_dataset(found: Any, where: str = "recording") -> None:
+    """Raise a RecordingError for what is no dataset at all: a table, an array, the name of a file."""
+    if isinstance(found, (str, os.PathLike)):
+        raise RecordingError(f"{where}: {os.fspath(found)} is a name; open it with airflock.load_recording")
+    if isinstance(found, xr.DataArray):
+        raise RecordingError(f"{where}: is the DataArray {found.name}, one variable; give the whole Dataset")
+    if not isinstance(found, xr.Dataset):
+        kind = type(found).__name__
+        raise RecordingError(f"{where}: {kind} is no xarray Dataset; airflock.load_tracks makes one of tracks")
+
+
 def check(found: xr.Dataset, where: str = "recording") -> None:
     """Raise a RecordingError that lists everything a dataset lacks to be a recording."""
+    check_dataset(found, where)
     faults = []
     if "position" not in found:
         faults.append("no variable position")

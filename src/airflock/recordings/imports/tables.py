@@ -184,7 +184,7 @@ def _pieces(
 
 
 def _numbers(column: Any, where: str, name: str, at: int) -> Any:
-    """A column as float64; dates and their texts become seconds since 1970, durations seconds; other texts are faults."""
+    """A column as float64; dates become seconds since 1970, durations seconds; texts of neither are faults."""
     if pd.api.types.is_numeric_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
     if pd.api.types.is_datetime64_any_dtype(column):
