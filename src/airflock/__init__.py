@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.recordings.flights import recording_of as recording_of
     from airflock.recordings.flights import simulate as simulate
     from airflock.recordings.health import doctor as doctor
+    from airflock.recordings import measures as measures
     from airflock.recordings.imports.load import load_tracks as load_tracks
     from airflock.recordings.scores import over_time as over_time
     from airflock.recordings.scores import score as score
@@ -102,12 +103,13 @@ _WHERE = {
     "identify": "airflock.identify",
     "infer": "airflock.infer",
     "load_tracks": "airflock.recordings.imports.load",
+    "measures": "airflock.recordings.measures",
     "load_recording": "airflock.recordings.files",
     "paper": "airflock.papers",
     "doctor": "airflock.recordings.health",
 }
-# packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
+# packages; all but plots and measures can be called (decision 0010)
+_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots", "measures")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine"  # not in __all__: `from airflock import *` would hide Python's own
 

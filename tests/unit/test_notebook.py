@@ -127,3 +127,9 @@ def test_a_sweep_over_a_single_value_is_told_to_give_a_list(short, value):
 def test_courses_say_their_units(short):
     course = airflock.over_time(airflock.simulate(short, device="python"))
     assert course.attrs["units"]["phi_vel"] == "m/s" and "speed" in course.attrs["meanings"]["phi_vel"]
+
+
+def test_measures_of_groups_are_found_by_tab():
+    found = airflock.measures
+    assert "measures" in dir(airflock) and found.milling is milling
+    assert {"bursts", "contacts", "correlation", "delays", "milling", "neighbours", "shape"} <= set(dir(found))
