@@ -22,7 +22,7 @@ def gradient(position: Array, times: Array) -> Array:
 
 def velocities(position: Array, times: Array) -> Array:
     """Velocity (time, axis, individual), m/s, within the stretches in which each individual is there; else nan."""
-    there: Array = ~np.isnan(position).any(axis=1)
+    there = np.asarray(~np.isnan(position).any(axis=1))
     if there.all():
         return gradient(position, times)
     velocity = np.full_like(position, np.nan)
