@@ -35,13 +35,13 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.papers import paper as paper
     from airflock.plots.picture import plot as plot
     from airflock.plots.video import video as video
+    from airflock.recordings import measures as measures
     from airflock.recordings.exports.export import export as export
     from airflock.recordings.files import load_recording as load_recording
     from airflock.recordings.files import save as save
     from airflock.recordings.flights import recording_of as recording_of
     from airflock.recordings.flights import simulate as simulate
     from airflock.recordings.health import doctor as doctor
-    from airflock.recordings import measures as measures
     from airflock.recordings.imports.load import load_tracks as load_tracks
     from airflock.recordings.scores import over_time as over_time
     from airflock.recordings.scores import score as score
