@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; at run time __getatt
     from airflock.papers import paper as paper
     from airflock.plots.picture import plot as plot
     from airflock.plots.video import video as video
+    from airflock.recordings import measures as measures
     from airflock.recordings.exports.export import export as export
     from airflock.recordings.files import load_recording as load_recording
     from airflock.recordings.files import save as save
@@ -102,12 +103,13 @@ _WHERE = {
     "identify": "airflock.identify",
     "infer": "airflock.infer",
     "load_tracks": "airflock.recordings.imports.load",
+    "measures": "airflock.recordings.measures",
     "load_recording": "airflock.recordings.files",
     "paper": "airflock.papers",
     "doctor": "airflock.recordings.health",
 }
-# packages; all but plots can be called (decision 0010)
-_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots")
+# packages; all but plots and measures can be called (decision 0010)
+_MODULES = ("evolve", "certify", "tune", "display", "identify", "infer", "body", "plots", "measures")
 __all__ = [*_WHERE, "__version__"]
 _WHERE["open"] = "airflock.engine"  # not in __all__: `from airflock import *` would hide Python's own
 

@@ -7,8 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import ParameterError
-from airflock.recordings.layout import dataset
+from airflock.recordings.imports.load import load_tracks
+from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.measures import bursts, correlation, delays, milling, neighbours, shape, surroundings, turning
+from airflock.recordings.measures.states import states
 
 
 def recording(place, speed, period=0.1):
@@ -210,3 +212,81 @@ def test_widths_that_cannot_be_meant_are_refused():
     for wrong in wrongs:
         with pytest.raises(ParameterError, match="must"):
             wrong()
+
+
+def tracks(place, period=0.1):
+    """A recording of positions (time, axis, individual) alone."""
+    return recording(place, np.zeros_like(place), period).drop_vars(["velocity", "command"], errors="ignore")
+
+
+def test_the_same_speed_for_ever_has_no_burst():
+    place = np.arange(50)[:, None, None] * np.array([[0.1], [0.0]]) + np.zeros((50, 2, 3))
+    assert len(bursts.bursts(tracks(place), 0.05)) == 0
+
+
+def test_those_who_fly_straight_lead_nobody():
+    place = np.arange(60)[:, None, None] * np.array([[0.1], [0.02]]) + np.arange(4.0)
+    table = delays.leadership(tracks(place), longest=2.0)
+    assert len(table) == 12 and (table["delay"] == 0.0).all()
+
+
+def test_of_a_pair_one_leads_and_the_other_follows_in_a_periodic_flight():
+    angle = np.arange(200)[:, None] * 2.0 * np.pi / 20 + np.array([0.0, np.pi])  # half a turn apart: before is behind
+    table = delays.leadership(tracks(np.stack([np.cos(angle), np.sin(angle)], axis=1)), 1.5)
+    assert table["delay"].abs().to_list() == pytest.approx([1.0, 1.0]) and table["delay"].sum() == 0.0
+
+
+def test_velocities_of_all_who_move_alike_have_no_correlation():
+    place = crowd(11, frames=1)[0] + np.arange(50)[:, None, None] * np.array([[0.1], [0.02]])
+    rounded = np.float32(0.7) * (1.0 + np.random.default_rng(1).integers(-1, 2, place.shape) * np.float32(6e-8))
+    for found in (tracks(place), recording(place, rounded.astype(np.float32))):
+        assert np.isnan(correlation.velocity_correlation(found, 1.0)).all()
+        assert np.isnan(correlation.correlation_length(found, 1.0))
+
+
+def test_one_who_stands_has_no_heading():
+    """Differences of equal positions are 0, not the rounding error of their weights."""
+    place = np.broadcast_to(np.random.default_rng(3).normal(0.0, 5.0, (1, 2, 6)), (300, 2, 6))
+    found = tracks(place)
+    assert (states(found).velocity == 0.0).all() and np.isnan(milling.milling(found)).all()
+    imported = load_tracks(place.transpose(0, 2, 1), unit="m", fps=10.0)
+    assert (imported["velocity"] == 0.0).all() and len(delays.leadership(imported)) == 0
+
+
+def test_a_milling_is_of_those_who_move_and_the_centre_of_all():
+    place, speed = crowd(12)
+    speed[:, :, 0] *= 1e-3
+    there = milling.milling(recording(place, speed), slowest=0.01)
+    h = speed[:, :, 1:] / np.linalg.norm(speed[:, :, 1:], axis=1, keepdims=True)
+    out = place[:, :, 1:] - place.mean(axis=2, keepdims=True)
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    assert there.to_numpy() == pytest.approx(np.abs((out[:, 0] * h[:, 1] - out[:, 1] * h[:, 0]).mean(axis=1)))
+
+
+def test_one_frame_has_distances_and_no_motion():
+    place = crowd(13, frames=1)[0]
+    apart = np.linalg.norm(place[0][:, :, None] - place[0][:, None, :], axis=0) + np.diag([np.inf] * 12)
+    for found in (tracks(place), load_tracks(place.transpose(0, 2, 1), unit="m", fps=10.0)):
+        assert neighbours.nearest_distances(found).values[0] == pytest.approx(apart.min(axis=1), rel=1e-5)
+        assert float(neighbours.pair_distances(found, 1.0, 100.0).sum()) == pytest.approx(1.0)
+        assert shape.group_shape(found)["present"].to_list() == [12] and shape.group_shape(found)["hull"].iloc[0] > 0.0
+        assert len(delays.leadership(found)) == len(bursts.bursts(found, 0.1)) == 0
+        assert np.isnan(turning.turning_speed(found)).all() and np.isnan(milling.milling(found)).all()
+
+
+def test_beside_a_gap_one_is_near_before_its_velocity_is_known():
+    """A fish that is seen in one frame is the nearest neighbour of the other in that frame."""
+    place = np.zeros((5, 2, 3)) + np.array([0.0, 1.0, 10.0])
+    place[[0, 1, 3, 4], :, 1] = np.nan
+    place[:, 1] *= 0.0
+    near = neighbours.nearest_distances(tracks(place)).values
+    assert near[:, 0].tolist() == [10.0, 10.0, 1.0, 10.0, 10.0]
+
+
+def test_velocities_beside_a_gap_are_those_of_the_scores():
+    g = np.random.default_rng(5)
+    place = np.cumsum(g.normal(0.0, 0.1, (40, 2, 3)), axis=0)
+    place[10:15, :, 1] = np.nan
+    frames, _, present = frames_of(tracks(place))
+    found = states(tracks(place))
+    assert (found.present == present).all() and np.array_equal(found.velocity, frames[:, 2:], equal_nan=True)

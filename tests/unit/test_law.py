@@ -5,6 +5,7 @@ from importlib import import_module
 from types import SimpleNamespace
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from airflock.body.registry import BODIES
@@ -15,6 +16,7 @@ from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.errors import RuleError
 from airflock.metrics.registry import METRICS
 from airflock.rules import law
+from airflock.rules.probe import probe
 from airflock.scenarios.laws import MODELS
 
 RULES = ("reach", "sight", "neighbour", "boundary", "decide", "preferred_speed", "interaction_range")
@@ -201,3 +203,26 @@ def test_what_the_compiler_refuses_is_one_line():
         score_flight(found, 0)
     assert "does not compile" in str(fault.value) and "as_integer_ratio" in str(fault.value)
     assert "\n" not in str(fault.value)
+
+
+def test_what_a_rule_brings_beside_itself_is_told():
+    parts = {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": lambda dx: dx}
+    with pytest.raises(RuleError, match="no Sums .a NamedTuple of this name with what neighbour returns"):
+        model(SimpleNamespace(**parts), "mine")
+
+
+def plain_tuple(dx):
+    return (dx,)
+
+
+def of_numpy(dx):
+    return Sums(np.exp(dx))
+
+
+@pytest.mark.parametrize(("rule", "said"), [
+    (plain_tuple, r"mine.neighbour must return Sums\("), (of_numpy, "np.exp: only math .* write math.exp"),
+])  # fmt: skip
+def test_what_to_write_instead_is_told_of_the_rule_that_is_wrong(rule, said):
+    parts = {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": Sums}
+    with pytest.raises(RuleError, match=said):
+        probe(model(SimpleNamespace(**parts), "mine"), Parameters())

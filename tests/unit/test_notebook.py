@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import airflock
-from airflock.errors import ParameterError, ScenarioError
+from airflock.errors import ParameterError, RecordingError, ScenarioError
+from airflock.recordings.measures import milling
 from processes import called
 
 NAME = "vasarhelyi_2018/4ms"
@@ -89,3 +90,46 @@ def test_the_command_refuses_seeds_that_are_none():
     done = called("run", NAME, "--duration", "1", "--first-seed", "9" * 23)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == f"airflock: seed = {'9' * 23} lies outside [0, 2^64 - 1]\n"
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    (lambda found: found["position"], "DataArray position, one variable; give the whole Dataset"),
+    (lambda found: found["position"].values, "ndarray is no xarray Dataset; airflock.load_tracks makes one"),
+    (lambda found: found["time"].to_dataframe("t"), "DataFrame is no xarray Dataset; airflock.load_tracks makes one"),
+    (lambda found: "flight.nc", "flight.nc is a name; open it with airflock.load_recording"),
+    (lambda found: None, "NoneType is no xarray Dataset"),
+])  # fmt: skip
+def test_what_is_no_recording_is_told_what_makes_one(short, tmp_path, given, said):
+    wrong = given(airflock.simulate(short, device="python"))
+    doors = (
+        airflock.over_time, airflock.replay, milling.milling, airflock.plots.trajectories, airflock.plots.series,
+        partial(airflock.video, path=tmp_path / "a.gif"), partial(airflock.save, path=tmp_path / "a.nc"),
+        partial(airflock.export, path=tmp_path / "a.csv"),
+    )  # fmt: skip
+    for door in doors:
+        with pytest.raises(RecordingError, match=said):
+            door(wrong)
+
+
+def test_what_is_no_scenario_is_told_by_its_kind_and_not_printed(short):
+    array = airflock.simulate(short, device="python")["position"]
+    for door in (airflock.plot, airflock.score, airflock.open, lambda what: airflock.sweep(what, {"agents": [2, 3]})):
+        with pytest.raises(ScenarioError, match="^DataArray is not a scenario; .* airflock.load_tracks makes"):
+            door(array)
+
+
+@pytest.mark.parametrize("value", [0.4, "0.4"])
+def test_a_sweep_over_a_single_value_is_told_to_give_a_list(short, value):
+    with pytest.raises(ScenarioError, match="radio.delay = .*0.4.*: give the values to sweep over in a list"):
+        airflock.sweep(short, {"radio.delay": value})
+
+
+def test_courses_say_their_units(short):
+    course = airflock.over_time(airflock.simulate(short, device="python"))
+    assert course.attrs["units"]["phi_vel"] == "m/s" and "speed" in course.attrs["meanings"]["phi_vel"]
+
+
+def test_measures_of_groups_are_found_by_tab():
+    found = airflock.measures
+    assert "measures" in dir(airflock) and found.milling is milling
+    assert {"bursts", "contacts", "correlation", "delays", "milling", "neighbours", "shape"} <= set(dir(found))

@@ -12,7 +12,7 @@ import airflock
 from airflock.cli.counterparts import COUNTERPARTS, LIBRARY
 from airflock.cli.main import app
 
-PACKAGES = {"plots"}
+PACKAGES = {"plots", "measures"}
 CLASSES = ["AirflockError", "Scenario", "Flight", "Parameters"]
 HOMES = {
     "evolve": "airflock.evolve.run", "certify": "airflock.certify.run", "display": "airflock.display.displays",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
 from airflock.recordings import attributes
+from airflock.recordings.differences import velocities
 from airflock.recordings.layout import DIMENSIONS, check
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.geometry import ground_plan
@@ -63,7 +64,7 @@ def paths_of(
     if "velocity" in shown:
         velocity = shown["velocity"].transpose(*order).values.astype(float)
     elif chosen.sum() > 1:
-        velocity = np.gradient(position, times[chosen], axis=0)
+        velocity = velocities(position, times[chosen])
     else:
         velocity = np.zeros_like(position)
     return Paths(times[chosen], position, velocity)
@@ -83,6 +84,7 @@ def window(times: Array, start: float | None, stop: float | None, last: float | 
 
 def flown_with(recording: xr.Dataset) -> Scenario | None:
     """Scenario that a recording was flown with; None for tracks."""
+    check(recording)
     return scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
 
 

@@ -17,6 +17,7 @@ from airflock.errors import AirflockError
 from airflock.plots.film_stage import Stage
 from airflock.plots.flight import window
 from airflock.plots.save import PictureError, complete_or_absent, positive
+from airflock.recordings.layout import check
 from airflock.suffixes import VIDEOS
 
 Array = NDArray[Any]
@@ -129,6 +130,7 @@ def _instants(recording: xr.Dataset, fps: float, speed: float, start: float | No
     positive(fps=fps, speed=speed)
     if fps > 240.0:
         raise AirflockError(f"fps = {fps:g} lies outside (0, 240] 1/s")
+    check(recording)
     times = recording["time"].values.astype(float)
     begin, end = window(times, start, stop)
     begin, end = max(begin, float(times[0])), min(end, float(times[-1]))

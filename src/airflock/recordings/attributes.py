@@ -14,6 +14,7 @@ import xarray as xr
 
 from airflock.errors import RecordingError, bounded
 from airflock.faults.registry import KINDS
+from airflock.recordings.layout import check_dataset
 from airflock.scenarios.laws import MODELS
 from airflock.untrusted import from_outside, json_object
 
@@ -23,7 +24,8 @@ EVENTS, FAULTS = "airflock_events", "airflock_faults"
 
 
 def check_format(recording: xr.Dataset, where: str = "recording") -> None:
-    """Raise RecordingError for a format that only a newer Airflock knows."""
+    """Raise RecordingError for what is no dataset, and for a format that only a newer Airflock knows."""
+    check_dataset(recording, where)
     found = whole_number(recording, FORMAT_KEY, 1, where)
     if not 1 <= found <= FORMAT:
         raise RecordingError(f"{where}: is of format {found}; this Airflock reads formats 1 to {FORMAT}")

@@ -4,6 +4,7 @@ Dimensions (time, space, keypoint, individual) and the attributes fps, time_unit
 convention of `movement`; velocity and command are Airflock's own additions. Local east-north-up, SI units.
 """
 
+import os
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings.differences import velocities
 
 DIMENSIONS = ("time", "space", "keypoint", "individual")
 SHORTEST = 1e-6  # s between frames: the shortest motion step there is
@@ -53,8 +55,20 @@ def dataset(
     return xr.Dataset(variables, coordinates, {**fixed, **attributes})
 
 
+def check_dataset(found: Any, where: str = "recording") -> None:
+    """Raise a RecordingError for what is no dataset at all: a table, an array, the name of a file."""
+    if isinstance(found, (str, os.PathLike)):
+        raise RecordingError(f"{where}: {os.fspath(found)} is a name; open it with airflock.load_recording")
+    if isinstance(found, xr.DataArray):
+        raise RecordingError(f"{where}: is the DataArray {found.name}, one variable; give the whole Dataset")
+    if not isinstance(found, xr.Dataset):
+        kind = type(found).__name__
+        raise RecordingError(f"{where}: {kind} is no xarray Dataset; airflock.load_tracks makes one of tracks")
+
+
 def check(found: xr.Dataset, where: str = "recording") -> None:
     """Raise a RecordingError that lists everything a dataset lacks to be a recording."""
+    check_dataset(found, where)
     faults = []
     if "position" not in found:
         faults.append("no variable position")
@@ -101,7 +115,7 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     if "velocity" in found:
         velocity = found["velocity"].transpose(*order).isel(keypoint=0).values
     elif len(times) > 1:
-        velocity = _differentiated(position, times)
+        velocity = velocities(position, times)
     else:
         raise RecordingError(f"{where}: one frame without velocity has no speed to score")
     frames = np.concatenate([position, velocity], axis=1)
@@ -114,18 +128,3 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
     if not present.any():
         raise RecordingError(f"{where}: nobody is there at any instant: a position or velocity is always missing")
     return frames, period, present
-
-
-def _differentiated(position: NDArray[Any], times: NDArray[np.float64]) -> NDArray[Any]:
-    """Velocity (time, axis, agent) from positions, agent by agent within the stretches in which it is there."""
-    there = ~np.isnan(position).any(axis=1)
-    if there.all():
-        return np.asarray(np.gradient(position, times, axis=0))
-    velocity = np.full_like(position, np.nan)
-    for agent in range(position.shape[2]):
-        borders = np.flatnonzero(np.diff(there[:, agent], prepend=False, append=False))
-        for first, last in zip(borders[::2].tolist(), borders[1::2].tolist(), strict=True):
-            if last - first > 1:
-                stretch = slice(first, last)
-                velocity[stretch, :, agent] = np.gradient(position[stretch, :, agent], times[stretch], axis=0)
-    return velocity

@@ -160,7 +160,9 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     Returns
     -------
     pandas.DataFrame
-        One row per frame that is measured, with the time in s as index, and one column per order parameter.
+        One row per frame that is measured, with the time in s as index, and one column per order parameter;
+        `attrs["units"]` and `attrs["meanings"]` say what they are. `outside` counts who is outside of the arena or in
+        an obstacle, `out` adds up how far (m).
 
     Raises
     ------
@@ -174,7 +176,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     >>> airflock.over_time(airflock.simulate(short))["phi_vel"].shape
     (6,)
     """
-    return measure(recording, settings)[1]
+    return _about(measure(recording, settings)[1], scenario_of(recording, settings))
 
 
 def courses(scenario: Scenario) -> list[str]:

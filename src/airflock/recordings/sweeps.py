@@ -88,7 +88,10 @@ def sweep(
 
 
 def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """All combinations of the values of several keys."""
+    """All combinations of the values of several keys; raises a ScenarioError that names keys without a list of them."""
+    lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
+    if lacking:
+        raise ScenarioError([f"{key} = {over[key]!r}: give the values to sweep over in a list" for key in lacking])
     return [dict(zip(over, values, strict=True)) for values in itertools.product(*over.values())]
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -47,7 +48,8 @@ def faults(rule: Callable[..., Any]) -> list[str]:
         if isinstance(item, ast.Attribute) and isinstance(item.value, ast.Name):
             module = rule.__globals__.get(item.value.id)
             if inspect.ismodule(module) and module.__name__ != "math":
-                complain(item, f"{item.value.id}.{item.attr}: only math may be used through a module name")
+                instead = f"; write math.{item.attr}" if hasattr(math, item.attr) else ""
+                complain(item, f"{item.value.id}.{item.attr}: only math may be used through a module name{instead}")
     return found
 
 

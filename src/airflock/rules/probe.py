@@ -38,6 +38,10 @@ def probe(model: Model, parameters: Any) -> None:
             if kind != "reach":
                 record = model.Sums if kind == "neighbour" else model.Walls
                 _same_length(rule, answer, record, model.name)
+                if getattr(answer, "_fields", None) != record._fields:  # type: ignore[union-attr]
+                    fields = ", ".join(record._fields)  # type: ignore[union-attr]
+                    told = f"{model.name}.{kind} must return {record.__name__}({fields}), not a plain tuple"  # type: ignore[union-attr]
+                    raise RuleError(f"{_place(rule)}: {told}")
                 given["sums" if kind == "neighbour" else "walls"] = answer
     for word, record in (("sums", model.Sums), ("walls", model.Walls)):
         if word not in given and record is not None:

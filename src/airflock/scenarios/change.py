@@ -7,7 +7,7 @@ from typing import Any
 from airflock.core.contract import Model
 from airflock.errors import ScenarioError
 from airflock.scenarios.families import FAMILIES, Given
-from airflock.scenarios.files import load
+from airflock.scenarios.files import load, loaded
 from airflock.scenarios.laws import MODELS
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -67,6 +67,8 @@ def variant(
     what: Scenario | str | os.PathLike[str], settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False
 ) -> Scenario:
     """A scenario, or the one that a name or file stands for, with keys set anew; law and trust as in `load`."""
+    if not isinstance(what, (Scenario, str, os.PathLike)):
+        return loaded(what)
     if not isinstance(what, Scenario):
         return load(what, settings, law, trust=trust)
     if law is not None:

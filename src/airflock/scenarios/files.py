@@ -204,9 +204,9 @@ def loaded(what: Any) -> Scenario:
         return what
     if isinstance(what, (str, os.PathLike)):
         return load(what)
-    raise ScenarioError(
-        [f"{type(what).__name__} is not a scenario; give a Scenario, a preset's name or a scenario file"]
-    )
+    kind = type(what).__name__
+    tracks = "; airflock.load_tracks makes a recording of tracks" if hasattr(what, "shape") else ""
+    raise ScenarioError([f"{kind} is not a scenario; give a Scenario, a preset's name or a scenario file{tracks}"])
 
 
 def tells_of_study(document: Mapping[str, Any]) -> bool:

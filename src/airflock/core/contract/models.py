@@ -14,6 +14,12 @@ NEEDED = {  # what each law brings, and what it is
     "COMMAND": f"what decide returns, one of {', '.join(COMMANDS)}",
     "decide": "the rule itself",
 }
+RECORDS = {  # what a rule of this kind brings beside itself
+    "Sums": "a NamedTuple of this name with what neighbour returns, which decide gets added up as sums",
+    "Walls": "a NamedTuple of this name with what boundary returns, which decide gets added up as walls",
+    "Shared": "a NamedTuple of this name with what flock finds for each agent, which decide gets as shared",
+    "workspace": "the shapes of the scratch that flock fills",
+}
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ def model(namespace: Any, name: str = "") -> Model:
         raise RuleError(f"model {name}: COMMAND = {found['COMMAND']!r} is none of {', '.join(COMMANDS)}")
     for rule, record in (("neighbour", "Sums"), ("boundary", "Walls"), ("flock", "Shared"), ("flock", "workspace")):
         if rule in found and record not in found:
-            raise RuleError(f"model {name} has a rule {rule} but no {record}")
+            raise RuleError(f"model {name} has a rule {rule} but no {record} ({RECORDS[record]})")
     for kind in ("reach", "sight", "wall_reach", "neighbour", "boundary", "flock", "decide"):
         if kind in found:
             asks(found[kind], kind, name)

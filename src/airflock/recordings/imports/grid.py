@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings.differences import gradient
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
 from airflock.recordings.layout import DIMENSIONS, UNITS
@@ -27,12 +28,20 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
         raise RecordingError(f"no rows between {first:g} and {last:g} s")
-    count = int(np.floor((last - first) / period + 1e-6)) + 1
+    count = int(np.floor((last - first + _slack(period, first, last)) / period)) + 1
     if count * len(tracks) * 6 > MOST:
         raise RecordingError(
             f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
         )
     return first + np.arange(count) * period, period
+
+
+def _slack(period: float, *instants: float) -> float:
+    """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
+
+    Seconds since 1970 are told to 2.4e-7 s.
+    """
+    return 1e-6 * period + 2.0 * float(np.spacing(max(abs(instant) for instant in instants)))
 
 
 def _round(period: float) -> float:
@@ -71,7 +80,7 @@ def recording(
     if wish is not None:
         variables["command"] = (DIMENSIONS, wish[:, :, None, :], {"units": "m/s"})
     coordinates = {
-        "time": ("time", times - times[0], {"units": "s"}),
+        "time": ("time", np.arange(len(times)) * period, {"units": "s"}),
         "space": list("xyz"[:axes]),
         "keypoint": ["centre"],
         "individual": [track.name for track in tracks],
@@ -87,8 +96,9 @@ def _fill(
     axes = place.shape[1]
     own, usual = track.time, period_of(track) or period
     rows = track.stack(POSITION, axes)
-    at = np.searchsorted(own, times + 1e-6 * period, side="right") - 1
-    inside = (at >= 0) & (times <= own[-1] + 1e-6 * period)
+    slack = _slack(period, times[0], times[-1])
+    at = np.searchsorted(own, times + slack, side="right") - 1
+    inside = (at >= 0) & (times <= own[-1] + slack)
     before = np.clip(at, 0, max(len(own) - 2, 0))
     after = np.minimum(before + 1, len(own) - 1)
     step = own[after] - own[before]
@@ -126,7 +136,7 @@ def _slopes(times: Any, rows: Any, breaks: Any, usual: float) -> Any:
     edges = np.unique(np.concatenate([[0], breaks, gaps, [len(times)]])).astype(int)
     for begin, end in zip(edges[:-1], edges[1:], strict=True):
         if end - begin > 1:
-            found[begin:end] = np.gradient(rows[begin:end], times[begin:end], axis=0)
+            found[begin:end] = gradient(rows[begin:end], times[begin:end])
         else:
             found[begin:end] = np.nan
     return found

@@ -184,11 +184,13 @@ def _pieces(
 
 
 def _numbers(column: Any, where: str, name: str, at: int) -> Any:
-    """A column as float64; texts of times become seconds since 1970, other texts are faults."""
+    """A column as float64; dates become seconds since 1970, durations seconds; texts of neither are faults."""
     if pd.api.types.is_numeric_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
     if pd.api.types.is_datetime64_any_dtype(column):
         return _since_1970(column)
+    if pd.api.types.is_timedelta64_dtype(column):
+        return column.dt.total_seconds().to_numpy(float)
     found = pd.to_numeric(column, errors="coerce")
     given = column.notna() & (column.astype(str).str.strip() != "")
     bad = np.flatnonzero((found.isna() & given).to_numpy())
@@ -212,7 +214,8 @@ def _numbers(column: Any, where: str, name: str, at: int) -> Any:
 
 def _since_1970(column: Any) -> Any:
     when = column.dt.tz_convert("UTC").dt.tz_localize(None) if column.dt.tz is not None else column
-    return when.to_numpy("datetime64[us]").astype(np.int64) * 1e-6
+    seconds = when.to_numpy("datetime64[us]").astype(np.int64) * 1e-6
+    return np.where(when.isna(), np.nan, seconds)
 
 
 def _by_name(column: Any) -> Iterator[tuple[str, Any]]:

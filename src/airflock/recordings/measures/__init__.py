@@ -5,3 +5,19 @@ nearest distances and pairs · surroundings: where neighbours are, front-back an
 milling · turning · bursts: burst and coast · contacts: with walls, obstacles and the scene. Order parameters of a
 flight, by the compiled rules, are in `scores`.
 """
+
+from airflock.recordings.measures import (
+    bursts,
+    contacts,
+    correlation,
+    delays,
+    milling,
+    neighbours,
+    shape,
+    surroundings,
+    turning,
+)
+
+__all__ = [
+    "bursts", "contacts", "correlation", "delays", "milling", "neighbours", "shape", "surroundings", "turning",
+]  # fmt: skip

@@ -50,5 +50,5 @@ def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int
             top, rising = k, True
     if rising:
         turns.append((low, top))
-    ends = [begin for begin, _ in turns[1:]] + [len(speed) - 1]
+    ends = [*[begin for begin, _ in turns[1:]], len(speed) - 1][: len(turns)]
     return [(begin, peak, end) for (begin, peak), end in zip(turns, ends, strict=True)]

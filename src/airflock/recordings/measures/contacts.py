@@ -29,7 +29,7 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     for i, name in enumerate(found.names):
         begun: dict[str, int] = {}
         for k in range(len(found.time) + 1):
-            there = k < len(found.time) and found.present[k, i]
+            there = k < len(found.time) and found.placed[k, i]
             now = set()
             if there:
                 x, y, z = (*found.position[k, :, i].tolist(), 0.0)[:3]

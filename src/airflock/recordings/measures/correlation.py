@@ -7,23 +7,27 @@ import xarray as xr
 from airflock.errors import ParameterError
 from airflock.recordings.measures.states import states
 
+NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
+
 
 def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | None = None) -> pd.Series:
     """Correlation of velocities about the group's mean, by distance (m); 1 at distance 0.
 
     width    : of a bin of distances, m: about a tenth of the group
     farthest : m; by default the largest distance that occurs
+    nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
     """
     found = states(recording)
     if not width > 0.0:
         raise ParameterError(f"width = {width:g} m must be above 0")
     sums: dict[int, list[float]] = {}
-    alone, count = 0.0, 0
+    alone, whole, count = 0.0, 0.0, 0
     for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
         if there.sum() < 2:
             continue
         x, u = place[:, there], speed[:, there]
+        whole += float((u * u).sum())
         u = u - u.mean(axis=1, keepdims=True)
         alone, count = alone + float((u * u).sum()), count + u.shape[1]
         i, j = np.triu_indices(u.shape[1], 1)
@@ -34,11 +38,11 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
             entry = sums.setdefault(int(b), [0.0, 0.0])
             entry[0] += total[b]
             entry[1] += number[b]
-    scale = alone / count if count else np.nan
+    scale = alone / count if alone > NOTHING**2 * whole else np.nan
     last = max(sums, default=0) if farthest is None else int(farthest / width)
     kept = [b for b in sorted(sums) if b <= last]
     index = pd.Index([(b + 0.5) * width for b in kept], name="distance")
-    return pd.Series([sums[b][0] / sums[b][1] / scale for b in kept], index=index, name="correlation")
+    return pd.Series([sums[b][0] / sums[b][1] / scale for b in kept], index=index, name="correlation", dtype=float)
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:

@@ -6,6 +6,8 @@ import xarray as xr
 
 from airflock.recordings.measures.states import headings, states
 
+ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
+
 
 def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: float = 0.0) -> xr.DataArray:
     """Mean of heading i at t times heading j at t + delay, (leader, follower, delay), -1 to 1.
@@ -32,7 +34,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
 def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, slowest: float = 0.0) -> pd.DataFrame:
     """One row for each ordered pair: leader, follower, delay (s) and correlation (-1 to 1) where that is largest.
 
-    A positive delay says that the leader is first; each pair stands there twice, with both signs.
+    A positive delay says that the leader is first; each pair stands there twice, with both signs. Where several delays
+    are as good, such as of two that fly straight, it is the shortest of them.
 
     longest : largest delay that is tried, s
     least   : correlation below which a pair is left out
@@ -40,13 +43,18 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
     table = delay_correlation(recording, longest, slowest)
-    rows = []
-    for i, first in enumerate(table["leader"].values):
-        for j, second in enumerate(table["follower"].values):
+    shifts, n = table["delay"].values, table.sizes["leader"]
+    best: dict[tuple[int, int], tuple[float, float]] = {}
+    for i in range(n):
+        for j in range(i + 1, n):
             course = table.values[i, j]
-            if i == j or not np.isfinite(course).any():
+            if not np.isfinite(course).any():
                 continue
-            best = int(np.nanargmax(course))
-            if course[best] >= least:
-                rows.append((first, second, float(table["delay"].values[best]), float(course[best])))
+            top = np.flatnonzero(course >= np.nanmax(course) - ALIKE)
+            k = int(top[np.abs(shifts[top]).argmin()])
+            if course[k] >= least:
+                best[i, j] = float(shifts[k]), float(course[k])
+                best[j, i] = 0.0 - float(shifts[k]), float(course[k])
+    names = table["leader"].values
+    rows = [(names[i], names[j], *best[i, j]) for i, j in sorted(best)]
     return pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])

@@ -7,12 +7,15 @@ import xarray as xr
 from airflock.recordings.measures.states import headings, states
 
 
-def milling(recording: xr.Dataset) -> pd.Series:
-    """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone."""
+def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
+    """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
+
+    slowest : speed (m/s) at or below which one has no heading; it still counts for the centre
+    """
     found = states(recording)
     course = np.full(len(found.time), np.nan)
-    h = headings(found.velocity)
-    for k, there in enumerate(found.present):
+    h = headings(found.velocity, slowest)
+    for k, there in enumerate(found.placed):
         moves = there & np.isfinite(h[k]).all(axis=0)
         if moves.sum() < 2:
             continue

@@ -11,8 +11,8 @@ from airflock.recordings.measures.states import states
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
     """Distance of each individual to its nearest neighbour, (time, individual), m; nan for one absent or alone."""
     found = states(recording)
-    table = np.full(found.present.shape, np.nan)
-    for k, there in enumerate(found.present):
+    table = np.full(found.placed.shape, np.nan)
+    for k, there in enumerate(found.placed):
         if there.sum() > 1:
             x = found.position[k][:, there]
             apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)
@@ -32,7 +32,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     found = states(recording)
     edges = np.arange(0.0, farthest + 0.5 * width, width)
     counts, pairs = np.zeros(len(edges) - 1), 0
-    for place, there in zip(found.position, found.present, strict=True):
+    for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)
         counts += np.histogram(np.linalg.norm(x[:, i] - x[:, j], axis=0), edges)[0]

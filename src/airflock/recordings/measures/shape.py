@@ -18,7 +18,7 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     found = states(recording)
     axes = found.position.shape[1]
     rows = []
-    for place, speed, there in zip(found.position, found.velocity, found.present, strict=True):
+    for place, speed, there, moves in zip(found.position, found.velocity, found.placed, found.present, strict=True):
         x, count = place[:, there], int(there.sum())
         hull = length = width = np.nan
         if count > axes:
@@ -26,8 +26,8 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
                 hull = float(ConvexHull(x.T).volume)  # in the plane `volume` is the area
             except QhullError:
                 hull = 0.0  # all on one line, or on one plane in space
-        if count > 1:
-            mean = speed[:2, there].mean(axis=1)
+        if count > 1 and moves.any():
+            mean = speed[:2, moves].mean(axis=1)
             size = np.linalg.norm(mean)
             if size > 1e-12:
                 ahead = mean / size

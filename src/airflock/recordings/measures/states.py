@@ -7,28 +7,33 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings.differences import velocities
 from airflock.recordings.layout import check
 
 Array = NDArray[Any]
 
 
 class States(NamedTuple):
-    """time (frame,) s, position m and velocity m/s (frame, axis, individual), present (frame, individual)."""
+    """time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame, individual).
+
+    placed: its position is known; present: its velocity, too. What needs no motion counts all who are placed.
+    """
 
     time: Array
     position: Array
     velocity: Array
+    placed: Array
     present: Array
     names: list[str]
 
     @property
     def period(self) -> float:
-        """Time between frames, s."""
-        return float(np.median(np.diff(self.time)))
+        """Time between frames, s; 1 where there is one frame."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
 
 def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
-    """Arrays of a recording; velocities are differentiated where it has none.
+    """Arrays of a recording; where it has no velocities they are differentiated, unknown in a single frame.
 
     keypoint : which one, where there are several
     """
@@ -44,14 +49,14 @@ def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
     position = own["position"].transpose(*order).values.astype(float)
     if "velocity" in own:
         velocity = own["velocity"].transpose(*order).values.astype(float)
-    elif len(time) > 1:
-        velocity = np.gradient(position, time, axis=0)
     else:
-        raise RecordingError("recording: one frame without velocity has no motion to measure")
-    present = np.isfinite(position).all(axis=1) & np.isfinite(velocity).all(axis=1)
-    gone = ~present[:, None, :]
+        velocity = velocities(position, time) if len(time) > 1 else np.full_like(position, np.nan)
+    placed = np.isfinite(position).all(axis=1)
+    present = placed & np.isfinite(velocity).all(axis=1)
+    nowhere, unknown = ~placed[:, None, :], ~present[:, None, :]
     individuals = [str(name) for name in own["individual"].values]
-    return States(time, np.where(gone, np.nan, position), np.where(gone, np.nan, velocity), present, individuals)
+    position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
+    return States(time, position, velocity, placed, present, individuals)
 
 
 def headings(velocity: Array, slowest: float = 0.0) -> Array:

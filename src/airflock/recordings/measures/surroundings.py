@@ -19,7 +19,7 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     h = headings(found.velocity[:, :2], slowest)
     edges = np.linspace(-reach, reach, cells + 1)
     total, focal = np.zeros((cells, cells)), 0
-    for place, ahead, there in zip(found.position[:, :2], h, found.present, strict=True):
+    for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         x = place[:, there]
         for i in np.flatnonzero(there & np.isfinite(ahead).all(axis=0)):
             offset = x - place[:, i : i + 1]
@@ -41,11 +41,15 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
 
 
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
-    """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere."""
+    """Mean of cos 2 angle to the nearest neighbour within reach (m): 1 ahead or behind, -1 at the sides, 0 anywhere.
+
+    slowest : speed (m/s) at or below which one has no front
+    In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
+    """
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
     total, count = 0.0, 0
-    for place, ahead, there in zip(found.position[:, :2], h, found.present, strict=True):
+    for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         rows = np.flatnonzero(there)
         x = place[:, rows]
         apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)

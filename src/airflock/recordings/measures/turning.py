@@ -16,6 +16,9 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
     rate = np.arctan2(sine, (h[:-1] * h[1:]).sum(axis=1)) / np.diff(found.time)[:, None]
-    before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
+    if len(h) > 1:
+        before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
+    else:  # one frame has no turn
+        before = after = np.full((len(h), h.shape[2]), np.nan)
     coordinates = {"time": found.time, "individual": found.names}
     return xr.DataArray(0.5 * (before + after), coordinates, ("time", "individual"), attrs={"units": "rad/s"})
