@@ -268,6 +268,11 @@ def test_a_change_is_refused_in_one_line_each_and_leaves_the_flight_as_it_was(sc
     }.items():
         with pytest.raises((ScenarioError, FlightError), match=said):
             flight.change(dict([settings]))
+    for settings in ("x", 3, [1], {3: 4}):
+        with pytest.raises(ScenarioError, match="are no keys with values"):
+            flight.change(settings)
+        with pytest.raises(ScenarioError, match="are no keys with values"):
+            airflock.load("vasarhelyi_2018/4ms", settings)
     assert whole(flight.advance(1.0)) == whole(twin.advance(1.0)) and flight.events == []
 
 

@@ -7,6 +7,7 @@ from airflock.engine.presence import join, leave
 from airflock.engine.standing import Standing
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
+from airflock.scenarios.document import keyed
 from airflock.scenarios.events import Event, agent_number, vector
 
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
@@ -56,7 +57,8 @@ class Acting(Standing):
         the old scenario until the next `advance` after the new one is ready.
         Raises ScenarioError, and the flight is as it was.
         """
-        return self._change(settings, Event(self.step, "change", dict(settings)), wait)
+        settings = keyed(settings, self.scenario.name)
+        return self._change(settings, Event(self.step, "change", settings), wait)
 
     def _change(self, settings: Mapping[str, Any], event: Event, wait: bool) -> Self:
         """Set keys of the scenario anew, as an event says."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from airflock.core.parameters import declarations
 from airflock.core.vectors import expanded, overruled
+from airflock.errors import ScenarioError
 from airflock.scenarios.families import FAMILIES
 from airflock.scenarios.sections import SECTIONS
 from airflock.spelling import meant
@@ -26,6 +27,15 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
         document = {**document, section: kept}
     return document, tuple(notes)
+
+
+def keyed(settings: Any, where: str) -> dict[str, Any]:
+    """Settings as a dict of keys and values; none for None. Raises ScenarioError for anything else."""
+    if settings is None:
+        return {}
+    if not isinstance(settings, Mapping) or not all(isinstance(key, str) for key in settings):
+        raise ScenarioError([f"{where}: settings {settings!r} are no keys with values, such as {{'dt': '10 ms'}}"])
+    return dict(settings)
 
 
 def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:

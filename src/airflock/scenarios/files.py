@@ -11,6 +11,7 @@ from typing import Any
 from airflock.core.fault import Fault, fault
 from airflock.errors import ScenarioError
 from airflock.scenarios import formats
+from airflock.scenarios.document import keyed
 from airflock.scenarios.extends import extended
 from airflock.scenarios.families import FAMILIES, Family, Given
 from airflock.scenarios.ground import with_ground
@@ -133,7 +134,7 @@ def load(
         of_groups = {own.name: own for own in map(given_law, _several(laws))}
         given = replace(given, law=flown, kinds=_kinds(faults), laws=of_groups)
         notes = (f"extends {base}: what is not given here is taken from there",) if base else ()
-        document, settings, told, wrong = with_ground(document, settings or {}, folder)
+        document, settings, told, wrong = with_ground(document, keyed(settings, where), folder)
         if flown is not None:
             kind = str(Path(law).absolute()) if str(law).endswith(".py") else flown.name
             document = {**document, "model": {"kind": kind}, "published": {}}

@@ -23,7 +23,7 @@ from airflock.scenarios import (
 )
 from airflock.scenarios.advice import advice
 from airflock.scenarios.cells import group_notes, measured_by_cells, takes_all_cores
-from airflock.scenarios.document import TOP, components, merged, with_kinds
+from airflock.scenarios.document import TOP, components, keyed, merged, with_kinds
 from airflock.scenarios.families import FAMILIES, METRICS, NOTHING, TOPOLOGY, Given
 from airflock.scenarios.gathering import Gathered, gathered
 from airflock.scenarios.ground import file_faults
@@ -49,7 +49,7 @@ def make(
     given : rules that fly in place of those that the document names
     trust : whether code that the document names may run
     """
-    settings = settings or {}
+    settings = keyed(settings, where)
     document, settings, faults = group_keys.with_groups(formats.current(document, where), settings)
     short = {key: value for key, value in settings.items() if "." not in key and key not in TOP}
     document, left_out = with_kinds(document, settings)
