@@ -357,6 +357,9 @@ def test_faults_are_checked_at_once(tmp_path):
     path.write_text("[[fault")
     with pytest.raises(ScenarioError):
         read_faults(path, (1,))
+    path.write_text('[[fault]]\nkind = "clock"\namount = 3.0\nbegin = 10\n')  # it would be wrong from 0 s on
+    with pytest.raises(ScenarioError, match="leave out begin and end"):
+        read_faults(path, (1,))
 
 
 # ------------------------------------------------------------------------------------------------------- vehicles

@@ -178,7 +178,16 @@ def test_nothing_arms_without_a_start_and_nothing_starts_with_something_missing(
     assert node.phase == Phase.READY and not vehicle.armed
 
 
+def test_an_autopilot_that_is_not_heard_is_told_until_it_is():
+    node, vehicle = node_with_vehicle()
+    early, late = ([note for k in range(*span) for note in node.tick(0.2 * k).notes] for span in ((0, 15), (15, 30)))
+    assert early == [] and [note.startswith("missing: no heartbeat from the autopilot") for note in late] == [True]
+    live(node, vehicle, 6.0, 8.0)
+    assert node.phase == Phase.READY
+
+
 @pytest.mark.parametrize(("change", "line"), [
+    (lambda v: setattr(v, "armed", True), "is armed already; disarm it"),
     (lambda v: v.parameters.update(COM_OF_LOSS_T=3.0), "COM_OF_LOSS_T = 3 lies outside"),
     (lambda v: v.parameters.update(GF_ACTION=0), "GF_ACTION = 0 lies outside"),
     (lambda v: setattr(v, "battery", 20.0), "battery: 20 %"),

@@ -4,6 +4,9 @@ Nothing here depends on how fast the computer is: a flight begins when all are t
 """
 
 import asyncio
+import multiprocessing
+import os
+import signal
 import time
 
 import numpy as np
@@ -101,6 +104,26 @@ def test_a_process_that_fails_ends_the_fleet_in_a_line(monkeypatch, capfd):
     with pytest.raises(LinkError, match="a process of the fleet ended with status 1"):
         flown("processes")
     assert "a wing came off" in capfd.readouterr().err
+
+
+def test_a_process_that_is_killed_ends_the_others_without_a_word_of_theirs(monkeypatch, capfd):
+    def killed(plan, i):
+        yield Rest(0.0)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def stop(number, _):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(realtime, "craft_life", killed)
+    before = signal.signal(signal.SIGTERM, stop)  # as the command has it; processes inherit it
+    try:
+        with pytest.raises(LinkError, match="a process of the fleet ended with status -9"):
+            flown("processes")
+        for process in multiprocessing.active_children():
+            process.join(10.0)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert "KeyboardInterrupt" not in capfd.readouterr().err
 
 
 def test_what_flies_in_lock_step_only_is_refused():

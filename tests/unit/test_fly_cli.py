@@ -1,7 +1,9 @@
 """The verbs fly and fleet: cards and keys are written whole or not at all, and mistakes are told all at once."""
 
 import json
+import subprocess
 import sys
+import time
 
 import pytest
 
@@ -91,6 +93,60 @@ def test_orders_are_checked_before_they_are_sent(airflock):
     assert code == 2 and "cannot send" in lines[0]
     code, _, _ = airflock("fly", "order", "mission.json", "hold", "--radio", "udp:127.0.0.1:39433>127.0.0.1:39434")
     assert code == 0
+
+
+@pytest.mark.parametrize(
+    ("point", "said"),
+    [
+        ("47.5,19.04,20", "lies -100 m above the site; the fence reaches from 2 to 30 m (ALT is above sea level"),
+        ("47.501,19.04,140", "m outside of the fence"), ("1,2,140", "m outside of the fence"),
+        ("nan,19.04,140", "is not LAT,LON,ALT"),
+    ],
+)  # fmt: skip
+def test_nobody_is_sent_to_a_point_that_every_drone_would_refuse(airflock, point, said):
+    airflock("fly", "prepare", REAL, *HERE)
+    radio = ["--radio", "udp:127.0.0.1:39433>127.0.0.1:39434"]
+    code, out, lines = airflock("fly", "order", "mission.json", "goto", "--point", point, *radio)
+    assert code == 2 and not out and len(lines) == 1 and lines[0].startswith(f"airflock: --point {point}: ")
+    assert said in lines[0]
+
+
+def test_a_point_within_the_fence_is_sent_and_a_kill_tells_its_second_step(airflock):
+    airflock("fly", "prepare", REAL, *HERE)
+    radio = ["--radio", "udp:127.0.0.1:39433>127.0.0.1:39434"]
+    code, _, lines = airflock("fly", "order", "mission.json", "goto", "--point", "47.5001,19.04,140", *radio)
+    assert code == 0 and lines == ["sent GOTO to all"]
+    _, _, lines = airflock("fly", "order", "mission.json", "kill", *radio)
+    assert lines == ["sent KILL to all; the motors stop when kill --confirm follows within 5 s"]
+    _, _, lines = airflock("fly", "order", "mission.json", "kill", "--confirm", *radio)
+    assert lines == ["sent CONFIRM_KILL to all"]
+
+
+def test_a_node_that_a_service_stops_keeps_its_log_and_its_memory(airflock, tmp_path):
+    airflock("fly", "prepare", REAL, *HERE)
+    ports = ["--autopilot", "udp:127.0.0.1:39435", "--radio", "udp:127.0.0.1:39436>127.0.0.1:39437"]
+    command = [sys.executable, "-m", "airflock.onboard", "mission.json", "--member", "2", "--i-am-the-pilot", *ports]
+    node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 30.0
+    while not list(tmp_path.glob("mission-2-*.log")) and time.monotonic() < until:
+        time.sleep(0.01)
+    time.sleep(0.2)  # less than the second after which it saves by itself
+    node.terminate()
+    _, told = node.communicate(timeout=30.0)
+    assert node.returncode == 2 and told.startswith("airflock: stopped; ")
+    (log,) = tmp_path.glob("mission-2-*.log")
+    code, out, lines = airflock("fly", "replay", "mission.json", log, "--json")
+    assert code == 0 and json.loads(out)["ticks"] >= 2 and not lines, "what it did since it last saved"
+
+
+@pytest.mark.parametrize("host", ["nobody.invalid", "a..b", "x" * 70])
+@pytest.mark.parametrize("port", ["udp:{}:39432", "udp:127.0.0.1:39432>{}:39433"])
+def test_a_check_on_the_ground_finds_a_radio_whose_name_leads_nowhere(airflock, host, port):
+    airflock("fly", "prepare", REAL, *HERE)
+    radio = port.format(host)
+    autopilot = ["--autopilot", "udp:127.0.0.1:39431"]
+    code, out, lines = airflock("fly", "mission.json", "--member", 2, *autopilot, "--radio", radio, "--check")
+    assert code == 2 and not out and len(lines) == 1 and lines[0].startswith(f"airflock: {radio}: ")
 
 
 def test_a_file_that_is_no_log_is_one_line(airflock, tmp_path):

@@ -270,6 +270,8 @@ def test_each_fault_is_one_line_that_says_what_to_write(tmp_path):
     assert "two individuals under one id" in refused(written(tmp_path, turns))
     below = own.assign(z=-20.0)
     assert 'write --map "z:=-z"' in refused(written(tmp_path, below))
+    line = refused(written(tmp_path, own.assign(z=20.0)), axes="ned")  # what is given already is not told again
+    assert 'it points up, where --axes ned has it down; leave --axes ned out, or add --map "z:=-z"' in line
 
 
 def test_a_reset_of_the_estimator_splits_and_an_outlier_is_left_out(tmp_path):

@@ -126,3 +126,28 @@ def texts(command, path=()):
 def test_no_square_bracket_of_a_help_is_taken_for_markup():
     found = {where: re.findall(r"(?<!\\)\[(?!/?bold\])[^\]]*\]", text) for where, text in texts(get_command(app))}
     assert {where: brackets for where, brackets in found.items() if brackets} == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "file"),
+    [
+        ("certify mine.toml --limit r_min<1 --out mine.toml", "mine.toml"),
+        ("certify mine.toml --limit r_min<1 --out ../here/mine.toml", "mine.toml"),
+        ("harden mine.toml --out mine.toml", "mine.toml"),
+        ("identify fish.nc --like mine.toml --out mine.toml", "mine.toml"),
+        ("infer fish.nc --models vicsek_1995,mine.toml --out mine.toml", "mine.toml"),
+        ("import fish.nc --save fish.nc", "fish.nc"),
+        ("export fish.nc --out fish.nc", "fish.nc"),
+        ("display heart.png --plot heart.png", "heart.png"),
+    ],
+)
+def test_no_command_writes_over_the_file_that_it_reads(words, file, tmp_path, monkeypatch, capsys):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    for name in ("mine.toml", "fish.nc", "heart.png"):
+        Path(name).write_text("duration = 5.0\n")
+    monkeypatch.setattr("sys.argv", ["airflock", *words.split()])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2 and f"{file}: is read here, and would be lost; give another" in capsys.readouterr().err
+    assert Path(file).read_text() == "duration = 5.0\n"

@@ -109,7 +109,7 @@ def certify(
     seconds, campaign = 1.0, None
     also: dict[str, Any] = {}
     with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES))
+        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[scenario])
     with gathering(faults):
         seconds = options.time_of(budget)
     with gathering(faults):

@@ -37,7 +37,7 @@ def display(
 
     faults: list[str] = []
     with gathering(faults):
-        options.writable((save, RECORDINGS), (plot, PICTURES))
+        options.writable((save, RECORDINGS), (plot, PICTURES), reads=shapes)
     settings: dict[str, Any] = {}
     with gathering(faults):
         settings = options.settings(changes)

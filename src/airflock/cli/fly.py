@@ -1,5 +1,6 @@
 """Verb fly: prepare a mission on the ground, run a node, give orders, fly a log again."""
 
+import math
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,7 @@ from airflock.untrusted import is_file
 DATAGRAM = 95  # bytes of a signed status packet
 OVERHEAD = 64  # bytes of headers of the link; our choice, WiFi with UDP and IP has 64
 PREAMBLE = 2e-4  # s of a packet before its first bit; WiFi's long preamble
+KILL = "; the motors stop when kill --confirm follows within 5 s"
 SHARE = 0.6  # of the channel's time that a flock may take; our choice: random access breaks down beyond
 FAST_BITS, SLOW_BITS = 6e6, 250e3  # bit/s: WiFi's multicast rate as it should be set; IEEE 802.15.4
 
@@ -52,7 +54,9 @@ def card(ctx: typer.Context) -> None:
 @app.command("prepare")
 def prepare(
     scenario: options.Where,
-    site: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground: degrees, m.")],
+    site: Annotated[
+        str, typer.Option(metavar="LAT,LON,ALT", help="Centre of the arena on the ground; ALT above sea level, m.")
+    ],
     members: Annotated[str, typer.Option(metavar="1-10", help="System ids of the drones, such as 1-10 or 1,2,5.")],
     changes: options.Set = None,
     trust: options.Trust = False,
@@ -163,7 +167,9 @@ def order(
     radio: Annotated[str, typer.Option(metavar="PORT", help="udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")],
     target: Annotated[int, typer.Option(min=0, max=250, help="System id; 0 for all.")] = 0,
     delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="s until a start.")] = 3.0,
-    point: Annotated[str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to, for goto.")] = None,
+    point: Annotated[
+        str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to, for goto; ALT as of the site.")
+    ] = None,
     confirm: Annotated[bool, typer.Option("--confirm", help="Second step of a kill, within 5 s of the first.")] = False,
 ) -> None:
     """Give an order, signed with the operator's key beside the card. Sent five times; each drone obeys it once.
@@ -187,6 +193,8 @@ def order(
         found = read_card(card_file)
         if target and target not in found.members:
             faults.append(f"--target {target}: the card's members are {', '.join(map(str, found.members))}")
+        if point and not faults:
+            options.refuse(_beyond(found, where, point))
     with gathering(faults):
         key, private = read_key(card_file.with_suffix(".key")), read_key(card_file.with_suffix(".operator"))
     options.refuse(faults)
@@ -203,7 +211,8 @@ def order(
             time.sleep(0.1)
     finally:
         port.close()
-    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}")
+    told = KILL if what is orders.Do.KILL else ""
+    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}{told}")
 
 
 @app.command("replay")
@@ -239,9 +248,23 @@ def replay(
         )
 
 
+def _beyond(card: Any, where: tuple[float, float, float], point: str) -> list[str]:
+    """What no drone would obey: a point outside the card's fence, which they refuse, each by itself."""
+    x, y, z = card.site.local(*where)
+    if not card.low <= z <= card.high:
+        return [
+            f"--point {point}: lies {z:.4g} m above the site; the fence reaches from {card.low:g} to {card.high:g} m "
+            f"(ALT is above sea level, the site's is {where[2] - z:g} m)"
+        ]
+    far = card.fence.outside(x, y)
+    return [f"--point {point}: lies {far:.4g} m outside of the fence"] if far > 0.0 else []
+
+
 def _site(option: str, text: str, faults: list[str]) -> tuple[float, float, float]:
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
+        if not math.isfinite(latitude + longitude + altitude):
+            raise ValueError
     except ValueError:
         faults.append(f"{option} {text}: is not LAT,LON,ALT, for instance 47.50,19.04,120")
         return 0.0, 0.0, 0.0

@@ -64,7 +64,7 @@ def harden(
     places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(found) + 1))]
     for place in places:
         with gathering(faults):
-            options.writable((place, SCENARIOS))
+            options.writable((place, SCENARIOS), reads=[scenario])
     again = r_coll is not None or delay is not None
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:

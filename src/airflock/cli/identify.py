@@ -57,7 +57,7 @@ def identify(
 
     faults: list[str] = []
     with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES))
+        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[like, heard, *files])
     with gathering(faults):
         scenario = load(like, options.settings(changes))
     with gathering(faults):

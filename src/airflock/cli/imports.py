@@ -91,7 +91,7 @@ def import_tracks(
 
     faults: list[str] = []
     with gathering(faults):
-        options.writable((save, RECORDINGS))
+        options.writable((save, RECORDINGS), reads=files)
     with gathering(faults):
         how = mapped(map)
     with gathering(faults):
@@ -175,7 +175,7 @@ def export(
     from airflock.recordings.exports.export import export as write
     from airflock.recordings.files import load_recording
 
-    options.writable((out, ENDINGS))
+    options.writable((out, ENDINGS), reads=[recording])
     write(load_recording(recording), out, layout=layout.value)
     ned = "; x is north, as in PX4: airflock import --axes ned reads it" if layout is Layout.PX4 else ""
     tables.say(f"saved {out}{ned}")

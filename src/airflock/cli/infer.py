@@ -52,7 +52,7 @@ def infer(
 
     faults: list[str] = []
     with gathering(faults):
-        options.writable((out, SCENARIOS), (plot, PICTURES))
+        options.writable((out, SCENARIOS), (plot, PICTURES), reads=[*models.split(","), *tracks])
     settings: dict[str, Any] = {}
     with gathering(faults):
         settings = options.settings(changes)

@@ -11,7 +11,7 @@ import typer
 
 from airflock.errors import ScenarioError, gathering
 from airflock.suffixes import suffix_fault
-from airflock.untrusted import from_outside, toml_value
+from airflock.untrusted import from_outside, is_file, toml_value
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
@@ -108,8 +108,11 @@ def refuse(faults: list[str]) -> None:
         raise ScenarioError(faults)
 
 
-def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
-    """Refuse files to be written, each with its possible endings, that cannot be; before any work is done."""
+def writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str | Path | None] = ()) -> None:
+    """Refuse files to be written, each with its possible endings, that cannot be; before any work is done.
+
+    reads : what the command reads, names of presets among it: none of these files is written over
+    """
     import os
 
     faults = []
@@ -123,6 +126,8 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]]) -> None:
             faults.append(f"{path}: the folder {folder} does not exist")
         elif path.is_dir() or not os.access(folder, os.W_OK):
             faults.append(f"{path}: cannot be written")
+        elif path.exists() and any(is_file(read) and path.samefile(read) for read in reads if read is not None):
+            faults.append(f"{path}: is read here, and would be lost; give another file to write")
     refuse(faults)
 
 

@@ -85,9 +85,10 @@ def told(entry: Mapping[str, Any]) -> str:
     """One entry of `kept` in words."""
     where = f" in {entry['scenario']}" if "scenario" in entry else ""
     verdict = "looks kept" if entry["keeps"] else "looks broken"
+    near = ", by how near they came" if entry["estimated"] > entry["events"] / entry["flights"] else ""
     return (
         f"{entry['limit']}{where}: {verdict}: {entry['events']} events in {entry['flights']} fresh flights, about "
-        f"{entry['estimated']:.2g} per flight; allowed are {entry['allowed']:.2g}"
+        f"{entry['estimated']:.2g} per flight{near}; allowed are {entry['allowed']:.2g}"
     )
 
 

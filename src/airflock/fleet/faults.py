@@ -8,6 +8,7 @@ from typing import Any
 from airflock.errors import ScenarioError
 from airflock.untrusted import from_outside, read_toml
 
+WHOLE_FLIGHT = "from the start of the flight on"
 KINDS = {
     "outage": "nobody hears these drones, and they hear nobody",
     "partition": "these drones and all others do not hear each other",
@@ -22,7 +23,7 @@ KINDS = {
     "gnss": "the position that the autopilot tells is frozen",
     "battery": "the battery is at `amount` %",
     "pilot": "the pilot takes over at the beginning",
-    "clock": "the node's clock is ahead by `amount` s from the start of the flight on",
+    "clock": f"the node's clock is ahead by `amount` s {WHOLE_FLIGHT}",
 }
 AMOUNTS = {
     "loss": (0.0, 1.0), "duplicate": (0.0, 1.0), "corrupt": (0.0, 1.0), "jitter": (0.0, 30.0), "battery": (0.0, 100.0),
@@ -85,6 +86,8 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
             wrong.append(f"amount is missing: {KINDS[kind]}; give it within [{low:g}, {high:g}]")
         elif not low <= numbers["amount"] <= high:
             wrong.append(f"amount = {numbers['amount']:g} lies outside [{low:g}, {high:g}]")
+    if kind == "clock" and not numbers.keys() <= {"amount"}:
+        wrong.append(f"a clock is wrong {WHOLE_FLIGHT}: leave out begin and end")
     if not wrong and numbers.get("begin", 0.0) >= numbers.get("end", 1e9):
         wrong.append("begin is not before end")
     return ([] if wrong else [Fault(str(kind), tuple(who), **numbers)]), wrong

@@ -246,7 +246,8 @@ def _alive(processes: Sequence[Any]) -> None:
 
 def _child(life: Callable[[], Begun], pipe: Any) -> None:
     """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it, and tells why
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
     pipe.recv()
     pipe.send(alone(life()))

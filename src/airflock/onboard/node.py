@@ -25,7 +25,7 @@ from airflock.onboard.wire import Wire
 
 EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
 RETRY = 1.0  # s between two tries of a command
-TELL = frozenset({Phase.READY, Phase.CLEARED})
+TELL = frozenset({Phase.BOOT, Phase.READY, Phase.CLEARED})
 
 
 class Memory(NamedTuple):
@@ -306,7 +306,7 @@ class Node:
         if now - self._beat_at >= RETRY - EPSILON:
             self._beat_at = now
             out.autopilot.append(self._say.heartbeat())
-        if now - self._asked_at >= RETRY - EPSILON and self.phase in (Phase.BOOT, *TELL):
+        if now - self._asked_at >= RETRY - EPSILON and self.phase in TELL:
             self._asked_at = now
             out.autopilot.extend(saying.questions(self._say, self.card.autopilot, self.wire))
         due = [k for k, at in enumerate(self._next_status) if now >= at - EPSILON]

@@ -1,7 +1,8 @@
 """Ports of a node: UDP and serial lines, by a short text each; non-blocking, without a library.
 
 udp:HOST:PORT listens there and answers to who spoke last; udp:HOST:PORT>HOST:PORT listens at the first and sends to
-the second (a broadcast address for a radio); serial:/dev/NAME:BAUD opens a serial line.
+the second (a broadcast address for a radio; a name is looked up once, when the port is opened); serial:/dev/NAME:BAUD
+opens a serial line.
 """
 
 import os
@@ -50,12 +51,19 @@ def open_port(text: str) -> Port:
             return Serial(rest, text)
     except (OSError, termios.error) as fault:
         raise LinkError(f"{text}: {fault.strerror if isinstance(fault, OSError) else fault}") from fault
+    except UnicodeError as fault:
+        raise LinkError(f"{text}: a computer cannot have this name") from fault
     raise LinkError(f"{text}: give udp:HOST:PORT, udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")
 
 
 def _place(rest: str, text: str) -> Place:
     here, _, there = rest.partition(">")
-    return Place(_address(here, text), _address(there, text) if there else None)
+    return Place(_address(here, text), _resolved(*_address(there, text)) if there else None)
+
+
+def _resolved(host: str, port: int) -> tuple[str, int]:
+    """An address by its number: a name is looked up once, not at each packet, and a wrong one is told before."""
+    return socket.gethostbyname(host), port
 
 
 def _address(told: str, text: str) -> tuple[str, int]:

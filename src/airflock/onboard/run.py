@@ -1,7 +1,9 @@
 """Run a node: its sockets, its clock, its files. The only part on board that does input and output."""
 
 import argparse
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from importlib.util import find_spec
@@ -58,6 +60,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; exit status 2 and one line per fault for whatever cannot be flown."""
     given = parser().parse_args(arguments)
+    if threading.current_thread() is threading.main_thread():  # only there are signals heard
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service that is stopped ends as by Ctrl-C
     try:
         return _run(given)
     except AirflockError as fault:

@@ -12,6 +12,7 @@ from airflock.onboard.wire import Wire
 
 SLOW = 0.5  # m/s; faster than this a drone does not stand, nor begin to land
 ALIVE = 3.0  # s; an autopilot that says nothing for longer is not there
+SILENT = "no heartbeat from the autopilot: is it on, its port and baud rate right, and does it speak MAVLink 2?"
 GATHERED = (Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD)
 BY_MODE = frozenset({Phase.RETURN, Phase.LAND, Phase.DONE})
 
@@ -37,6 +38,8 @@ def misses(card: Card, member: int, wire: Wire, peers: Peers, utc: int, now: flo
         found.append(f"the card expired at Unix time {card.expires} s; the clock says {utc // 1_000_000} s")
     if not card.operator:
         found.append("operator: the card names no key, so nobody could start or stop the drone")
+    if wire.armed:
+        found.append("the autopilot is armed already; disarm it")
     found += _parameter_misses(card, member, wire) + _own_misses(card, wire, now) + _clock_misses(card, wire, peers)
     return (*found, *_peer_misses(card, wire, peers, now))
 
@@ -149,6 +152,8 @@ def facts(
     calm = not (position_bad or gnss_for or few_for or clock_for or neighbour_near or more["overload"])
     calm = calm and not (operator_lost and s.operator_lost == "hold")
     told = misses(card, member, wire, peers, utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
+    if timers("silent", phase == Phase.BOOT and not alive, now) > ALIVE:
+        told = (SILENT,)
     layer = card.layer(member)
     at_home = False
     if own is not None and home is not None:

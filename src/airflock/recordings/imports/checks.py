@@ -70,8 +70,8 @@ def check_names(tracks: list[Track], findings: Findings) -> None:
         known.setdefault(track.name, track)
 
 
-def check_heights(tracks: list[Track], findings: Findings) -> None:
-    """Rule 4: heights of all individuals are above the same level; z points up."""
+def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
+    """Rule 4: heights of all individuals are above the same level; z points up, if `axes` (enu, ned) are the file's."""
     levels = {track.datum: track for track in tracks if "z" in track.columns or "alt" in track.columns}
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
@@ -83,9 +83,14 @@ def check_heights(tracks: list[Track], findings: Findings) -> None:
         low = np.flatnonzero(z < -1.0)
         if len(low) > 0.9 * len(z):
             name = track.label("z")
+            turn = f'--map "z:=-{quoted(name)}"'
+            if axes == "ned":
+                told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
+            else:
+                told = f"it points down; write {turn}, or --axes ned if x is north"
             findings.fault(
                 f"{track.source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: "
-                f'it points down; write --map "z:=-{quoted(name)}", or --axes ned if x is north',
+                + told,
                 "down",
             )
             return

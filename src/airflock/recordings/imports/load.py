@@ -170,7 +170,7 @@ def read_tracks(
     for track in tracks:
         checks.check_time(track, findings)
     checks.check_names(tracks, findings)
-    checks.check_heights(tracks, findings)
+    checks.check_heights(tracks, options.axes, findings)
     _to_metres(tracks, origin, findings)
     findings.refuse()
     motion.check_axes(tracks, findings)
