@@ -91,7 +91,7 @@ def test_a_law_that_does_not_ask_how_it_moves_itself_has_a_driver_by_cells(wary)
     scenario = load(
         "couzin_2002/torus", {**SCHOOL, "agents": 1000, "groups": [{"agents": 1, "model": {"kind": wary}}]}, trust=True
     )
-    assert "def neighbours_1(" in driver_text(scenario)
+    assert plan_of(scenario).grid and "def neighbours_1(" in driver_text(scenario)
 
 
 @pytest.mark.parametrize("reach", [12.9, 13.1])

@@ -181,6 +181,16 @@ def test_large_differences_count_by_their_size_and_normal_ones_keep_their_varian
     assert np.isfinite(lost).all() and np.abs(lost[:-1]).max() < 20.0
 
 
+def test_who_is_lost_costs_much_and_each_one_more():
+    model = Line(lambda x, a: a * x, ("a",), (0.5,))
+    e, owner = model.innovations(model.start())
+    losses = []
+    for lost in range(3):
+        e[:lost] = np.nan
+        losses.append(model.tally(e, owner).loss())
+    assert losses[0] + 1000.0 < losses[1] < losses[2] < 1e15
+
+
 def test_the_deviation_solves_its_equation_whatever_is_wild(seed):
     e = np.random.default_rng(seed).normal(size=500)
     for wild in (0, 20, 200):

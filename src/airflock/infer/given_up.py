@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airflock.infer.candidates import Candidate, Number
+from airflock.infer.candidates import Candidate
 from airflock.infer.fit import BOTH, FINE, Fit, beside, by_powers, climb, curvature, followed
 from airflock.infer.likelihood import Model
 from airflock.infer.ridges import View, Way
@@ -25,7 +25,7 @@ def taken_back(
 
     law : with all its numbers
     """
-    for number in _missing(law, model):
+    for number in model.missing(law):
         fuller, i = model.with_number(law, number)
         view = _view(fuller, fit, i, number.place(number.default), spans, DROP)
         if view is None:
@@ -47,18 +47,12 @@ def ways_beside(
     law : with all its numbers; drop : fall of the log-likelihood at which a way ends
     """
     found: list[Way] = []
-    for number in _missing(law, model):
+    for number in model.missing(law):
         fuller, i = model.with_number(law, number)
         ways = ways_of(fuller, fit, i, number.place(number.default), spans, drop)
         found += [tuple((np.delete(place, i), fell) for place, fell in way) for way in ways]
         say()
     return tuple(found)
-
-
-def _missing(law: Candidate, model: Model) -> list[Number]:
-    """Numbers of a law that the model does without."""
-    assert model.law is not None
-    return [number for number in law.numbers if number not in model.law.numbers]
 
 
 def ways_of(model: Model, fit: Fit, number: int, place: float, spans: Sequence[int], drop: float) -> list[Way]:

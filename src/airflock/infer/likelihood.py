@@ -138,6 +138,11 @@ class Model:
         several = [other for other in law.numbers if other in self.law.numbers or other == number]
         return self.told_by(several), several.index(number)
 
+    def missing(self, law: Candidate) -> list[Number]:
+        """Numbers of the law that the model does without; law : with all its numbers."""
+        assert self.law is not None
+        return [number for number in law.numbers if number not in self.law.numbers]
+
     def first(self) -> Array:
         """A place to begin with: defaults, usual gains, and of speeds what was seen."""
         values = [n.default for n in self.numbers[: self.named]] + list(FIRST_GAINS)
@@ -194,8 +199,8 @@ class Model:
     def tally(self, e: Array, owner: NDArray[np.int64]) -> Score:
         """Sums of squares by span of differences."""
         m = len(self.spans)
-        with np.errstate(over="ignore"):
-            squares = np.minimum(e * e, 1e12)
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.nan_to_num(e * e, nan=1e12, posinf=1e12)
         along = np.bincount(owner, squares[:, 0], m).astype(float)
         across = np.bincount(owner, squares[:, 1:].sum(axis=1), m).astype(float)
         return Score(np.bincount(owner, minlength=m).astype(float), along, across, self.axes)

@@ -75,10 +75,9 @@ def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) 
     Whether the others make up for a number is asked before the search (`telling`), at places that explain little. At
     the fit the answer may differ. law : with all its numbers
     """
-    assert model.law is not None
-    few, kept = model.few(), model.law.numbers
+    few = model.few()
     best = climb(model, found.place, found.free, few, slopes=(WIDE,))
-    for number in [number for number in law.numbers if number not in kept]:
+    for number in model.missing(law):
         fuller, k = model.with_number(law, number)
         places = [np.insert(best.place, k, x) for x in (number.place(number.default), *ELSEWHERE)]
         places.sort(key=lambda u, fuller=fuller: loss_at(fuller, u, free(fuller), few))  # type: ignore[misc]

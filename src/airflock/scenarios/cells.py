@@ -1,4 +1,4 @@
-"""Cells: whether neighbours are found by cells, as wide as the law's reach, instead of among all pairs.
+"""Cells: whether neighbours are found by cells, as wide as a law's reach, instead of among all pairs.
 
 And whether order parameters look at pairs by cells.
 """
