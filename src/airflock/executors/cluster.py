@@ -27,6 +27,7 @@ ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
 RETRIES = 2  # further tries of a flight that took too long
 DESERTED = 300.0  # s without a single worker after which nobody is expected to come back
+FRESH = 15.0  # s until whoever flies waits no longer for a fresh worker process: it comes by itself
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
 Fly = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
 compiling = Lock()  # held while a worker compiles: its threads wait for the first
@@ -167,7 +168,7 @@ class Cluster:
                 reason = f"took longer than {self.timeout:g} s, {tries[key]} times"
                 yield Landed(flight, None, reason, time.monotonic() - began)
         if workers:
-            self.client.restart_workers(workers, raise_for_error=False)
+            self.client.restart_workers(workers, timeout=FRESH, raise_for_error=False)
 
     def close(self) -> None:
         """Leave the scheduler; its workers are not ours to end."""
