@@ -208,13 +208,20 @@ def test_held_out_steps_have_a_density_that_one_wild_step_does_not_decide():
 
 
 def test_the_best_is_named_with_its_doubts():
-    def law(name, gain, missed, surprise):
-        return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, {}, None, None, None, np.array(surprise))
+    def law(name, gain, missed, surprise, numbers=0):
+        told = dict.fromkeys(map(str, range(numbers)))
+        return Law(name, gain, 5.0, 1.0, 20.0, -gain, 0.95, missed, told, None, None, None, np.array(surprise))
 
     ahead = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0])
     assert verdict_of([ahead, law("b", 100.0, 0.0, [76.0, 77.1, 78.0, 78.9])])[1] == "a explains the tracks best"
     doubtful = verdict_of([ahead, law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0])])[1]
     assert "b cannot be told from it" in doubtful
+    # by 1 unit with a standard error of 4.1: the simpler of two is the better explanation, wherever it stands
+    many, few = law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0], 8), law("b", 399.0, 0.0, [0.0, 4.0, 1.0, 6.0], 3)
+    assert verdict_of([many, few]) == (few, "b explains the tracks with 3 numbers as well as a with 8")
+    assert verdict_of([law("a", 400.0, 0.0, [1.0, 2.0, 3.0, 4.0], 3), few])[0].name == "a"
+    behind = law("b", 394.0, 0.0, [0.5, 6.0, 2.5, 7.0], 3)  # by 6 units with a standard error of 4.7
+    assert verdict_of([many, behind])[0] is many
     assert "would explain 30%" in verdict_of([law("a", 400.0, 0.3, [1.0, 2.0])])[1]
     assert verdict_of([law("a", 8.0, 0.0, [1.0, 2.0])])[0] is None  # within two standard errors
     assert verdict_of([law("a", 18.0, 0.0, [1.0, 2.0])])[0] is None  # less than so many numbers bring by chance

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 SURE = 2.0  # standard errors by which a law must predict better than going straight on, and
 MOST = 0.75  # share of the spans in which it must
 APART = 2.0  # standard errors by which the best law must be ahead of the second
+SIMPLER = 1.0  # standard errors within which a law of fewer numbers is the better explanation
 EDGE = 0.01  # of a range: nearer to its end nothing is told
 
 
@@ -128,24 +129,40 @@ class Inferred:
 
 
 def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
-    """The law that explains the tracks, if one does, and the line that says so."""
-    best = laws[0]
-    if not (best.gain > max(SURE * best.error, best.price) and best.ahead >= MOST):
+    """The law that explains the tracks, if one does, and the line that says so.
+
+    Of laws that foretell as well within a standard error it is that with the fewest numbers (Breiman et al. 1984).
+    """
+    first = laws[0]
+    if not _explains(first):
         return None, "none of these explains the tracks better than going straight on"
+    as_well = [law for law in rivals(laws, SIMPLER) if _explains(law)]
+    best = min([first, *as_well], key=lambda law: len(law.numbers))  # of equally many the first
     missed = (
         f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""
     )
+    if best is not first:
+        numbers = f"{len(best.numbers)} numbers", len(first.numbers)
+        return best, f"{best.name} explains the tracks with {numbers[0]} as well as {first.name} with {numbers[1]}{missed}"
     if beside := rivals(laws)[:1]:
         return best, f"{best.name} explains the tracks best, but {beside[0].name} cannot be told from it{missed}"
     return best, f"{best.name} explains the tracks best{missed}"
 
 
-def rivals(laws: list[Law]) -> list[Law]:
-    """Laws that cannot be told from the first, which explains the tracks best, by what each foretells."""
+def _explains(law: Law) -> bool:
+    """Whether a law foretells better than going straight on, and than so many numbers would by chance."""
+    return law.gain > max(SURE * law.error, law.price) and law.ahead >= MOST
+
+
+def rivals(laws: list[Law], apart: float = APART) -> list[Law]:
+    """Laws that cannot be told from the first, which explains the tracks best, by what each foretells.
+
+    apart : standard errors by which the first is ahead of all others
+    """
     found = []
     for law in laws[1:]:
         ahead = law.surprise - laws[0].surprise
-        if ahead.sum() < APART * float(np.sqrt(len(ahead)) * ahead.std(ddof=1)):
+        if ahead.sum() < apart * float(np.sqrt(len(ahead)) * ahead.std(ddof=1)):
             found.append(law)
     return found
 

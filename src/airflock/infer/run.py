@@ -23,6 +23,7 @@ from airflock.recordings.files import load_recording
 from airflock.recordings.imports.load import load_tracks
 from airflock.scenarios.scenario import Scenario
 
+RACES = 3  # from places drawn anew, of a law that is searched deeper
 LAWS = ("couzin_2002", "reynolds_1987", "vicsek_1995", "vasarhelyi_2018")
 
 
@@ -149,8 +150,12 @@ class _Comparison:
 
     def deeper(self, law: Law, model: Model) -> tuple[Model, Law]:
         """A law after more searching, and without numbers that the others make up for; judged anew."""
-        say = _teller(self.say, f"{law.name}, simplified")
-        model, fit = select.simpler(self.laws[law.name], model, law.fit, say)
+        own, say = self.laws[law.name], _teller(self.say, f"{law.name}, simplified")
+        gains = self.straight.place[self.reference.named :]
+        tried = [(model, law.fit)]
+        for more in range(1, RACES):
+            tried.append(select.fit(own, self.followed, self.scale, gains, self.seed + more, say))
+        model, fit = select.simpler(own, *min(tried, key=lambda each: each[1].loss), say)
         return model, self.judged(law.name, model, fit, say)
 
     def judged(self, name: str, model: Model, fit: Fit, say: Callable[[], None]) -> Law:
