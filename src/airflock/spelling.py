@@ -17,3 +17,19 @@ def meant(word: object, known: Iterable[str], otherwise: str = "", *, lead: str 
     """
     near = get_close_matches(str(word), list(known), n=1, cutoff=cutoff)
     return f"{lead}did you mean {near[0]}?" if near else otherwise
+
+
+def raised(fault: BaseException) -> str:
+    """What was raised, in one line, with the attribute that was meant where another one was asked for.
+
+    >>> import math
+    >>> try:
+    ...     math.sqr(4.0)
+    ... except AttributeError as fault:
+    ...     raised(fault)
+    "AttributeError: module 'math' has no attribute 'sqr'; did you mean sqrt?"
+    """
+    line = " ".join(f"{type(fault).__name__}: {fault}".removesuffix(": ").split())
+    if isinstance(fault, AttributeError) and fault.name is not None:
+        line += meant(fault.name, (name for name in dir(fault.obj) if name[0] != "_"), lead="; ")
+    return line

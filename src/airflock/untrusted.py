@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from xml.parsers import expat
 
 from airflock.errors import AirflockError, CardError, ScenarioError, bounded, reason
+from airflock.spelling import raised
 
 MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
 MOST_DEPTH = 32  # tables and lists inside each other
@@ -69,7 +70,7 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
     except MemoryError as fault:
         raise _one(kind, f"{where}: needs more memory than there is") from fault
     except Exception as fault:  # the last resort: a stranger's text must not end in a traceback
-        raise _one(kind, f"{where}: cannot be used: {type(fault).__name__}: {fault}") from fault
+        raise _one(kind, f"{where}: cannot be used: {raised(fault)}") from fault
 
 
 def _one(kind: type[AirflockError], line: str) -> AirflockError:

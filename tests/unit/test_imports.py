@@ -173,6 +173,16 @@ def test_movebank_rows_become_local_metres():
     np.testing.assert_allclose(values(found)[:, :, 0], expected[:, :2], rtol=1e-5, atol=1e-3)
 
 
+def test_columns_by_name_are_a_table():
+    t = np.repeat(np.arange(30) / 10.0, 2)
+    columns = {"t": t, "id": ["a", "b"] * 30, "x": (2.0 * t).tolist(), "y": range(60), "z": 0.0}
+    found, same = (airflock.load_tracks(each, unit="m") for each in (columns, pd.DataFrame(columns)))
+    xr.testing.assert_identical(found, same)
+    for wrong, told in (({"t": [0, 1], "x": [1.0]}, "t has 2, x has 1"), ({}, "there are none"), ({"t": 0}, "none")):
+        with pytest.raises(RecordingError, match=told):
+            airflock.load_tracks(wrong)
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.floats(-85, 85), st.floats(-179, 179), st.floats(-100, 5000), st.floats(-1, 1), st.floats(-1, 1))
 def test_local_metres_keep_distances_and_directions(lat, lon, height, north, east):

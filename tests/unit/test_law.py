@@ -1,6 +1,7 @@
 """The law of rules and the contract: what is refused, with the file, the line and the reason."""
 
 import math
+import re
 from importlib import import_module
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -152,6 +153,10 @@ class Parameters:
     pass
 
 
+class Gain:
+    gain = 1.0
+
+
 class Sums(NamedTuple):
     x: float
 
@@ -226,3 +231,21 @@ def test_what_to_write_instead_is_told_of_the_rule_that_is_wrong(rule, said):
     parts = {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": Sums}
     with pytest.raises(RuleError, match=said):
         probe(model(SimpleNamespace(**parts), "mine"), Parameters())
+
+
+def misspelt(dx, p):
+    return Sums(dx * p.gian)
+
+
+def unknown(dx):
+    return Sums(math.sqr(dx))
+
+
+@pytest.mark.parametrize(("rule", "meant"), [
+    (misspelt, "'gian'; did you mean gain?"), (unknown, "'sqr'; did you mean sqrt?"),
+])  # fmt: skip
+def test_an_attribute_that_is_misspelt_names_the_near_one_and_its_line(rule, meant):
+    parts = {"Parameters": Gain, "COMMAND": "velocity", "decide": decide, "neighbour": rule, "Sums": Sums}
+    line = rule.__code__.co_firstlineno + 1
+    with pytest.raises(RuleError, match=rf"test_law.py:{line}: .* has no attribute {re.escape(meant)}$"):
+        probe(model(SimpleNamespace(**parts), "mine"), Gain())

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from airflock.errors import ScenarioError
+from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.own_code import own_module
 
 
@@ -28,3 +28,12 @@ def test_what_is_no_text_of_python_is_refused(tmp_path, name):
     (tmp_path / name).write_text("GAIN = 0.1\n")
     with pytest.raises(ScenarioError, match="is not a Python file"):
         own_module(tmp_path / name, "model.kind", trust=True)
+
+
+def test_a_fault_of_its_own_names_the_line_and_the_word_that_was_meant(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text('import airflock\n\n\ndef made():\n    return airflock.quantiti(1.0, "m")\n\n\nGAIN = made()\n')
+    with pytest.raises(RuleError) as fault:
+        own_module(path, "model.kind", trust=True)
+    said = "AttributeError: module 'airflock' has no attribute 'quantiti'; did you mean quantity?"
+    assert str(fault.value) == f"{path}:5: {said}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import StudyError, bounded
+from airflock.spelling import raised
 
 OVER_SEEDS = ("mean", "worst", "quantile")
 Own = Callable[[Mapping[str, Any]], float]  # a fitness of the user's own, from the order parameters of one flight
@@ -69,8 +70,7 @@ def own_value(own: Own, name: str, values: Mapping[str, Any]) -> float:
         place = f"{last.filename}:{last.lineno}"
         if last.filename == __file__ and code is not None:  # it returned, but no number
             place = f"{code.co_filename}:{code.co_firstlineno}"
-        reason = " ".join(str(fault).split())
-        raise StudyError(f"objective {name}: {place}: {type(fault).__name__}: {reason}") from fault
+        raise StudyError(f"objective {name}: {place}: {raised(fault)}") from fault
 
 
 def losses(rows: Sequence[Sequence[float | None]], objectives: Sequence[Objective]) -> NDArray[np.float64]:

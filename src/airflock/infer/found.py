@@ -142,8 +142,8 @@ def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
         f"; a free sum of forces would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""
     )
     if best is not first:
-        numbers = f"{len(best.numbers)} numbers", len(first.numbers)
-        return best, f"{best.name} explains the tracks with {numbers[0]} as well as {first.name} with {numbers[1]}{missed}"
+        few, many = f"{best.name} explains the tracks with {len(best.numbers)} numbers", len(first.numbers)
+        return best, f"{few} as well as {first.name} with {many}{missed}"
     if beside := rivals(laws)[:1]:
         return best, f"{best.name} explains the tracks best, but {beside[0].name} cannot be told from it{missed}"
     return best, f"{best.name} explains the tracks best{missed}"

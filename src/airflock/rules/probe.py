@@ -19,6 +19,7 @@ from airflock.core.topology import Topology
 from airflock.core.vocabulary import PAIR, SURFACE, VOCABULARY, Own, Percept, asks
 from airflock.errors import RuleError
 from airflock.rules import law
+from airflock.spelling import raised
 
 VALUES = dict(zip([*PAIR, *(name for name in SURFACE if name not in PAIR)], (
     3.0, -4.0, 0.0, 5.0, 25.0, 0.6, 0.8, 0.0, 1.0, 1.0, 2.0, 0.0, 0.6, 0.8, 0.0, 0.8, 0.6, 0.0, 0.2, 1.0, 0.0, 1.0,
@@ -156,8 +157,7 @@ def _call(rule: Callable[..., Any], kind: str, given: dict[str, Any], owner: str
     except Exception as fault:  # a user's rule may fail in any way; show where
         frames = [f for f in traceback.extract_tb(fault.__traceback__) if "airflock/rules/probe" not in f.filename]
         spot = f"{frames[-1].filename}:{frames[-1].lineno}" if frames else _place(rule)
-        told = f"{type(fault).__name__}: {fault}".removesuffix(": ")
-        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {told}") from fault
+        raise RuleError(f"{spot}: {owner}.{kind} fails on a probe: {raised(fault)}") from fault
     numbers = answer if isinstance(answer, tuple) else (answer,)
     for number in numbers:
         if isinstance(number, (int, float)) and not math.isfinite(number):

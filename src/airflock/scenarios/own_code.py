@@ -7,6 +7,7 @@ imported only if the caller says so: `trust=True`, `--trust`, or by giving the l
 import hashlib
 import inspect
 import json
+import traceback
 from importlib import util
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
@@ -14,6 +15,7 @@ from types import FunctionType, ModuleType
 
 from airflock.core.contract import Model
 from airflock.errors import RuleError, ScenarioError, bounded
+from airflock.spelling import raised
 from airflock.untrusted import is_file
 
 
@@ -46,8 +48,9 @@ def own_module(path: Path, told: str, *, trust: bool) -> ModuleType:
     try:  # the text as it is now: bytecode kept beside it may be of an earlier text, or of a stranger's
         exec(spec.loader.source_to_code(path.read_bytes(), str(path)), vars(module))
     except (Exception, SystemExit, KeyboardInterrupt) as fault:  # the user's own file may fail in any way
-        reason = bounded(" ".join(str(fault).split()))
-        raise RuleError(f"{path}: {type(fault).__name__}: {reason}") from fault
+        lines = [frame.lineno for frame in traceback.extract_tb(fault.__traceback__) if frame.filename == str(path)]
+        place = f"{path}:{lines[-1]}" if lines else str(path)
+        raise RuleError(f"{place}: {bounded(raised(fault))}") from fault
     return module
 
 

@@ -62,9 +62,9 @@ def load_tracks(
 
     Parameters
     ----------
-    what : path, list of paths, pandas.DataFrame, xarray.Dataset or array
-        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a table, a Dataset of `movement`, or an
-        array (frame, individual, 2 or 3).
+    what : path, list of paths, pandas.DataFrame, mapping of columns, xarray.Dataset or array
+        A file or several (.csv, .parquet, .ulg, .bin, .tlog, .nc, .h5, .npy), a table, such as {"t": [...], "id":
+        [...], "x": [...]}, a Dataset of `movement`, or an array (frame, individual, 2 or 3).
     map : mapping, optional
         Target → expression of columns, e.g. {"t": "time_us*1e-6", "x": "pos_e", "id": "file"}; targets are t, x, y, z
         (m), vx, vy, vz, cx, cy, cz (velocity and its command, m/s), lat, lon (degrees), alt (m), utc (s since 1970),
@@ -195,10 +195,12 @@ def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Tra
 
 
 def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
+    if isinstance(what, xr.Dataset):  # which is a mapping, too
+        return movement.read_dataset(what, options)
+    if isinstance(what, Mapping):
+        what = tables.table_of(what)
     if isinstance(what, pd.DataFrame):
         return tables.read_frame(what, options, findings)
-    if isinstance(what, xr.Dataset):
-        return movement.read_dataset(what, options)
     if isinstance(what, np.ndarray):
         return arrays.read_array(what, options)
     if isinstance(what, (str, os.PathLike)):

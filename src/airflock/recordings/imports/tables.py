@@ -1,7 +1,7 @@
 """Tables: CSV and Parquet files and pandas DataFrames, one individual or many, long or one column per individual."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -60,6 +60,15 @@ def read_parquet(path: Path, options: Options, findings: Findings) -> list[Track
             options.done(min(1.0, at / total))
 
     return from_parts(str(path), path.stem, list(file.schema_arrow.names), parts, options, findings)
+
+
+def table_of(columns: Mapping[str, Any]) -> pd.DataFrame:
+    """Columns by name as a table, one value for all rows where a column is no list; raises RecordingError."""
+    lists = {str(k): list(v) for k, v in columns.items() if np.iterable(v) and not isinstance(v, str)}
+    if len({len(column) for column in lists.values()}) != 1:
+        told = ", ".join(f"{name} has {len(column)}" for name, column in lists.items()) or "there are none"
+        raise RecordingError(f"columns of a table must be lists of equal length: {told}")
+    return pd.DataFrame({str(name): lists.get(str(name), value) for name, value in columns.items()})
 
 
 def read_frame(table: pd.DataFrame, options: Options, findings: Findings) -> list[Track]:
