@@ -185,9 +185,21 @@ def test_branches_of_other_worlds_have_independent_noise():
 
 
 def test_moments_of_other_flights_are_refused(scenario):
-    moment = airflock.open(scenario, 4).snapshot()
+    flight = airflock.open(scenario, 4).advance(1.0)
+    moment = flight.snapshot()
+    alike = airflock.open(scenario, 4).restore(moment)  # by the same scenario, seed, precision and start
+    assert np.array_equal(alike.advance(1.0).state, flight.advance(1.0).state)
+    start = np.arange(4.0 * scenario.agents).reshape(4, -1)
+    others = (
+        airflock.open(scenario, 5),
+        airflock.open(scenario, 4, precision=64),
+        airflock.open(scenario, 4, start=start),
+    )
+    for other in others:
+        with pytest.raises(FlightError, match="not of this flight"):
+            other.restore(moment)
     with pytest.raises(FlightError, match="not of this flight"):
-        airflock.open(scenario, 4).restore(moment)
+        airflock.open(load("vasarhelyi_2018/4ms", {"model.p_rep": 0.3}), 4).restore(moment)
     for other in (None, 3, "moment", (1, 2)):
         with pytest.raises(FlightError, match="is not what snapshot\\(\\) of a flight returns"):
             airflock.open(scenario, 3).restore(other)

@@ -68,6 +68,10 @@ class Fault:
         """Names of its numbers, in declared order."""
         return number_names(self.Parameters)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: not the record, which is made where it is asked for."""
+        return {name: value for name, value in vars(self).items() if name != "record"}
+
     @cached_property
     def record(self) -> type:
         """NamedTuple of its numbers, which its rules are handed as `f`."""

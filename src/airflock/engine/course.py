@@ -1,8 +1,8 @@
 """Course: where a flight stands, what it has behind it, and the driver that flies it on; `Flight` is its face."""
 
+import pickle
 from collections.abc import Sequence
 from concurrent.futures import Future
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -220,9 +220,9 @@ class Course:
             raise FlightError(f"snapshot = {moment!r} is not what snapshot() of a flight returns")
         if moment.version != __version__:
             raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
-        if moment.origin is not self.origin:
-            theirs, seed = moment.origin[0].name, moment.origin[1]
-            raise FlightError(f"snapshot: of {theirs}, seed {seed}, in a flight of its own; not of this flight")
+        if not _same(moment.origin, self.origin):
+            theirs, seed, precision, _ = moment.origin
+            raise FlightError(f"snapshot: of {theirs.name}, seed {seed}, precision {precision}; not of this flight")
         self._coming = None
         if self.state is not moment.state:
             self.state = moment.state.twin()
@@ -235,11 +235,23 @@ class Course:
 
     def twin(self) -> "Course":
         """Another course that goes on from here."""
-        twin = copy(self)
+        twin = object.__new__(Course)
+        vars(twin).update(vars(self))
         twin.state, twin._coming = self.state.twin(), None
         twin.events, twin.windows = list(self.events), list(self.windows)
         twin._frames, twin._sampled = list(self._frames), list(self._sampled)
         return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises FlightError where no other process could import the law."""
+        try:
+            pickle.dumps(self.origin[0])
+        except (pickle.PicklingError, AttributeError, TypeError) as fault:
+            raise FlightError(
+                f"{self.scenario.name}: its own code cannot be sent to another process; open it there by its file, "
+                "with the seed and the events of this flight, which then has the same bits"
+            ) from fault
+        return vars(self) | {"_coming": None}
 
     def to_world(self, world: Any) -> None:
         """Draw from another world's random numbers from now on. Raises FlightError."""
@@ -252,6 +264,14 @@ class Course:
             coming = [o for o in onsets(self.scenario, self.seed, world) if o.step >= self.step]
             self.state.expect((*before, *coming))
         self.note("branch", world=world)
+
+
+def _same(origin: tuple[Scenario, int, int, Any], other: tuple[Scenario, int, int, Any]) -> bool:
+    """Whether two flights began alike: by the same scenario, seed and precision, at the same start."""
+    if origin is other:
+        return True
+    alike = origin[0].document == other[0].document and origin[1:3] == other[1:3]
+    return alike and origin[0].model == other[0].model and np.array_equal(origin[3], other[3])
 
 
 def _faults_at_the_end(events: Sequence[Event]) -> int:

@@ -24,6 +24,11 @@ def driver_of(plan: Plan, device: str = "cpu") -> ModuleType:
     return interpreted.flight_driver(plan) if device == "python" else flight_driver(plan)
 
 
+def device_of(driver: ModuleType) -> str:
+    """What a driver flies on: cpu, or python, uncompiled."""
+    return "cpu" if hasattr(driver.advance, "overloads") else "python"
+
+
 def is_loaded(driver: ModuleType) -> bool:
     """Whether a driver flies at once: it has been compiled or read in this process, or is interpreted."""
     return bool(getattr(driver.advance, "overloads", True))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.beginnings import first_memories
-from airflock.engine.drivers import driver_of, flying
+from airflock.engine.drivers import device_of, driver_of, flying
 from airflock.engine.layout import aligned_zeros, layout_of
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
@@ -229,6 +229,10 @@ class State:
         made.buffer[:] = self.buffer
         return made
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled without its driver, which another process makes, or has, of the same plan."""
+        return _again, (self.plan, self.tables, device_of(self.driver), self.start, self.buffer)
+
     def expect(self, due: tuple[Onset, ...]) -> None:
         """Have these faults to come, instead of those before."""
         self.tables = replace(self.tables, due=due)
@@ -296,3 +300,10 @@ class State:
             there, of = self.arrays["there"].tolist()
             found["present"] = there / of if of else 1.0
         return found
+
+
+def _again(plan: Plan, tables: Tables, device: str, start: NDArray[Any], buffer: NDArray[np.uint8]) -> State:
+    """A state out of a pickle."""
+    made = State(plan, tables, driver_of(plan, device), start)
+    made.buffer[:] = buffer
+    return made

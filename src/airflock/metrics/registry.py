@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass, make_dataclass
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -52,7 +53,11 @@ def _named(*names: str) -> tuple[Metric, ...]:
 
 def _counted(found: tuple[Metric, ...]) -> Any:
     """Metrics of a set whose collisions the key metrics.count counts: each agent, or as the authors' program does."""
-    return lambda q: tuple(METRICS["marks"] if q.count == "program" and m.name == "quality" else m for m in found)
+    return partial(_by_count, found)
+
+
+def _by_count(found: tuple[Metric, ...], q: Any) -> tuple[Metric, ...]:
+    return tuple(METRICS["marks"] if q.count == "program" and m.name == "quality" else m for m in found)
 
 
 QUALITY = _named("quality", "polarisation")
