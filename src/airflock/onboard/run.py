@@ -94,6 +94,12 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
                       "be able to take over each drone at any time")  # fmt: skip
     if card is not None and find_spec("cryptography") is None:
         sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
+    for text in given.radio:
+        if text.startswith("udp:") and ">" not in text:
+            sys.stderr.write(
+                f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
+                f"first, write {text}>HOST:PORT\n"
+            )
     ports: list[Port] = []
     for text in (given.autopilot, *given.radio):
         try:
