@@ -94,12 +94,6 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
                       "be able to take over each drone at any time")  # fmt: skip
     if card is not None and find_spec("cryptography") is None:
         sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
-    for text in given.radio:
-        if text.startswith("udp:") and ">" not in text:
-            sys.stderr.write(
-                f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
-                f"first, write {text}>HOST:PORT\n"
-            )
     ports: list[Port] = []
     for text in (given.autopilot, *given.radio):
         try:
@@ -110,6 +104,12 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
         for port in ports:
             port.close()
         raise CardError(faults)
+    for text in given.radio:
+        if text.startswith("udp:") and ">" not in text:
+            sys.stderr.write(
+                f"airflock: note: --radio {text} sends to nobody before it has heard somebody; where no router speaks "
+                f"first, write {text}>HOST:PORT\n"
+            )
     return card, key, ports
 
 
