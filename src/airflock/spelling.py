@@ -31,5 +31,5 @@ def raised(fault: BaseException) -> str:
     """
     line = " ".join(f"{type(fault).__name__}: {fault}".removesuffix(": ").split())
     if isinstance(fault, AttributeError) and fault.name is not None:
-        line += meant(fault.name, (name for name in dir(fault.obj) if name[0] != "_"), lead="; ")
+        line += meant(fault.name, (name for name in dir(fault.obj) if not name.startswith("_")), lead="; ")
     return line

@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from concurrent.futures import Future
 
 import pytest
 
@@ -33,7 +34,7 @@ def test_a_pickled_flight_goes_on_as_the_flight_itself(name):
     assert bits(other.advance(steps=4)) == there
     assert bits(other.restore(moment).advance(steps=4)) == there
     assert bits(flight.restore(pickle.loads(pickle.dumps(moment))).advance(steps=4)) == there
-    with pytest.raises(FlightError, match="seed 1, precision 32; not of this flight"):
+    with pytest.raises(FlightError, match="seed 1, precision = 32, device = python, record = True; not of this flight"):
         airflock.open(load(name, {"agents": 4} | FLOWN[name]), 2, device="python").restore(moment)
 
 
@@ -58,5 +59,22 @@ def test_a_law_of_ones_own_is_refused_in_a_line_with_what_to_do():
 
     law = {"Parameters": Parameters, "COMMAND": "velocity", "decide": decide, "__name__": "mine"}
     flight = airflock.open(load("viragh_2014/4ms", {"agents": 3}, law=law), 1, device="python")
-    with pytest.raises(FlightError, match="its own code cannot be sent to another process; open it there by its file"):
+    for what in (flight, flight.snapshot()):
+        with pytest.raises(FlightError, match="its own code cannot be sent to another process; open it there by its"):
+            pickle.dumps(what)
+
+
+def test_a_flight_whose_change_waits_for_its_compiler_is_not_pickled_without_it(monkeypatch):
+    flight = opened("vasarhelyi_2018/4ms", {})
+    monkeypatch.setattr("airflock.engine.course.in_background", lambda _: Future())
+    flight.fault("motor", [2], wait=False, share=0.1)
+    with pytest.raises(FlightError, match="^a change waits for its compiler"):
         pickle.dumps(flight)
+
+
+@pytest.mark.parametrize("other", [{"device": "cpu", "record": True}, {"device": "python", "record": False}])
+def test_moments_stay_on_their_device_and_with_what_is_recorded(other):
+    moment = opened("vasarhelyi_2018/4ms", {}).snapshot()
+    flight = airflock.open(load("vasarhelyi_2018/4ms", {"agents": 4}), 1, **other)
+    with pytest.raises(FlightError, match="device = python, record = True; not of this flight"):
+        flight.restore(moment)

@@ -1,6 +1,5 @@
 """Course: where a flight stands, what it has behind it, and the driver that flies it on; `Flight` is its face."""
 
-import pickle
 from collections.abc import Sequence
 from concurrent.futures import Future
 from typing import Any
@@ -12,8 +11,8 @@ from airflock import __version__
 from airflock.engine import cpu, failure
 from airflock.engine.background_compile import compile_aside
 from airflock.engine.carry import carry
-from airflock.engine.drivers import flying, is_compiled
-from airflock.engine.moments import Snapshot, Window
+from airflock.engine.drivers import device_of, flying, is_compiled
+from airflock.engine.moments import Snapshot, Window, sendable
 from airflock.engine.simulate import opened, to_fly
 from airflock.engine.state import State
 from airflock.errors import FlightError
@@ -220,9 +219,13 @@ class Course:
             raise FlightError(f"snapshot = {moment!r} is not what snapshot() of a flight returns")
         if moment.version != __version__:
             raise FlightError(f"snapshot: made by version {moment.version}, this is {__version__}")
-        if not _same(moment.origin, self.origin):
+        device, record = device_of(moment.state.driver), moment.state.plan.record
+        if not _same(moment.origin, self.origin) or (device, record) != (self.device, self.record):
             theirs, seed, precision, _ = moment.origin
-            raise FlightError(f"snapshot: of {theirs.name}, seed {seed}, precision {precision}; not of this flight")
+            raise FlightError(
+                f"snapshot: of {theirs.name}, seed {seed}, precision = {precision}, device = {device}, "
+                f"record = {record}; not of this flight"
+            )
         self._coming = None
         if self.state is not moment.state:
             self.state = moment.state.twin()
@@ -243,15 +246,11 @@ class Course:
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises FlightError where no other process could import the law."""
-        try:
-            pickle.dumps(self.origin[0])
-        except (pickle.PicklingError, AttributeError, TypeError) as fault:
-            raise FlightError(
-                f"{self.scenario.name}: its own code cannot be sent to another process; open it there by its file, "
-                "with the seed and the events of this flight, which then has the same bits"
-            ) from fault
-        return vars(self) | {"_coming": None}
+        """What is pickled. Raises FlightError where a change is on its way, or another process has not the code."""
+        if self.waiting:
+            raise FlightError("a change waits for its compiler; let it come into force before the flight is pickled")
+        sendable(self.origin[0], self.scenario)
+        return vars(self)
 
     def to_world(self, world: Any) -> None:
         """Draw from another world's random numbers from now on. Raises FlightError."""
@@ -268,10 +267,7 @@ class Course:
 
 def _same(origin: tuple[Scenario, int, int, Any], other: tuple[Scenario, int, int, Any]) -> bool:
     """Whether two flights began alike: by the same scenario, seed and precision, at the same start."""
-    if origin is other:
-        return True
-    alike = origin[0].document == other[0].document and origin[1:3] == other[1:3]
-    return alike and origin[0].model == other[0].model and np.array_equal(origin[3], other[3])
+    return origin is other or (origin[:3] == other[:3] and np.array_equal(origin[3], other[3]))
 
 
 def _faults_at_the_end(events: Sequence[Event]) -> int:

@@ -1,5 +1,6 @@
 """Moments: a stretch of a flight with its scores, and a moment of one to go back to."""
 
+import pickle
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.engine.state import State
+from airflock.errors import FlightError
 from airflock.scenarios.events import Event
 from airflock.scenarios.onsets import Onset
 from airflock.scenarios.scenario import Scenario
@@ -42,3 +44,20 @@ class Snapshot:
     frames: tuple[NDArray[Any], ...]
     sampled: tuple[NDArray[Any], ...]
     due: tuple[Onset, ...]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises FlightError where another process could not import a law."""
+        sendable(self.origin[0], self.scenario)
+        return vars(self)
+
+
+def sendable(*scenarios: Scenario) -> None:
+    """Raise FlightError where a scenario has code of its own, which another process could not import."""
+    for scenario in scenarios:
+        try:
+            pickle.dumps(scenario)
+        except (pickle.PicklingError, AttributeError, TypeError) as fault:  # as pickle says it of functions and classes
+            raise FlightError(
+                f"{scenario.name}: its own code cannot be sent to another process; open it there by its file, "
+                "with the seed and the events of this flight, which then has the same bits"
+            ) from fault

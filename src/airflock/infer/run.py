@@ -126,15 +126,19 @@ class _Comparison:
 
     def of(self, candidates: Sequence[Candidate]) -> tuple[list[Law], dict[str, Model]]:
         """Laws from best to worst, and the model of each by its name."""
-        gains = self.straight.place[self.reference.named :]
         self.laws = {each.name: each for each in candidates}
         laws, models = [], {}
         for each in candidates:
             say = _teller(self.say, each.name)
-            models[each.name], fit = select.fit(each, self.followed, self.scale, gains, self.seed, say)
+            models[each.name], fit = self.fitted(each, self.seed, say)
             laws.append(self.judged(each.name, models[each.name], fit, say))
         laws.sort(key=lambda law: -law.gain)
         return laws, models
+
+    def fitted(self, law: Candidate, seed: int, say: Callable[[], None]) -> tuple[Model, Fit]:
+        """A law at its likeliest, raced from places drawn by a seed."""
+        gains = self.straight.place[self.reference.named :]
+        return select.fit(law, self.followed, self.scale, gains, seed, say)
 
     def contest(self, laws: list[Law], models: dict[str, Model]) -> None:
         """Search deeper for the best law, and for each that cannot be told from it; laws are sorted anew.
@@ -151,10 +155,7 @@ class _Comparison:
     def deeper(self, law: Law, model: Model) -> tuple[Model, Law]:
         """A law after more searching, and without numbers that the others make up for; judged anew."""
         own, say = self.laws[law.name], _teller(self.say, f"{law.name}, simplified")
-        gains = self.straight.place[self.reference.named :]
-        tried = [(model, law.fit)]
-        for more in range(1, RACES):
-            tried.append(select.fit(own, self.followed, self.scale, gains, self.seed + more, say))
+        tried = [(model, law.fit), *(self.fitted(own, self.seed + more, say) for more in range(1, RACES))]
         model, fit = select.simpler(own, *min(tried, key=lambda each: each[1].loss), say)
         return model, self.judged(law.name, model, fit, say)
 

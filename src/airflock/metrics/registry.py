@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass, make_dataclass
-from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -51,17 +50,23 @@ def _named(*names: str) -> tuple[Metric, ...]:
     return tuple(METRICS[name] for name in names)
 
 
-def _counted(found: tuple[Metric, ...]) -> Any:
+def _counted(found: tuple[Metric, ...], q: Any) -> tuple[Metric, ...]:
     """Metrics of a set whose collisions the key metrics.count counts: each agent, or as the authors' program does."""
-    return partial(_by_count, found)
-
-
-def _by_count(found: tuple[Metric, ...], q: Any) -> tuple[Metric, ...]:
     return tuple(METRICS["marks"] if q.count == "program" and m.name == "quality" else m for m in found)
 
 
 QUALITY = _named("quality", "polarisation")
 GROUPS = (*QUALITY, *_named("groups", "shape"))
+
+
+def _quality(q: Any) -> tuple[Metric, ...]:
+    return _counted(QUALITY, q)
+
+
+def _groups(q: Any) -> tuple[Metric, ...]:
+    return _counted(GROUPS, q)
+
+
 SETS: dict[str, MetricSet] = {
     found.name: found
     for found in (
@@ -74,9 +79,9 @@ SETS: dict[str, MetricSet] = {
             best="fitness",
         ),
         MetricSet(
-            "zapotecatl", QUALITY, parameters.Parameters, _counted(QUALITY), best="quality", faults=quality.faults
+            "zapotecatl", QUALITY, parameters.Parameters, _quality, best="quality", faults=quality.faults
         ),
-        MetricSet("groups", GROUPS, parameters.Parameters, _counted(GROUPS), best="quality", faults=quality.faults),
+        MetricSet("groups", GROUPS, parameters.Parameters, _groups, best="quality", faults=quality.faults),
         MetricSet(
             "contacts",
             _named("speed", "polarisation", "nearest", "collisions", "contacts", "excursion"),
