@@ -95,3 +95,24 @@ def test_a_unit_of_something_else_is_refused_once(settings, fault):
     with pytest.raises(ScenarioError) as caught:
         load(NAME, settings)
     assert len(caught.value.faults) == 1 and fault in caught.value.faults[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "remedy"),
+    [
+        ("model.c_frict", "is text; give NUMBER without quotes"),  # 0.1 was read as 0. in the unit 1: as nothing
+        ("radio.range", "has no unit; give NUMBER without quotes, or 'NUMBER m' (or mm, cm, km,"),
+        ("faults.share", "is text; give NUMBER without quotes"),
+    ],
+)
+@given(number=st.decimals(0, 1000, places=2).map(str) | st.integers(0, 1000).map(str))
+def test_a_number_in_quotes_without_a_unit_is_refused_whatever_its_digits(key, remedy, number):
+    entry = {"faults": [{"kind": "motor", "at": 1.0, "share": number}]} if key == "faults.share" else {key: number}
+    with pytest.raises(ScenarioError) as caught:
+        load(NAME, entry)
+    assert f"= '{number}' {remedy.replace('NUMBER', number)}" in str(caught.value)
+
+
+@pytest.mark.parametrize(("text", "rate"), [("1 1/min", 1 / 60), ("0.5 1/s", 0.5), ("6e1 1/min", 1.0), ("0.5Hz", 0.5)])
+def test_a_unit_may_begin_with_a_digit_after_a_blank(text, rate):
+    assert load(NAME, {"model.p_rep": text}).parameters.p_rep == pytest.approx(rate)

@@ -44,7 +44,8 @@ SPELLINGS = {
     "feet": "ft", "foot": "ft", "kph": "km/h", "kmh": "km/h", "knots": "kn", "kt": "kn", "kts": "kn", "°": "deg",
     "degrees": "deg", "hz": "Hz", "minutes": "min", "hours": "h", "mps": "m/s", "percent": "%", "μs": "us", "µs": "us",
 }  # fmt: skip
-NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+# a digit can go on only after a blank (1 1/s), so that no unit takes digits from its number
+NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s+(?=\S)|(?![\d.]))(.*?)\s*")
 
 
 def factor(unit: str, declared: str) -> float | None:
@@ -89,11 +90,13 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return given, "", ""
     long = isinstance(given, Mapping) and "value" in given
     value, unit = (given["value"], given.get("unit", "")) if long else (given, "")
-    written = f"{value} {unit}" if long else given
+    written = f"{value} {unit}".strip() if long else given
     if isinstance(value, str) and not unit:
         match = NUMBER.fullmatch(value)
         if match is None:
             return given, "", ""  # no number at all: told with the allowed range by the check of the section
+        if not match[2]:
+            return None, "", f"{name} = {value!r} {_unitless(match[1], declared)}"
         value, unit = float(match[1]), match[2]
     if not isinstance(unit, str) or unit in ("", declared.unit):
         if not long and unit == declared.unit and unit:
@@ -101,7 +104,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return given, "", ""
     times = factor(unit, declared.unit)
     if times is None:
-        others = ", ".join(UNITS.get(declared.unit, ()))
+        others = _others(declared.unit)
         if declared.unit in ("", "1"):
             return None, "", f"{name} = {written}: has no unit{f'; give a number, or {others}' if others else ''}"
         return None, "", f"{name} = {written}: the unit is {declared.unit}{f', or one of {others}' if others else ''}"
@@ -112,6 +115,19 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
     if isinstance(scaled, list):
         note = f"{name} is converted from {unit} to {declared.unit}"
     return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""
+
+
+def _others(declared: str) -> str:
+    """Units that may be written where one is declared."""
+    return ", ".join(UNITS.get(declared, ()))
+
+
+def _unitless(number: str, declared: Quantity | Points) -> str:
+    """What is wrong with a number in quotes, and what to write instead."""
+    if declared.unit in ("", "1"):
+        return f"is text; give {number} without quotes"
+    others = f" (or {_others(declared.unit)})" if _others(declared.unit) else ""
+    return f"has no unit; give {number} without quotes, or '{number} {declared.unit}'{others}"
 
 
 def _times(value: Any, times: float) -> Any:
