@@ -376,3 +376,32 @@ def test_a_flight_says_which_it_is_and_how_far(scenario):
         repr(flight)
         == f"<Flight {scenario.name}, seed 7: 0.5 of {scenario.flight.duration:g} s, {scenario.agents} agents>"
     )
+
+
+# ------------------------------------------------------------------------------------------- rules of the start
+
+
+@pytest.mark.parametrize(
+    ("base", "keys", "settings"),
+    [
+        ("vasarhelyi_2018/4ms", {"world.side": 60.0}, {"model.v_flock": 100.0}),  # twice that is start.separation
+        ("vasarhelyi_2018/4ms", {"start.separation": 5.0}, {"world.side": 10.0}),
+        ("vasarhelyi_2018/4ms", {"start.kind": "ball", "start.radius": 20.0}, {"world.side": 30.0}),
+        (
+            "vasarhelyi_2018/fixed_wing",
+            {"start.speed": 10.0},
+            {"wing.weight": 80.0},
+        ),  # it stalls at more than start.speed
+    ],
+    ids=lambda given: str(given),
+)
+def test_a_flight_in_the_air_is_not_judged_by_rules_of_its_start(base, keys, settings):
+    """A file with the same keys is refused; a flight that has begun takes them, and flies again to the same bits."""
+    small = load(base, {"agents": 6, "duration": 2.0, **keys})
+    with pytest.raises(ScenarioError, match=r"start\.\w+ = "):
+        load(base, {"agents": 6, "duration": 2.0, **keys, **settings})
+    flight = airflock.open(small, 6, device="python", record=True).advance(0.5).change(settings)
+    flight.restore(flight.snapshot()).advance(0.5).change({"duration": 1.5}).finish()
+    again = airflock.simulate(small, 6, device="python", events=flight.events)
+    theirs = airflock.recording_of(flight)
+    assert np.array_equal(again.position, theirs.position) and len(flight.events) == 2

@@ -15,11 +15,12 @@ from airflock.scenarios.scenario import Scenario
 LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at the top that a flight cannot change
 
 
-def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+def remade(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = False) -> Scenario:
     """The scenario with keys set anew, checked as a whole as if it came from a file.
 
     Its law, body, sensor, radio, topology and order parameters stay those that it has where they are no names of ours,
-    unless their kind is set anew. Raises ScenarioError with one line per fault.
+    unless their kind is set anew. Nothing is asked about the start of a flight that has `started`.
+    Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}
     if scenario.scene.kind == "mesh":  # which was looked for beside the scenario file
@@ -38,7 +39,7 @@ def remade(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         document["faults"] = named(scenario)
     law = None if shipped else scenario.model
     given = Given(law=law, kinds=kinds, laws=own_laws(scenario), **own)
-    return make(document, scenario.name, settings, given=given)
+    return make(document, scenario.name, settings, given=given, started=started)
 
 
 def own_laws(scenario: Scenario) -> dict[str, Model]:
@@ -60,7 +61,9 @@ def begun(scenario: Scenario, count: int, at: float) -> Scenario:
     last = entries[len(entries) - count :]
     if all(entry["at"] == at for entry in last):
         return scenario
-    return remade(scenario, {"faults": [*entries[: len(entries) - count], *({**entry, "at": at} for entry in last)]})
+    return remade(
+        scenario, {"faults": [*entries[: len(entries) - count], *({**entry, "at": at} for entry in last)]}, started=True
+    )
 
 
 def variant(
@@ -82,7 +85,7 @@ def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     A flight can take everything that a scenario file says but the number of agents, the dimensions, the motion step and
     the start. Raises ScenarioError with one line per fault.
     """
-    new = remade(scenario, settings)
+    new = remade(scenario, settings, started=True)
     faults = [
         f"{key} = {getattr(new.flight, key):g}: {what} cannot change in flight; open another flight"
         for key, what in LASTING.items()

@@ -1,5 +1,6 @@
 """Checks of a scenario that take more than one key: the body's kind, the order of updates, the metrics."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,8 +12,8 @@ from airflock.core.vocabulary import CLOCKS, asks
 from airflock.scenarios.geometry import largest_extension
 
 
-def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) -> list[str]:
-    """What of a scenario its body cannot fly: too long a step, too slow a law."""
+def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None, started: bool = False) -> list[str]:
+    """What of a scenario its body cannot fly: too long a step, too slow a law or (unless it has started) a start."""
     b, p, flight = parts["body"], parts.get("parameters"), parts["flight"]
     if b is None or flight is None or found is None or p is None:
         return []
@@ -20,7 +21,7 @@ def body_faults(carried: Body, parts: Mapping[str, Any], found: Model | None) ->
     begin, wing = parts["start"], parts["wing"]
     if begin is None or wing is None:
         return []
-    return carried.lacks(b=b, dt=flight.dt, speed=speed, start=begin.speed, wing=wing)
+    return carried.lacks(b=b, dt=flight.dt, speed=speed, start=math.inf if started else begin.speed, wing=wing)
 
 
 def sensor_faults(found: Sensor, parts: Mapping[str, Any]) -> list[str]:

@@ -97,6 +97,16 @@ def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: i
     return []
 
 
+def _edge_faults(world: arena.Parameters) -> list[str]:
+    """Edges that the arena cannot have."""
+    found = []
+    if world.edges != "open" and world.arena != "square":
+        found.append(f"world.edges = {world.edges!r} needs world.arena = 'square'")
+    if world.edges == "periodic" and world.obstacles:
+        found.append("world.edges = 'periodic' takes no obstacles")
+    return found
+
+
 def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) -> list[str]:
     """Why a start region does not fit into the arena."""
     found = []
@@ -114,10 +124,6 @@ def start_faults(world: arena.Parameters, begin: start.Parameters, agents: int) 
                 f"start.{name} = {getattr(begin, name):g} m: the arena is smaller than the {begin.kind} in which "
                 f"agents start; enlarge world.side or world.height, or lower start.{name}"
             )
-    if world.edges != "open" and world.arena != "square":
-        found.append(f"world.edges = {world.edges!r} needs world.arena = 'square'")
-    if world.edges == "periodic" and world.obstacles:
-        found.append("world.edges = 'periodic' takes no obstacles")
     return found
 
 
@@ -160,8 +166,10 @@ def height_faults(world: arena.Parameters) -> list[str]:
     return found
 
 
-def faults(world: arena.Parameters, agents: int, separation: float, begin: start.Parameters) -> list[str]:
-    """Everything that is wrong with a world, one line each."""
+def faults(
+    world: arena.Parameters, agents: int, separation: float, begin: start.Parameters, *, started: bool = False
+) -> list[str]:
+    """Everything that is wrong with a world, and with starting in it unless the flight has started; one line each."""
     found = height_faults(world)
     if world.arena == "polygon":
         fault = polygon_fault(world.corners)
@@ -171,7 +179,8 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
         found.append("world.walls = 'nearest_per_axis' needs world.arena = 'square'")
     plan = None if found else ground_plan(world)
     region, height = (None, 1.0) if found else _region(world, begin)
-    found += [] if found else start_faults(world, begin, agents)
+    if not found:
+        found += _edge_faults(world) if started else start_faults(world, begin, agents) + _edge_faults(world)
     solid: list[Polygon] = []
     for number, corners in enumerate(world.obstacles):
         fault = polygon_fault(corners)
@@ -182,6 +191,8 @@ def faults(world: arena.Parameters, agents: int, separation: float, begin: start
         if plan is not None and not plan.covers(shape):
             found.append(f"world.obstacles[{number}] reaches outside the arena")
         solid.append(shape.buffer(begin.wall_clearance))
+    if started:
+        return found
     free = math.inf if region is None else region.difference(union_all(solid)).area
     if world.dimensions == "3":
         need = agents * math.pi / 6.0 * separation**3 / max(free * height, 1e-9)

@@ -42,12 +42,14 @@ def make(
     notes: tuple[str, ...] = (),
     known_faults: tuple[str, ...] = (),
     trust: bool = False,
+    started: bool = False,
 ) -> Scenario:
     """Scenario from a nested dict.
 
     where : names it in faults; notes : what is known of it already; known_faults : what is wrong already
     given : rules that fly in place of those that the document names
     trust : whether code that the document names may run
+    started : whether the flight is in the air, so that nothing is asked about its start
     """
     settings = keyed(settings, where)
     document, settings, faults = group_keys.with_groups(formats.current(document, where), settings)
@@ -60,7 +62,7 @@ def make(
     whole, told, more = _written_out(whole, settings, short, records)
     faults += more
     parts, more = _parts(whole, flown)
-    faults += more + _faults_between(parts, flown)
+    faults += more + _faults_between(parts, flown, started)
     individuals, told_of, more = _individuals(whole, parts, flown, given, folder, trust)
     faults += more
     if faults or flown.law is None:
@@ -71,7 +73,7 @@ def make(
         measures=flown.measures, own_topology=flown.own_topology, published=_published(whole.get("published", {})),
         document=whole, **parts, **individuals,
     )  # fmt: skip
-    if faults := _derived_faults(scenario) or places.place_faults(scenario):
+    if faults := _derived_faults(scenario) or places.place_faults(scenario, started):
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     notes = (*notes, *left_out, *told, *told_of, *_notes(scenario), *advice(scenario), *places.place_notes(scenario))
     return replace(scenario, notes=notes)
@@ -156,7 +158,7 @@ def _parts(document: Mapping[str, Any], flown: Gathered) -> tuple[dict[str, Any]
     return parts, faults
 
 
-def _faults_between(parts: Mapping[str, Any], flown: Gathered) -> list[str]:
+def _faults_between(parts: Mapping[str, Any], flown: Gathered, started: bool) -> list[str]:
     """Faults of sections that are sound alone but do not fit each other."""
     faults: list[str] = []
     flight, law, world = parts["flight"], flown.law, parts["world"]
@@ -172,14 +174,14 @@ def _faults_between(parts: Mapping[str, Any], flown: Gathered) -> list[str]:
         if separation is None and law is not None and parts.get("parameters") is not None:
             separation = start_separation(law, parts["parameters"], begin, world)
         count = int(flight.agents) if flight is not None else 1
-        faults += geometry.faults(world, count, separation or 0.0, begin)
+        faults += geometry.faults(world, count, separation or 0.0, begin, started=started)
     if flight is not None and parts["sensors"] is not None and parts["metrics"] is not None:
         faults += timing.faults(flight, parts["sensors"].period, parts["metrics"])
         faults += checks.order_faults(flight, flown.sensor, parts["sensors"], flown.transceiver, parts["radio"])
         faults += checks.silence_faults(parts["silence"].rule, flight, law) if parts["silence"] is not None else []
         faults += checks.metric_faults(flown.measures, parts["metrics"], world)
-        faults += wings.faults(parts, law, flown.measures)
-    return faults + checks.body_faults(flown.vehicle, parts, law) + checks.sensor_faults(flown.sensor, parts)
+        faults += wings.faults(parts, law, flown.measures, started)
+    return faults + checks.body_faults(flown.vehicle, parts, law, started) + checks.sensor_faults(flown.sensor, parts)
 
 
 def _published(table: Any) -> dict[str, tuple[float, float | None]]:

@@ -18,8 +18,8 @@ DRAWN = 64  # positions at which a start region is looked at
 MOST = 2000  # the same where none is free
 
 
-def place_faults(scenario: Scenario) -> list[str]:
-    """What is wrong with a scene, with goals and with the region of starts, one line each."""
+def place_faults(scenario: Scenario, started: bool = False) -> list[str]:
+    """What is wrong with a scene, with goals and, unless it has started, with the region of starts; one line each."""
     given = scenario.goals
     if given.kind == "own" and len(given.points) != scenario.agents:
         return [
@@ -47,7 +47,7 @@ def place_faults(scenario: Scenario) -> list[str]:
             found.append(
                 f"goals.points[{number}] = [{where}] m lies {depth:.3g} m inside what stands in the scene; move it out"
             )
-    if _blocked(scenario) == 1.0:
+    if not started and _blocked(scenario) == 1.0:
         found.append(
             "start: the whole region in which agents start lies inside what stands in the scene, or nearer to it than "
             f"start.clearance = {scenario.start.clearance:g} m; enlarge the region or lower scene.density"

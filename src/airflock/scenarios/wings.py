@@ -38,8 +38,8 @@ def flies_on_wings(found: Model | None, metrics: tuple[Metric, ...]) -> bool:
     )
 
 
-def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -> list[str]:
-    """Everything that is wrong with the wings of a scenario, one line each."""
+def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet, started: bool = False) -> list[str]:
+    """Everything that is wrong with the wings of a scenario, one line each; not of its start once it has started."""
     q, wing = parts["metrics"], parts["wing"]
     if q is None or wing is None:
         return []
@@ -49,7 +49,7 @@ def faults(parts: Mapping[str, Any], found: Model | None, measures: MetricSet) -
     if not flies_on_wings(found, metrics):
         return lines
     lines += _stalled(wing) if wing.stall == "refused" else []
-    lines += _overlapping(parts)
+    lines += [] if started else _overlapping(parts)
     place = "aero" if found is not None and found.flock is descent.flock else "model"
     gradient = getattr(parts["aero"] if place == "aero" else parts.get("parameters"), "gradient", "none")
     if gradient in ("analytic", "frozen") and wing.positions == "grid":
