@@ -389,7 +389,7 @@ def test_a_flight_says_which_it_is_and_how_far(scenario):
         ("vasarhelyi_2018/4ms", {"start.kind": "ball", "start.radius": 20.0}, {"world.side": 30.0}),
         (
             "vasarhelyi_2018/fixed_wing",
-            {"start.speed": 10.0},
+            {"body.kind": "fixed_wing", "start.speed": 10.0},
             {"wing.weight": 80.0},
         ),  # it stalls at more than start.speed
     ],
