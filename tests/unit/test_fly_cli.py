@@ -115,6 +115,20 @@ def test_nobody_is_sent_to_a_point_that_every_drone_would_refuse(airflock, point
     assert said in lines[0]
 
 
+@pytest.mark.parametrize(
+    ("autopilot", "guard", "silent"), [("px4", "COM_OF_LOSS_T", 1.0), ("ardupilot", "GUID_TIMEOUT", 3.0)]
+)
+@pytest.mark.parametrize("preset", ["vasarhelyi_2018/32ms", REAL])
+def test_how_far_a_drone_flies_on_without_setpoints_is_told_for_its_own_limits(
+    airflock, preset, autopilot, guard, silent
+):
+    """It keeps its speed until the time-out, and e-folds in `response` from then on: v (T + response) in all."""
+    _, _, lines = airflock("fly", "prepare", preset, *HERE[:4], "--autopilot", autopilot, "--limit", "response=0.5")
+    (line,) = [line for line in lines if guard in line]
+    fast = 1.5 * float(preset.rpartition("/")[2].strip("real_ms"))
+    assert line.endswith(f": {fast * (silent + 0.5):.3g} m at the limit of {fast:g} m/s with {silent:g} s")
+
+
 def test_a_point_within_the_fence_is_sent_and_a_kill_tells_its_second_step(airflock):
     airflock("fly", "prepare", REAL, *HERE)
     radio = ["--radio", "udp:127.0.0.1:39433>127.0.0.1:39434"]

@@ -146,7 +146,8 @@ def prepare(
         tables.say(f"{name} radio: {share:.0%} of its time, by an estimate from its bit rate")
     for guard in made.autopilot.guards:
         safe = "to the own system id" if guard.own else f"within [{guard.low:g}, {guard.high:g}]"
-        tables.say(f"set {guard.name} {safe}: {guard.why}")
+        why = guard.reason(made.safety.speed_max, made.safety.response)
+        tables.say(f"set {guard.name} {safe}: {why}")
 
 
 def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[tuple[str, str, float]]:

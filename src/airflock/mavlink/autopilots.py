@@ -29,7 +29,8 @@ STREAMS = {33: 20.0, 32: 20.0, 24: 5.0, 245: 2.0, 2: 1.0, 1: 2.0}  # message →
 class Guard(NamedTuple):
     """A parameter of the autopilot that must lie between two values before anything arms, and why.
 
-    own : it must be the autopilot's own system id instead
+    own    : it must be the autopilot's own system id instead
+    silent : such a time-out, s, of which is told how far the drone flies on
     """
 
     name: str
@@ -37,10 +38,18 @@ class Guard(NamedTuple):
     high: float
     why: str
     own: bool = False
+    silent: float = 0.0
 
     def range(self, member: int) -> tuple[float, float]:
         """Least and largest value that is safe for a member of a flock."""
         return (float(member), float(member)) if self.own else (self.low, self.high)
+
+    def reason(self, speed: float, response: float) -> str:
+        """Why, for a drone of a largest speed (m/s) that gets slower with a relaxation time (s)."""
+        if not self.silent:
+            return self.why
+        way = speed * (self.silent + response)
+        return f"{self.why}: {way:.3g} m at the limit of {speed:g} m/s with {self.silent:g} s"
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,7 @@ AUTOPILOTS = {
     "px4": Autopilot(
         "px4", number=12, ours=px4_mode(6), land=px4_mode(4, 6), hold=px4_mode(4, 3), climbs=True, bytewise=True,
         guards=(
-            Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts: 8 m at 4 m/s with 1 s"),
+            Guard("COM_OF_LOSS_T", 0.0, 1.0, "s after the last setpoint until it acts", silent=1.0),
             Guard("COM_OBL_RC_ACT", 4.0, 4.0, "on lost setpoints: 4 land; whoever holds is hit by those who forget it"),
             Guard("GF_ACTION", 2.0, 5.0, "its own fence acts: 2 hold, 3 return, 5 land"),
         ),
@@ -93,7 +102,7 @@ AUTOPILOTS = {
     "ardupilot": Autopilot(
         "ardupilot", number=3, ours=4, land=9, hold=17, climbs=False, bytewise=False,
         guards=(
-            Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes: 16 m at 4 m/s with 3 s"),
+            Guard("GUID_TIMEOUT", 0.1, 1.0, "s after the last setpoint until it brakes", silent=3.0),
             Guard("FENCE_ENABLE", 1.0, 1.0, "its own fence acts"),
             Guard("FS_GCS_ENABLE", 5.0, 5.0, "when heartbeats end: 5 land; whoever hovers is hit in the end"),
             Guard("FS_GCS_TIMEOUT", 2.0, 5.0, "s after the last heartbeat until it lands"),

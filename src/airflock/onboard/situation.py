@@ -54,7 +54,8 @@ def _parameter_misses(card: Card, member: int, wire: Wire) -> list[str]:
             continue
         low, high = guard.range(member)
         if not low <= value <= high:
-            found.append(f"{guard.name} = {value:g} lies outside [{low:g}, {high:g}]: {guard.why}")
+            why = guard.reason(card.safety.speed_max, card.safety.response)
+            found.append(f"{guard.name} = {value:g} lies outside [{low:g}, {high:g}]: {why}")
     return found
 
 
