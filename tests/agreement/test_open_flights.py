@@ -405,3 +405,82 @@ def test_a_flight_in_the_air_is_not_judged_by_rules_of_its_start(base, keys, set
     again = airflock.simulate(small, 6, device="python", events=flight.events)
     theirs = airflock.recording_of(flight)
     assert np.array_equal(again.position, theirs.position) and len(flight.events) == 2
+
+
+# ------------------------------------------------------------------------------------------- several agents at once
+
+
+def acted(flight, agents, many):
+    """A flight in which the same is done to agents, all at once or one after another."""
+    rows = [[0.5 * agent, -1.0] for agent in agents]
+    spots = [[8.0 * agent, 3.0] for agent in agents]
+    for act, values in (("push", rows), ("place", spots), ("command", rows)):
+        if many:
+            getattr(flight, act)(agents, np.array(values))
+        else:
+            for agent, value in zip(agents, values, strict=True):
+                getattr(flight, act)(agent, value)
+    return flight
+
+
+@pytest.mark.parametrize("precision", [32, 64])
+def test_what_is_done_to_several_agents_is_what_is_done_to_each(precision):
+    small = load("vasarhelyi_2018/4ms", {"agents": 6, "duration": 3.0})
+    start = airflock.open(small, 2, precision=precision, device="python").advance(0.2)
+    start.remove(5)  # agents lie in slots from here on
+    agents = [4, 0, 3]
+    once, each = (acted(start.branch(), agents, many).advance(1.0) for many in (True, False))
+    assert np.array_equal(once.state, each.state, equal_nan=True)
+    assert not np.array_equal(once.state, start.branch().advance(1.0).state, equal_nan=True)
+    assert [event.data["agent"] for event in once.events[1:]] == [agents] * 3
+    again = airflock.open(small, 2, precision=precision, device="python", events=[e.plain() for e in once.events])
+    assert np.array_equal(again.advance(1.2).state, once.state, equal_nan=True)
+    pushed = start.branch().push((1, 2), [3.0, -2.0])  # one velocity for both
+    assert np.allclose((pushed.state - start.state)[2:, :5], np.outer([3.0, -2.0], [0, 1, 1, 0, 0]))
+
+
+BOUNCING = {"agents": 3, "world.edges": "bounce", "world.side": 40.0, "start.separation": 1.0}
+CITY = {"agents": 3, "scene.kind": "boxes", "scene.boxes": [[-5, -5, 0, 5, 5, 50, 0]], "world.dimensions": "3"}
+
+
+@pytest.mark.parametrize(
+    ("keys", "act", "said"),
+    [
+        ({"agents": 3}, lambda f: f.place(0, [1e9, 0.0]), r"position = \[1000000000.0, 0.0\] m lies outside"),
+        ({"agents": 3}, lambda f: f.place([0, 1], [[0.0, 0.0], [0.0, -2e6]]), r"position = \[0.0, -2000000.0\] m lies"),
+        ({"agents": 3}, lambda f: f.place(0, [float("inf"), 0.0]), "each finite"),
+        ({"agents": 3}, lambda f: f.place([0, 1], [5.0, 5.0]), "2 agents in one place; give one row for each"),
+        ({"agents": 3}, lambda f: f.place([0, 1], [[5.0, 5.0]]), "1 rows for 2 agents"),
+        ({"agents": 3}, lambda f: f.push([0, 3], [5.0, 5.0]), "agent = 3: this flight has the agents 0 to 2"),
+        ({"agents": 3}, lambda f: f.push([0, 0], [5.0, 5.0]), r"agent = \[0, 0\]: 0 is named twice"),
+        ({"agents": 3}, lambda f: f.push([], [5.0, 5.0]), "names nobody"),
+        ({"agents": 3}, lambda f: f.push("01", [5.0, 5.0]), "agent = '01': this flight has the agents"),
+        ({"agents": 3}, lambda f: f.push(0, [5.0, 1e9]), r"velocity = \[5.0, 1000000000.0\] m/s lies outside"),
+        (
+            {"agents": 3},
+            lambda f: f.push([0, 1], [[5.0, 1.0], [5.0]]),
+            r"velocity\[1\] = \[5.0\] is not \[east, north\]",
+        ),
+        ({"agents": 3}, lambda f: f.remove(1).push([0, 1], [5.0, 1.0]), "agent = 1: it is absent"),
+        ({"agents": 3}, lambda f: f.remove(1).add(1, [1e9, 1.0]), "position = .* lies outside"),
+        (BOUNCING, lambda f: f.place(2, [25.0, 0.0]), "place: agent 2 lies 5 m outside the arena, from whose faces"),
+        (BOUNCING, lambda f: f.remove(1).add(1, [25.0, 0.0]), "add: agent 1 lies 5 m outside the arena"),
+        (CITY, lambda f: f.place([0, 2], [[9.0, 9.0, 9.0], [0.0, 1.0, 9.0]]), "place: agent 2 lies 4 m inside what"),
+    ],
+)
+def test_agents_cannot_be_put_where_a_flight_cannot_hold_them(keys, act, said):
+    flight = airflock.open(load("vasarhelyi_2018/4ms", {"duration": 3.0, **keys}), 2, device="python").advance(0.1)
+    with pytest.raises(FlightError, match=said) as fault:
+        act(flight)
+    assert "\n" not in str(fault.value)
+    assert all(event.kind == "remove" for event in flight.events)
+
+
+def test_a_place_beyond_a_periodic_box_is_the_same_place_in_it_and_beyond_soft_walls_one_may_be_put():
+    box = {"agents": 3, "duration": 3.0, "world.edges": "periodic", "world.side": 40.0}
+    flights = [airflock.open(load("vicsek_1995/ordered", box), 2, device="python") for _ in range(2)]
+    for flight, spot in zip(flights, ([13.0, -5.0], [53.0, 35.0]), strict=True):
+        flight.place(0, spot).advance(1.0)
+    assert np.array_equal(flights[0].state, flights[1].state)
+    soft = airflock.open(load("vasarhelyi_2018/4ms", {"agents": 3}), 2, device="python").place(1, [300.0, 0.0])
+    assert soft.state[0, 1] == 300.0

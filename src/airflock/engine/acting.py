@@ -3,14 +3,19 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
+import numpy as np
+
 from airflock.engine.presence import join, leave
 from airflock.engine.standing import Standing
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
 from airflock.scenarios.document import keyed
-from airflock.scenarios.events import Event, agent_number, vector
+from airflock.scenarios.events import Event, agent_number, are_several, vector, vectors
+from airflock.scenarios.places import spot_fault, start_in_box
 
 COMMANDS = {"velocity": "m/s", "acceleration": "m/s^2", "heading": ""}
+FARTHEST = 1e6  # m from the centre: the largest arena; beyond it single precision does not hold a step of motion
+FASTEST = 1e3  # m/s; our choice: faster than anything that these bodies are made for
 
 
 class Acting(Standing):
@@ -37,16 +42,17 @@ class Acting(Standing):
             self._course.sensed = True
         return self
 
-    def command(self, agent: int, value: Any) -> Self:
-        """Overrule what an agent decided at this step, until its next decision.
+    def command(self, agent: int | Sequence[int], value: Any) -> Self:
+        """Overrule what an agent, or each of several, decided at this step, until its next decision.
 
-        value : one number per axis, m/s, m/s² or a direction, as the law commands
+        value : one number per axis, m/s, m/s² or a direction, as the law commands; for several agents one such row
+                for all of them, or one for each: (agent, axis)
         """
-        number, unit = self._there(agent), COMMANDS.get(self.scenario.model.command, "")
-        given = vector("command", value, self.scenario.dimensions, unit)
+        numbers, unit = self._those(agent), COMMANDS.get(self.scenario.model.command, "")
+        given = vectors("command", value, len(numbers), self.scenario.dimensions, unit)
         self.sense()
-        self._course.put("c", number, given)
-        self._course.note("command", agent=number, value=given)
+        self._course.put("c", numbers, given)
+        self._course.note("command", agent=_said(agent, numbers), value=given)
         return self
 
     def change(self, settings: Mapping[str, Any], *, wait: bool = True) -> Self:
@@ -67,24 +73,45 @@ class Acting(Standing):
         self._course.change(changed(self._course.latest, settings), event, wait)
         return self
 
-    def push(self, agent: int, velocity: Any) -> Self:
-        """Add to an agent's velocity, m/s, one number per axis: a gust, a collision, a hand."""
-        number = self._there(agent)
-        given = vector("velocity", velocity, self.scenario.dimensions, "m/s")
+    def push(self, agent: int | Sequence[int], velocity: Any) -> Self:
+        """Add to the velocity of an agent, or of several: a gust, a collision, a hand.
+
+        velocity : m/s, one number per axis, at most 1000; for several agents one such row for all, or one for each
+        """
+        numbers = self._those(agent)
+        given = vectors("velocity", velocity, len(numbers), self.scenario.dimensions, "m/s")
+        _within("velocity", given, FASTEST, "m/s", "a push is at most so much")
         self._course.begin()
-        self._course.put("v", number, given, add=True)
-        self._course.note("push", agent=number, velocity=given)
+        self._course.put("v", numbers, given, add=True)
+        self._course.note("push", agent=_said(agent, numbers), velocity=given)
         return self
 
-    def place(self, agent: int, position: Any) -> Self:
-        """Put an agent somewhere else, m, one number per axis."""
-        number = self._there(agent)
-        given = vector("position", position, self.scenario.dimensions, "m")
+    def place(self, agent: int | Sequence[int], position: Any) -> Self:
+        """Put an agent, or several, somewhere else: outside of soft walls, too, but not beyond faces that bounce.
+
+        position : m, one number per axis, up to 1e6; for several agents one row for each: (agent, axis)
+
+        Raises FlightError for a place inside what stands in the scene. A periodic box holds every place.
+        """
+        numbers = self._those(agent)
+        given = vectors("position", position, len(numbers), self.scenario.dimensions, "m")
+        if len(numbers) > 1 and not isinstance(given[0], list):
+            raise FlightError(f"position = {given}: {len(numbers)} agents in one place; give one row for each")
+        spots = self._free("place", numbers, given)
         self._course.begin()
-        self._course.put("", number, given)
+        self._course.put("", numbers, spots)
         self._state.look_at_pairs()
-        self._course.note("place", agent=number, position=given)
+        self._course.note("place", agent=_said(agent, numbers), position=given)
         return self
+
+    def _free(self, what: str, numbers: list[int], given: list[Any]) -> Any:
+        """Places (agent, axis) as they are in a periodic box. Raises FlightError where an agent cannot be there."""
+        _within("position", given, FARTHEST, "m", "that is the largest arena")
+        spots = np.broadcast_to(np.array(given, float), (len(numbers), self.scenario.dimensions)).T
+        fault = spot_fault(self.scenario, spots, numbers)
+        if fault:
+            raise FlightError(f"{what}: {fault}")
+        return start_in_box(self.scenario, spots).T
 
     def fault(self, kind: str, agents: Sequence[int] | int | None = None, *, wait: bool = True, **numbers: Any) -> Self:
         """Let a fault begin, as an entry of [[faults]] with at = now does. A new window of scores begins.
@@ -123,7 +150,20 @@ class Acting(Standing):
             raise FlightError(f"add: agent {number} is there already")
         dims = self.scenario.dimensions
         at = vector("position", position, dims, "m")
+        spot = self._free("add", [number], at)[0].tolist()
         v = vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
-        join(self._state, number, at, v)
+        join(self._state, number, spot, v)
         self._course.note("add", agent=number, position=at, velocity=v)
         return self
+
+
+def _said(agent: Any, numbers: list[int]) -> int | list[int]:
+    """Agents as an event holds them: the number of one that was named by itself, or a list."""
+    return numbers if are_several(agent) else numbers[0]
+
+
+def _within(what: str, given: list[Any], most: float, unit: str, why: str) -> None:
+    """Raise FlightError for a vector whose components are not all within +- most."""
+    for row in np.atleast_2d(np.array(given, float)).tolist():
+        if max(map(abs, row)) > most:
+            raise FlightError(f"{what} = {row} {unit} lies outside [-{most:g}, {most:g}] {unit} per axis; {why}")

@@ -192,11 +192,15 @@ class Course:
         state.arrays["there"][:] = (self.step - self.since) * state.agents
         self.state = state
 
-    def put(self, prefix: str, agent: int, values: Sequence[float], add: bool = False) -> None:
-        """Set the rows that begin with `prefix`, one per axis, of one agent; `add` to what they hold."""
+    def put(self, prefix: str, agents: Sequence[int], values: Sequence[Any], add: bool = False) -> None:
+        """Set the rows that begin with `prefix`, one per axis, of some agents; `add` to what they hold.
+
+        values : one number per axis for all of them, or one such row for each
+        """
         names = [f"{prefix}{axis}" for axis in self.state.plan.axes]
         rows = self.state.rows(names)
-        rows[:, agent] = np.array(values, rows.dtype) + (rows[:, agent] if add else 0)
+        each = np.broadcast_to(np.array(values, rows.dtype), (len(agents), len(names))).T
+        rows[:, agents] = each + (rows[:, agents] if add else 0)
         self.state.put(names, rows)
 
     def note(self, kind: str, /, **data: Any) -> None:

@@ -10,7 +10,7 @@ from airflock.engine.course import Course
 from airflock.engine.moments import Window
 from airflock.engine.state import State
 from airflock.errors import FlightError
-from airflock.scenarios.events import Event, agent_number
+from airflock.scenarios.events import Event, agent_number, agent_numbers
 from airflock.scenarios.onsets import told
 from airflock.scenarios.scenario import Scenario
 
@@ -149,6 +149,12 @@ class Standing:
     def _there(self, agent: Any) -> int:
         """Number of an agent that is there. Raises FlightError in one line."""
         number = agent_number(agent, self.agents)
-        if not self.present[number]:
-            raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")
-        return number
+        return self._those(number)[0]
+
+    def _those(self, agents: Any) -> list[int]:
+        """Numbers of one agent or several that are there. Raises FlightError in one line."""
+        numbers, there = agent_numbers(agents, self.agents), self.present
+        for number in numbers:
+            if not there[number]:
+                raise FlightError(f"agent = {number}: it is absent at t = {self.time:g} s")
+        return numbers

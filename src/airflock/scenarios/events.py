@@ -1,7 +1,7 @@
 """Events: what was done to a flight from outside, each at a step. With scenario and seed they give the same bits."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,8 +12,8 @@ from airflock.errors import FlightError
 class Event:
     """Something done to a flight before it flew `step`.
 
-    kind : change (keys of the scenario), command (of one agent, instead of its law's), push (of one agent, m/s),
-           place (of one agent, m), fault (of some agents), remove (an agent drops out), add (one that was absent
+    kind : change (keys of the scenario), command (of agents, instead of their law's), push (of agents, m/s),
+           place (of agents, m), fault (of some agents), remove (an agent drops out), add (one that was absent
            joins), or branch (another world's random numbers)
     data : plain values, as the method of `Flight` of the same name takes them
     """
@@ -46,6 +46,17 @@ def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
     return sorted(events, key=lambda event: event.step)
 
 
+def vectors(what: str, given: Any, count: int, dimensions: int, unit: str) -> list[Any]:
+    """One finite vector for all of `count` agents, or a list of one for each, as plain floats. Raises FlightError."""
+    rows = given.tolist() if hasattr(given, "tolist") else given
+    each = isinstance(rows, (list, tuple)) and any(hasattr(row, "__len__") for row in rows)
+    if not each:
+        return vector(what, rows, dimensions, unit)
+    if len(rows) != count:
+        raise FlightError(f"{what}: {len(rows)} rows for {count} agents; give one for all, or one row for each")
+    return [vector(f"{what}[{number}]", row, dimensions, unit) for number, row in enumerate(rows)]
+
+
 def vector(what: str, given: Any, dimensions: int, unit: str) -> list[float]:
     """A finite vector of plain floats. Raises FlightError in one line."""
     try:
@@ -60,6 +71,32 @@ def vector(what: str, given: Any, dimensions: int, unit: str) -> list[float]:
 
 def agent_number(given: Any, agents: int) -> int:
     """Number of an agent of the flock. Raises FlightError in one line."""
-    if isinstance(given, bool) or not hasattr(given, "__index__") or not 0 <= int(given) < agents:
+    if isinstance(given, bool) or not hasattr(given, "__index__") or not 0 <= _index(given) < agents:
         raise FlightError(f"agent = {given!r}: this flight has the agents 0 to {agents - 1}")
-    return int(given)
+    return _index(given)
+
+
+def are_several(given: Any) -> bool:
+    """Whether agents are given as a list, an array or a range, and not one by itself."""
+    return (
+        isinstance(given, Iterable) and not isinstance(given, (str, bytes, Mapping)) and getattr(given, "ndim", 1) > 0
+    )
+
+
+def agent_numbers(given: Any, agents: int) -> list[int]:
+    """Numbers of one agent or of several different ones. Raises FlightError in one line."""
+    found = [agent_number(number, agents) for number in (given if are_several(given) else [given])]
+    if not found:
+        raise FlightError(f"agent = {given!r}: names nobody")
+    twice = [number for place, number in enumerate(found) if number in found[:place]]
+    if twice:
+        raise FlightError(f"agent = {given!r}: {twice[0]} is named twice")
+    return found
+
+
+def _index(given: Any) -> int:
+    """A whole number, -1 where an array of several stands for one."""
+    try:
+        return int(given)
+    except TypeError:
+        return -1

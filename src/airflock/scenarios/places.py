@@ -1,5 +1,6 @@
 """Checks of a scenario against what stands in its scene: the scene itself, goals inside it, starts inside it."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -82,25 +83,27 @@ def start_in_box(scenario: Scenario, given: NDArray[Any]) -> NDArray[Any]:
 
 def start_fault(scenario: Scenario, given: NDArray[Any]) -> str:
     """What is wrong with a given start (component, agent), as a sentence; empty if nothing is."""
+    fault = spot_fault(scenario, given, range(np.shape(given)[1]))
+    return f"start: {fault}" if fault else ""
+
+
+def spot_fault(scenario: Scenario, given: NDArray[Any], agents: Sequence[int]) -> str:
+    """What is wrong with places (component, agent) at which these agents are to be; empty if nothing is."""
     dims = scenario.dimensions
     if scenario.world.edges == "bounce":  # which would put whoever starts beyond a face onto it, farther than it flies
         beyond = np.abs(np.asarray(given, float)[:dims]) - np.array(half_sizes(scenario.world)[:dims])[:, None]
         if beyond.max() > 0.0:
-            agent = int(beyond.max(axis=0).argmax())
+            agent = agents[int(beyond.max(axis=0).argmax())]
             return (
-                f"start: agent {agent} lies {beyond.max():.3g} m outside the arena, from whose faces agents bounce; "
+                f"agent {agent} lies {beyond.max():.3g} m outside the arena, from whose faces agents bounce; "
                 "move it in or enlarge world.side"
             )
-    return start_inside(scenario, given)
-
-
-def start_inside(scenario: Scenario, given: NDArray[Any]) -> str:
-    """Which agent of a given start (component, agent) lies inside the scene, as a sentence; empty if none does."""
-    place, dims = scenario.stands(), scenario.dimensions
-    for agent, column in enumerate(np.asarray(given, float)[:dims].T if len(place.shapes) else ()):
+    place = scenario.stands()
+    columns = np.asarray(given, float)[:dims].T if len(place.shapes) else ()
+    for agent, column in zip(agents, columns, strict=False):
         depth = _depth(place, np.append(column, [0.0] * (3 - dims)))
         if depth > 0.0:
-            return f"start: agent {agent} lies {depth:.3g} m inside what stands in the scene"
+            return f"agent {agent} lies {depth:.3g} m inside what stands in the scene"
     return ""
 
 
