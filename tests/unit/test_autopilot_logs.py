@@ -1,6 +1,7 @@
 """Logs of PX4 and ArduPilot: a motion that was written is the motion that is read."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import airflock
@@ -87,3 +88,62 @@ def test_damaged_logs_end_with_one_line(tmp_path, ending):
     with pytest.raises(RecordingError) as fault:
         airflock.load_tracks(path)
     assert len(str(fault.value).splitlines()) == 1 and str(path) in str(fault.value)
+
+
+LATER = "ref_timestamp", "z_deriv", "xy_valid", "v_xy_valid"
+
+
+def px4_table(ned, speed, **more):
+    """The table that ulog2csv writes of vehicle_local_position; `more`: columns beside position and velocity."""
+    places = dict(zip(("x", "y", "z", "vx", "vy", "vz"), np.hstack([ned, speed]).T, strict=True))
+    return pd.DataFrame({"timestamp": np.round(1e6 * TIME).astype(int), **places, **more})
+
+
+@pytest.mark.parametrize("height", [0.2, -20.0])  # near the ground nothing but the names tells that z is down
+def test_a_table_of_px4_is_north_east_down_in_microseconds(tmp_path, height):
+    ned, speed = motion()
+    ned[:, 2] = height
+    px4_table(ned, speed, **dict.fromkeys(LATER, 1)).to_csv(tmp_path / "a.csv", index=False)
+    told = []
+    found = airflock.load_tracks(tmp_path / "a.csv", say=told.append, precision=64)
+    np.testing.assert_allclose(values(found), enu(ned), atol=1e-9)
+    np.testing.assert_allclose(values(found, "velocity"), enu(speed), atol=1e-9)
+    np.testing.assert_allclose(found.time - found.time[0], TIME - TIME[0], atol=1e-9)
+    assert "fields of PX4's vehicle_local_position: x is north, y east, z down (otherwise --axes enu)" in told[0]
+    as_said = airflock.load_tracks(tmp_path / "a.csv", axes="enu", accept=["down"], precision=64)
+    np.testing.assert_allclose(values(as_said), ned, atol=1e-9)
+
+
+def test_a_table_that_may_be_of_px4_is_asked_about_its_axes(tmp_path):
+    ned, speed = motion()
+    ned[:, 2] = 0.0
+    bare = px4_table(ned, speed)
+    bare.to_csv(tmp_path / "a.csv", index=False)
+    for how in ({"time_unit": "us"}, {"map": {"t": "timestamp*1e-6"}}):
+        with pytest.raises(
+            RecordingError, match=r"whose x is north and z down: write --axes ned, or --axes enu"
+        ) as line:
+            airflock.load_tracks(tmp_path / "a.csv", **how)
+        assert "\n" not in str(line.value)
+        for axes, place in (("ned", enu(ned)), ("enu", ned)):
+            found = airflock.load_tracks(tmp_path / "a.csv", axes=axes, precision=64, **how)
+            np.testing.assert_allclose(values(found), place, atol=1e-9)
+    seconds = bare.assign(timestamp=TIME)  # of anybody: nothing but PX4 counts microseconds under these names
+    np.testing.assert_allclose(values(airflock.load_tracks(seconds, precision=64)), ned, atol=1e-9)
+
+
+def test_tables_of_px4_with_origins_of_their_own_meet_and_invalid_rows_are_left_out(tmp_path):
+    from airflock.recordings.imports import geodesy
+
+    ned, speed = motion()
+    near, far = (47.0, 19.0, 100.0), (47.009, 19.001, 130.0)
+    there, turned = geodesy.moved(enu(ned), near, far), geodesy.turned(enu(speed), near, far)
+    rows = {"a": (ned, speed, near), "b": (enu(there), enu(turned), far)}
+    for name, (place, fast, origin) in rows.items():
+        place, valid = place.copy(), (np.arange(300) >= 40).astype(int)
+        place[:40] += 500.0  # of an estimator that calls them invalid
+        refs = dict(zip(("ref_lat", "ref_lon", "ref_alt"), origin, strict=True))
+        px4_table(place, fast, xy_valid=valid, **refs).to_csv(tmp_path / f"{name}.csv", index=False)
+    found = airflock.load_tracks([tmp_path / "a.csv", tmp_path / "b.csv"], same_clock=True, accept=["down"])
+    np.testing.assert_allclose(values(found, who=0), values(found, who=1), atol=1e-3)
+    assert found.sizes["time"] == 260

@@ -37,7 +37,7 @@ def identify(
     map: imports.Map = None,
     unit: imports.Unit = "",
     time_unit: imports.TimeUnit = "",
-    axes: imports.Axes = "enu",
+    axes: imports.Axes = "",
     same_clock: imports.SameClock = False,
     accept: imports.Accept = None,
     decimal: imports.Decimal = ".",

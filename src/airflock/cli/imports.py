@@ -25,7 +25,9 @@ Unit = Annotated[str, typer.Option(metavar="UNIT", help="Of lengths that bring n
 Scale = Annotated[float | None, typer.Option(help="Metres per pixel.", show_default=False)]
 TimeUnit = Annotated[str, typer.Option(metavar="UNIT", help="Of times that bring none: s, ms, us, ns, min, frames.")]
 Fps = Annotated[float | None, typer.Option(help="Frames per second, where frames are counted.", show_default=False)]
-Axes = Annotated[str, typer.Option(help="enu, or ned where x is north and z down.")]
+Axes = Annotated[
+    str, typer.Option(help="enu, or ned where x is north and z down.", show_default="enu; ned of fields of PX4")
+]
 SameClock = Annotated[bool, typer.Option("--same-clock", help="The clocks of all files agree.")]
 Accept = Annotated[
     list[str] | None,
@@ -62,7 +64,7 @@ def import_tracks(
     time_unit: TimeUnit = "",
     fps: Fps = None,
     keypoint: Annotated[str, typer.Option(help="Which one, where a file has several.")] = "",
-    axes: Axes = "enu",
+    axes: Axes = "",
     origin: Annotated[
         str, typer.Option(metavar="LAT,LON[,HEIGHT]", help="Of the local frame.", show_default="the first fix")
     ] = "",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError, gathering
-from airflock.recordings.imports import expressions, headers
+from airflock.recordings.imports import expressions, headers, px4
 from airflock.recordings.imports.track import COMMAND, POSITION, TARGETS, VELOCITY, Options
 from airflock.spelling import meant
 
@@ -53,7 +53,8 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
     if twice:
         raise RecordingError(f"{where}: column {twice[0]} appears twice; rename one of them")
     faults: list[str] = []
-    found = Layout(where)
+    options, notes = px4.as_logged(where, columns, options)
+    found = Layout(where, notes=notes)
     for step in (_mapped, _recognised):
         with gathering(faults):
             step(found, columns, options)
@@ -64,6 +65,8 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
     if faults:
         raise RecordingError("\n".join(faults))
     _ned(found, options)
+    for name in px4.beside(columns, options):
+        found.trees[name], found.factors[name], found.labels[name] = expressions.parsed(repr(name), name), 1.0, name
     return found
 
 

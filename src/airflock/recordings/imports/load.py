@@ -44,7 +44,7 @@ def load_tracks(
     time_unit: str = "",
     fps: float | None = None,
     keypoint: str = "",
-    axes: str = "enu",
+    axes: str = "",
     origin: tuple[float, float, float] | None = None,
     rate: float | None = None,
     bridge: float = 1.0,
@@ -80,7 +80,7 @@ def load_tracks(
     keypoint : str
         Which one, where there are several.
     axes : str
-        enu, or ned where x is north and z down.
+        enu, or ned where x is north and z down; by default enu, but ned of a table with the fields of PX4.
     origin : tuple of float, optional
         Latitude, longitude (degrees) and height (m) of the local frame; by default the first fix.
     rate : float, optional
@@ -235,7 +235,7 @@ def _sound(options: Options, findings: Findings, numbers: Mapping[str, float | N
     """Refuse options that cannot be meant, all at once."""
     faults = findings.faults
     known = {"unit": ("", *headers.LENGTHS, *headers.PIXELS), "time_unit": ("", *headers.TIMES, "frames")}
-    for name, allowed in {**known, "axes": ("enu", "ned"), "decimal": (".", ",")}.items():
+    for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
         value = getattr(options, name)
         if value not in allowed:
             faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")

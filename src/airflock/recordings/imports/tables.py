@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from airflock.errors import RecordingError
-from airflock.recordings.imports import headers
+from airflock.recordings.imports import headers, px4
 from airflock.recordings.imports.columns import MOST_COLUMNS, Layout, layout
 from airflock.recordings.imports.track import GEODETIC, POSITION, Findings, Options, Track
 
@@ -244,8 +244,9 @@ def _taken(values: dict[str, Any], rows: Any, chosen: Any) -> tuple[dict[str, An
 def _track(name: str, where: str, pieces: list[Any], how: Layout) -> Track:
     columns = {target: np.concatenate([p[0][target] for p in pieces]) for target in pieces[0][0]}
     rows = np.concatenate([p[1] for p in pieces])
+    origin, valid = px4.taken_out(columns)
     needed = [columns[c] for c in ("t", "utc", *POSITION[:2], "lat", "lon") if c in columns]
-    there = np.isfinite(np.stack(needed)).all(axis=0)
+    there = np.isfinite(np.stack(needed)).all(axis=0) & (True if valid is None else valid)
     if not there.all():
         columns, rows = {target: values[there] for target, values in columns.items()}, rows[there]
     utc = columns.pop("utc", None)
@@ -256,5 +257,6 @@ def _track(name: str, where: str, pieces: list[Any], how: Layout) -> Track:
     pair = np.stack([time, utc], axis=1) if utc is not None and utc is not time else None
     air = columns.pop("air") > 0.5 if "air" in columns else None
     found = Track(name, where, time, columns, rows, dict(how.labels), clock, pair, how.datum)
+    found.origin, found.datum = (origin, found.datum or "amsl") if origin is not None else (None, found.datum)
     found.air = air
     return found

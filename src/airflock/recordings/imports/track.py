@@ -37,7 +37,8 @@ class Options:
     time_unit  : s, ms, us, ns, min, or frames with `fps`
     fps        : frames per second
     keypoint   : which one, where a file has several
-    axes       : enu (x east, y north, z up) or ned (x north, y east, z down) of files that leave it open
+    axes       : enu (x east, y north, z up) or ned (x north, y east, z down) of files that leave it open; if empty,
+                 enu, but ned of tables with the fields of PX4
     decimal, delimiter : of text files; an empty delimiter is found out
     done       : called with the share of a file that has been read, 0-1
     """
@@ -48,7 +49,7 @@ class Options:
     time_unit: str = ""
     fps: float | None = None
     keypoint: str = ""
-    axes: str = "enu"
+    axes: str = ""
     decimal: str = "."
     delimiter: str = ""
     done: Callable[[float], None] = nothing

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from airflock.errors import RecordingError
+from airflock.recordings.imports.px4 import origin_of
 from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Options, Track
 
 LOCAL, SETPOINT = "vehicle_local_position", "trajectory_setpoint"
@@ -44,7 +45,7 @@ def read_ulog(path: Path, options: Options, findings: Findings) -> list[Track]:
         found.breaks = np.flatnonzero(np.diff(local["xy_reset_counter"].astype(np.int64)) != 0) + 1
         if found.breaks.size:
             findings.notes.append(f"{path}: {found.breaks.size} resets of the estimator: the track is split there")
-    found.origin = _origin(local)
+    found.origin = origin_of(local)
     found.utc = _utc(topics.get("vehicle_gps_position"))
     found.air = _air(topics.get("vehicle_land_detected"), time)
     found.keep(valid)
@@ -72,14 +73,6 @@ def _command(topic: Any, time: Any, path: Path, findings: Findings) -> dict[str,
     if share > 0.0:
         findings.notes.append(f"{path}: {share:.0%} of the time no velocity was commanded")
     return held if share < 1.0 else {}
-
-
-def _origin(local: Any) -> tuple[float, float, float] | None:
-    if not all(f"ref_{name}" in local for name in ("lat", "lon", "alt")):
-        return None
-    place = np.stack([np.asarray(local[f"ref_{name}"], float) for name in ("lat", "lon", "alt")], axis=1)
-    known = place[np.isfinite(place).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)]
-    return None if not len(known) else (float(known[-1, 0]), float(known[-1, 1]), float(known[-1, 2]))
 
 
 def _utc(topic: Any) -> Any:
