@@ -1,5 +1,6 @@
 """Order parameters, metric sets and bodies of a user's own, from a file or given directly; no compiler needed."""
 
+import json
 import linecache
 
 import numpy as np
@@ -7,8 +8,9 @@ import pytest
 
 import airflock
 from airflock.engine import fly
-from airflock.errors import RuleError, ScenarioError
+from airflock.errors import AirflockError, RuleError, ScenarioError
 from airflock.metrics.registry import SETS, metric_set, reports
+from airflock.recordings.files import fly_again
 from airflock.recordings.flights import flown_document
 from airflock.recordings.scores import scenario_of
 from airflock.scenarios.files import load
@@ -177,3 +179,41 @@ def test_a_set_of_nothing_is_refused():
 def test_every_set_says_what_is_best_or_that_nothing_is():
     for found in SETS.values():
         assert found.best in ("", *found.numbers(found.Parameters(kind=found.name)))
+
+
+def test_a_recording_of_ones_own_metrics_and_body_says_what_flies_and_scores_it_again(files, monkeypatch):
+    monkeypatch.chdir(files)
+    keys = {**SMALL, "metrics.kind": "spread.py", "metrics.width": 3.0, "body.kind": "half.py", "body.share": 0.7}
+    flown = airflock.simulate(load("vasarhelyi_2018/4ms", keys, trust=True), 1, precision=64, device="python")
+    airflock.save(flown, "mine.nc")
+    with pytest.raises(AirflockError) as fault:
+        airflock.validate("mine.nc")
+    remedy = "give their files with --set metrics.kind=spread.py --set body.kind=half.py --trust (in Python: settings="
+    assert remedy in str(fault.value) and "\n" not in str(fault.value)
+    given = {"metrics.kind": "spread.py", "body.kind": "half.py"}
+    assert airflock.validate("mine.nc", given, trust=True).verdict == "flown again with the same bits"
+    with pytest.raises(AirflockError, match="half.py: would run the code|would run the code in .*half.py"):
+        airflock.validate("mine.nc", given)
+    with pytest.raises(AirflockError, match="radio.delay: it is flown again as it was flown"):
+        airflock.validate("mine.nc", given | {"radio.delay": 2.0}, trust=True)
+    x = flown.position.sel(space="x").values[:, 0]
+    spread = np.abs(x - x.mean(axis=1, keepdims=True)).mean()
+    scores = airflock.score(flown, settings={"metrics.kind": "spread.py"}, trust=True).iloc[0]
+    assert scores["spread"] == pytest.approx(spread, rel=1e-12)
+    assert scores["fitness"] == pytest.approx(3.0 / (3.0 + spread), rel=1e-12)  # by the width that was flown
+    assert "spread" in airflock.over_time(flown, {"metrics.kind": "spread.py"}, trust=True)
+    with pytest.raises(AirflockError, match="if you trust it, add --trust"):
+        airflock.score(flown, settings={"metrics.kind": "spread.py"})
+
+
+def test_code_that_a_recording_names_does_not_run_with_trust_in_another_file(files, monkeypatch):
+    monkeypatch.chdir(files)
+    (files / "evil.py").write_text("raise SystemExit('it ran')\n")
+    direct = load("vasarhelyi_2018/4ms", SMALL, metrics=namespace(METRIC), body=namespace(BODY))
+    recording = airflock.simulate(direct, 1, precision=64, device="python")
+    document = json.loads(recording.attrs["airflock_scenario"])
+    document["body"]["kind"] = "evil.py"
+    crafted = recording.assign_attrs(airflock_scenario=json.dumps(document))
+    assert scenario_of(crafted, {"metrics.kind": "spread.py"}, trust=True).vehicle.name == "multirotor"
+    with pytest.raises(AirflockError, match=r"body.kind = 'evil.py', which is not in the file"):
+        fly_again(crafted, settings={"metrics.kind": "spread.py"}, trust=True)

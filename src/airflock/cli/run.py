@@ -104,6 +104,7 @@ def score(
         list[Path], typer.Argument(metavar="FILE.nc...", help="Recordings to measure.", show_default=False)
     ],
     changes: options.Set = None,
+    trust: options.Trust = False,
     as_json: options.Json = False,
     series: Annotated[
         Path | None, typer.Option(metavar="FILE.csv", help="Also write the order parameters over time.")
@@ -133,12 +134,12 @@ def score(
         changed = in_bodies(body_length) | changed
     with options.compiling_told(), Opening(files[0]) as first:  # another process opens it while this one imports
         if groups:
-            _groups([first, *files[1:]], files, changed, as_json)
+            _groups([first, *files[1:]], files, changed, trust, as_json)
         else:
-            _score([first, *files[1:]], files, changed, series, aero, as_json)
+            _score([first, *files[1:]], files, changed, trust, series, aero, as_json)
 
 
-def _groups(what, files, changed, as_json) -> None:  # type: ignore[no-untyped-def]
+def _groups(what, files, changed, trust, as_json) -> None:  # type: ignore[no-untyped-def]
     """Measure the groups of recordings, and print what was found."""
     from airflock.metrics.registry import reports
     from airflock.recordings.files import load_recording
@@ -148,8 +149,8 @@ def _groups(what, files, changed, as_json) -> None:  # type: ignore[no-untyped-d
     runs = []
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
-        about = reports(scenario_of(recording, changed).measures) | BETWEEN
-        table = group_scores(recording, changed)
+        about = reports(scenario_of(recording, changed, trust=trust).measures) | BETWEEN
+        table = group_scores(recording, changed, trust=trust)
         rows = {str(name): row.dropna().to_dict() for name, row in table.iterrows()}
         runs.append({"file": str(path), "groups": rows})
         if not as_json:
@@ -159,7 +160,7 @@ def _groups(what, files, changed, as_json) -> None:  # type: ignore[no-untyped-d
         tables.emit_json({"runs": runs})
 
 
-def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]
+def _score(what, files, changed, trust, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]
     """Measure recordings, of which the first is being opened, and write or print what was asked for."""
     from airflock.metrics.registry import reports
     from airflock.recordings.attributes import faults, told_faults
@@ -172,8 +173,8 @@ def _score(what, files, changed, series, aero, as_json) -> None:  # type: ignore
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
         settings = aero_settings(recording, changed) if aero else changed
-        values, course = measure(recording, settings)
-        scenario = scenario_of(recording, settings)
+        values, course = measure(recording, settings, trust=trust)
+        scenario = scenario_of(recording, settings, trust=trust)
         about |= reports(scenario.measures)
         rows.append(values)
         courses.append(course.assign(file=str(path)))

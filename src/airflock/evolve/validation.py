@@ -28,7 +28,8 @@ def validate(
     name : str or path
         A preset, a scenario file, a study file, or a recording (.nc).
     settings : mapping, optional
-        Keys to change before the check.
+        Keys to change before the check. Of a recording only {"metrics.kind": "mine.py"} and the like: the file of what
+        it was flown with and does not hold.
     law : optional
         A flocking law of your own, or one by its name or file, instead of the file's; for a recording that was flown
         with a law of its own, that law.
@@ -56,7 +57,7 @@ def validate(
     """
     text = str(name)
     if text.lower().endswith(".nc"):
-        same, differences = fly_again(load_recording(name), law)
+        same, differences = fly_again(load_recording(name), law, settings, trust=trust)
         if not same:
             told = "".join(f"\n{text}: {line}" for line in differences)
             reason = "see below" if differences else "although nothing that should matter differs"

@@ -10,22 +10,18 @@ import numpy as np
 import xarray as xr
 
 from airflock import atomic
-from airflock.body.registry import BODIES
 from airflock.errors import RecordingError
 from airflock.machine import processor
-from airflock.metrics.registry import SETS
-from airflock.radios.registry import RADIOS
 from airflock.recordings import attributes
 from airflock.recordings.flights import provenance, simulate
 from airflock.recordings.isolated import Opening
 from airflock.recordings.layout import check
+from airflock.recordings.own_kinds import refuse_without_files, with_files
 from airflock.scenarios.families import Given
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
-from airflock.sensors.registry import SENSORS
 from airflock.suffixes import RECORDINGS, suffix_fault
-from airflock.topology.registry import TOPOLOGIES
 from airflock.untrusted import from_outside
 
 
@@ -122,10 +118,14 @@ def load_recording(path: str | os.PathLike[str] | Opening) -> xr.Dataset:
     return recording
 
 
-def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
+def fly_again(
+    recording: xr.Dataset, law: Any = None, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> tuple[bool, list[str]]:
     """Fly a simulated recording again from its attributes.
 
-    law : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
+    law      : where it was flown with a law of the user's own, that law (a module, a mapping, a Model, or its file)
+    settings : where it was flown with a body, metrics, ... of the user's own, their files: {"metrics.kind": "mine.py"}
+    trust    : whether these files may run
     Returns whether all positions have the same bits, and what differs between then and now that could explain it.
     """
     found: dict[str, Any] = dict(recording.attrs)
@@ -140,15 +140,13 @@ def fly_again(recording: xr.Dataset, law: Any = None) -> tuple[bool, list[str]]:
             "--law FILE.py (in Python: law=...)"
         )
     for name in attributes.own_laws_of_groups(document):
-        raise RecordingError(f"recording: a group was flown with a law of its own, {name!r}, which is not in the file")
-    ours: dict[str, Mapping[str, Any]] = {
-        "body": BODIES, "sensors": SENSORS, "radio": RADIOS, "topology": TOPOLOGIES, "metrics": SETS,
-    }  # fmt: skip
-    for section, known in ours.items():
-        kind = document.get(section, {}).get("kind")
-        if kind is not None and kind not in known:
-            raise RecordingError(f"recording: was flown with {section}.kind = {kind!r}, which is not in the file")
-    scenario = make(document, str(found.get("airflock_name", "recording")), given=Given(law=own))
+        raise RecordingError(
+            f"recording: a group was flown with a law of its own, {name!r}, which is not in the file; it can be "
+            "scored and drawn, but not flown again"
+        )
+    refuse_without_files(document, settings or {})
+    document, _ = with_files(document, settings or {})
+    scenario = make(document, str(found.get("airflock_name", "recording")), given=Given(law=own), trust=trust)
     seed = attributes.whole_number(recording, "airflock_seed")
     precision = attributes.whole_number(recording, "airflock_precision", 32)
     again = simulate(

@@ -22,20 +22,22 @@ BETWEEN = {
 PART = 200  # instants at once
 
 
-def group_scores(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> pd.DataFrame:
+def group_scores(
+    recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> pd.DataFrame:
     """Order parameters as a table: a row for all agents, one for each group, and one for each two groups.
 
     A group is measured as if the others were not there. What is between two groups, `BETWEEN`, stands in rows named
     "one to other"; an instant counts where both have somebody there.
     Raises RecordingError where the recording's scenario has no groups.
     """
-    scenario = scenario_of(recording, settings)
+    scenario = scenario_of(recording, settings, trust=trust)
     groups = [group for group in scenario.groups if group.agents]
     if not groups:
         raise RecordingError("recording: its scenario has no [[groups]]")
-    rows: dict[str, dict[str, Any]] = {"all": measure(recording, settings)[0]}
+    rows: dict[str, dict[str, Any]] = {"all": measure(recording, settings, trust=trust)[0]}
     for group in groups:
-        rows[group.name] = measure(recording.isel(individual=list(group.agents)), settings)[0]
+        rows[group.name] = measure(recording.isel(individual=list(group.agents)), settings, trust=trust)[0]
     frames, _, present = frames_of(recording)
     dims, world = frames.shape[1] // 2, scenario.world
     box = 2.0 * np.array(half_sizes(world)[:dims]) if world.edges == "periodic" else None

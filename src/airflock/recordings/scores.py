@@ -1,7 +1,7 @@
 """Scores: order parameters of scenarios over many seeds, and of any recording, by the same rules."""
 
 import os
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +10,6 @@ import pandas as pd
 import xarray as xr
 
 from airflock.aero import descent
-from airflock.body.registry import BODIES
 from airflock.core.contract import Model
 from airflock.core.maths import FAR
 from airflock.core.parameters import Parameters, declarations, number_names
@@ -21,18 +20,16 @@ from airflock.errors import RecordingError
 from airflock.executors.scores import scores
 from airflock.metrics import nearest
 from airflock.metrics.registry import POWER, SETS, reports
-from airflock.radios.registry import RADIOS
 from airflock.recordings.attributes import check_format, flown_with_own_law, measured_by, scenario_document
 from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
+from airflock.recordings.own_kinds import missing_kinds, with_files
 from airflock.scenarios.families import Given
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
 from airflock.scenarios.seeds import sound_seeds
-from airflock.sensors.registry import SENSORS
-from airflock.topology.registry import TOPOLOGIES
 from airflock.untrusted import from_outside
 
 
@@ -50,6 +47,7 @@ def score(
     aero: bool = False,
     groups: bool = False,
     body_length: float | None = None,
+    trust: bool = False,
 ) -> pd.DataFrame:
     """Order parameters and fitness as a table: one row per seed of a scenario, or one row for a recording.
 
@@ -79,6 +77,8 @@ def score(
         For a recording, one row for all, one for each group of its scenario, and one for what is between each two.
     body_length : float, optional
         For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.lengths`.
+    trust : bool
+        Whether code that settings of a recording name may run, such as {"metrics.kind": "mine.py"}.
 
     Returns
     -------
@@ -110,12 +110,12 @@ def score(
         if groups:
             from airflock.recordings.groups import BETWEEN, group_scores
 
-            table = _about(group_scores(what, settings), scenario_of(what, settings))
+            table = _about(group_scores(what, settings, trust=trust), scenario_of(what, settings, trust=trust))
             for place, about in (("units", 0), ("meanings", 1)):
                 table.attrs[place] |= {name: told[about] for name, told in BETWEEN.items()}
             return table
-        values, _ = measure(what, settings)
-        scenario = scenario_of(what, settings)
+        values, _ = measure(what, settings, trust=trust)
+        scenario = scenario_of(what, settings, trust=trust)
         table = _about(pd.DataFrame([values]), scenario)
         table.attrs["not_told"] = not_told(what, scenario, settings)
         return table
@@ -147,7 +147,7 @@ def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     return table
 
 
-def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> pd.DataFrame:
+def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
     """Order parameters at every instant of a recording.
 
     Parameters
@@ -156,6 +156,8 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
         Simulated, flown or loaded from a file.
     settings : mapping, optional
         Keys such as {"metrics.r_coll": 2.0} that replace those it was flown with.
+    trust : bool
+        Whether code that settings name may run, such as {"metrics.kind": "mine.py"}.
 
     Returns
     -------
@@ -176,7 +178,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) 
     >>> airflock.over_time(airflock.simulate(short))["phi_vel"].shape
     (6,)
     """
-    return _about(measure(recording, settings)[1], scenario_of(recording, settings))
+    return _about(measure(recording, settings, trust=trust)[1], scenario_of(recording, settings, trust=trust))
 
 
 def courses(scenario: Scenario) -> list[str]:
@@ -184,7 +186,9 @@ def courses(scenario: Scenario) -> list[str]:
     return [name for metric in plan_of(scenario.alike()).metrics for name in metric.Sample._fields]  # type: ignore[attr-defined]
 
 
-def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> tuple[dict[str, Any], pd.DataFrame]:
+def measure(
+    recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False
+) -> tuple[dict[str, Any], pd.DataFrame]:
     """Order parameters of a recording, and their course over time.
 
     Frames are taken every metrics.period, or each one if they are farther apart; collisions every
@@ -193,7 +197,7 @@ def measure(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) ->
     of individuals and instants that is there. What tracks do not have for want of a length (`not_told`) is left out.
     """
     frames, period, present = frames_of(recording)
-    scenario = scenario_of(recording, settings)
+    scenario = scenario_of(recording, settings, trust=trust)
     precision = 64 if frames.dtype == np.float64 else 32
     q = scenario.measured_by()
     every = max(1, round(q.period / period)), max(1, round((q.collision_period or period) / period))
@@ -235,18 +239,18 @@ def aero_settings(recording: xr.Dataset, changed: Mapping[str, Any] | None = Non
     return {**POWER, **frame, **(changed or {})}
 
 
-def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None) -> Scenario:
+def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> Scenario:
     """Scenario that a recording was flown with, or for a flight log one that only says how to score it.
 
-    A law, a body or a metric set that was given directly is not in the file: the law is unknown then, and the body and
-    the metrics are the usual ones. A log brings no arena: it is open unless settings name one, and v_flock is its mean
-    speed.
+    A law, a body or a metric set of the user's own is not in the file: the law is unknown then, and the others are the
+    usual ones, unless settings give a file ({"metrics.kind": "mine.py"}), which runs with `trust`. A log brings no
+    arena: it is open unless settings name one, and v_flock is its mean speed.
     """
     check_format(recording)
     document = scenario_document(recording)
     if document is not None:
         with from_outside(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
-            return _flown(document, recording, dict(settings or {}))
+            return _flown(document, settings or {}, recording, trust)
     frames, period, _ = frames_of(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))
@@ -258,27 +262,30 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
         "metrics": {"v_flock": max(speed, 0.01), "r_cluster": 80.0, "r_comm": 80.0, "period": period},
         "world": {"dimensions": str(dims), "arena": "none"},
     }
-    return make(document, "recording", settings, given=Given(law=UNKNOWN))
+    return make(document, "recording", settings, given=Given(law=UNKNOWN), trust=trust)
 
 
-def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, Any]) -> Scenario:
-    """Scenario of a simulated recording, with stand-ins for what the file does not hold."""
+def _flown(document: dict[str, Any], given: Mapping[str, Any], recording: xr.Dataset, trust: bool) -> Scenario:
+    """Scenario of a simulated recording, with stand-ins for what the file does not hold and nobody gave."""
     name = str(recording.attrs.get("airflock_name", "recording"))
-    if not _in_file(_kind(document, "metrics"), SETS):
+    missing = missing_kinds(document, given)
+    document, settings = with_files(document, given)
+    if "metrics" in missing:
         document = {**document, "metrics": _usual_metrics(document["metrics"])}
-    if not _in_file(_kind(document, "body"), BODIES):
+    if "body" in missing:
         document = {**{key: value for key, value in document.items() if key != "groups"}, "body": {}}
-    if not _in_file(_kind(document, "sensors"), SENSORS):
+    if "sensors" in missing:
         document = {**document, "sensors": {k: v for k, v in document["sensors"].items() if k == "period"}}
-    if not _in_file(_kind(document, "radio"), RADIOS):
+    if "radio" in missing:
         common = {key: value for key, value in document["radio"].items() if key in number_names(Packets)}
         document = {**document, "radio": common}
-    if not _in_file(_kind(document, "topology"), TOPOLOGIES):
+    if "topology" in missing:
         document = {key: value for key, value in document.items() if key != "topology"}
     if not flown_with_own_law(recording):
-        return make(document, name, settings)
+        return make(document, name, settings, trust=trust)
     measured = measured_by(recording)
-    kept = measured if _in_file(str(measured.get("kind", "")), SETS) else _usual_metrics(measured)
+    kept = measured if str(measured.get("kind", "")) in ("", *SETS) else _usual_metrics(measured)
+    kept = document["metrics"] if str(given.get("metrics.kind")).endswith(".py") and "metrics" in document else kept
     stand_in = {**document, "model": {}, "body": {}, "metrics": {k: v for k, v in kept.items() if v is not None}}
     stand_in = {key: value for key, value in stand_in.items() if key not in ("groups", "faults")}
     if isinstance(document.get("groups"), list):  # who is in which is told even where nobody knows how they fly
@@ -287,20 +294,10 @@ def _flown(document: dict[str, Any], recording: xr.Dataset, settings: dict[str, 
             for group in document["groups"]
         ]
     others = {key: value for key, value in settings.items() if not key.startswith("model.")}
-    return make(stand_in, name, others, given=Given(law=UNKNOWN))
+    return make(stand_in, name, others, given=Given(law=UNKNOWN), trust=trust)
 
 
 def _usual_metrics(table: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a section metrics that every set has."""
     known = {key for key, _, _ in declarations(SECTIONS["metrics"])} - {"kind"}
     return {key: value for key, value in table.items() if key in known}
-
-
-def _kind(document: Mapping[str, Any], section: str) -> str:
-    table = document.get(section, {})
-    return str(table.get("kind", "")) if isinstance(table, Mapping) else ""
-
-
-def _in_file(kind: str, known: Container[str]) -> bool:
-    """Whether a kind is the usual one or one of ours; else it was the user's own, which is not in a recording."""
-    return not kind or kind in known
