@@ -125,6 +125,20 @@ def test_a_lattice_has_its_distances():
     assert shape.group_shape(found)["hull"].to_numpy() == pytest.approx(8.0 * 6.0)
 
 
+@given(st.floats(0.05, 4.0), st.floats(4.1, 30.0))
+def test_bins_of_distances_end_where_they_are_said_to_and_count_who_is_exactly_there(width, farthest):
+    place = np.array([[[0.0, 0.0, farthest], [0.0, 0.0, 0.0]]])
+    place[:, 0, 1] = np.nextafter(farthest, 2.0 * farthest)  # one pair of three is 0 apart, one beyond, one at the end
+    share = neighbours.pair_distances(recording(place, np.ones_like(place)), width, farthest)
+    own = share.attrs["width"]
+    assert own * len(share) == pytest.approx(farthest, rel=1e-14) and share.index[-1] + 0.5 * own == pytest.approx(
+        farthest
+    )
+    assert 2.0 / 3.0 < own / width < 1.5 or len(share) == 1
+    one = 1.0 / 3.0 if len(share) > 1 else 2.0 / 3.0
+    assert share.iloc[-1] * own == pytest.approx(one) and share.iloc[0] * own == pytest.approx(one)
+
+
 @settings(deadline=None, max_examples=20)
 @given(st.floats(-3.0, 3.0))
 def test_a_neighbour_ahead_is_seen_ahead_whatever_the_direction(angle):

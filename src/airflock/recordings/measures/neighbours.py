@@ -23,14 +23,16 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
 
 
 def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.Series:
-    """Share of pairs by distance, per m, over all frames: a histogram whose sum times `width` is at most 1.
+    """Share of pairs by distance, per m, over all frames: a histogram whose sum times the width of a bin is at most 1.
 
-    width, farthest : of a bin, and of the last one, m
+    width    : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
+    farthest : end of the last bin, m; a pair exactly so far apart counts
     """
     if not 0.0 < width < farthest:
         raise ParameterError(f"width = {width:g} m must lie between 0 and farthest = {farthest:g} m")
     found = states(recording)
-    edges = np.arange(0.0, farthest + 0.5 * width, width)
+    edges = np.linspace(0.0, farthest, round(farthest / width) + 1)
+    width = farthest / (len(edges) - 1)
     counts, pairs = np.zeros(len(edges) - 1), 0
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
@@ -38,4 +40,6 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
         counts += np.histogram(np.linalg.norm(x[:, i] - x[:, j], axis=0), edges)[0]
         pairs += len(i)
     index = pd.Index(0.5 * (edges[1:] + edges[:-1]), name="distance")
-    return pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")
+    density = pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")
+    density.attrs |= {"width": width, "units": "1/m"}
+    return density
