@@ -15,10 +15,13 @@ from flocks import interpreted
 from reference.flight import fly_plainly
 
 ROOT = Path(__file__).parents[2]
+NEEDS = {"gym_env": "gymnasium"}  # examples that need what we do not install
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
 def test_example_runs(path, tmp_path):
+    if path.stem in NEEDS:
+        pytest.importorskip(NEEDS[path.stem])
     done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "phi_vel" in done.stdout
@@ -39,6 +42,23 @@ def test_own_rule_flies_the_same_in_plain_python(seed):
     known, text = fly_plainly(found, seed), interpreted(found, seed)
     assert np.abs(np.diff(known.frames[:, 2:4], axis=0)).max() > 0.1  # they act on each other
     np.testing.assert_allclose(text.frames, known.frames, atol=1e-9)
+
+
+def test_the_environment_of_reinforcement_learning_keeps_the_rules_of_gymnasium(monkeypatch, seed):
+    checker = pytest.importorskip("gymnasium.utils.env_checker")
+    monkeypatch.syspath_prepend(ROOT / "examples")
+    import gym_env
+
+    small = {"agents": 12, "duration": 4.0, "world.side": 120.0}
+    checker.check_env(gym_env.FlockMember(settings=small), skip_render_check=True)
+    env = gym_env.FlockMember(settings=small)
+    seen, _ = env.reset(seed=seed)
+    assert seen[:2] == pytest.approx(0.0, abs=2.0)  # at rest, but for the error of its receiver
+    for count in range(1, 21):
+        seen, _, hit, over, _ = env.step(np.array([0.5, -0.25]))
+        assert not hit and over == (count == 20)
+    east, north = env.flight.state[2:, 0]  # 4 s of a body that relaxes within 1 s to what was commanded
+    assert (east, north) == pytest.approx((4.0, -2.0), abs=0.8) and (seen[2:] != 0.0).any()
 
 
 def test_readme_scenario_is_valid(tmp_path):
