@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 import airflock
+import toys
 from airflock.errors import ParameterError, RecordingError, ScenarioError
+from airflock.evolve.search import search
+from airflock.evolve.store import Store
+from airflock.evolve.study import load_study
+from airflock.evolve.winner import conclude
+from airflock.executors.in_process import InProcess
 from airflock.recordings.measures import milling
 from processes import called
 
@@ -133,3 +139,28 @@ def test_measures_of_groups_are_found_by_tab():
     found = airflock.measures
     assert "measures" in dir(airflock) and found.milling is milling
     assert {"bursts", "contacts", "correlation", "delays", "milling", "neighbours", "shape"} <= set(dir(found))
+
+
+def test_flights_moments_studies_and_results_show_themselves_with_units_and_meanings(short, tmp_path):
+    flight = airflock.open(short, seed=3, device="python")
+    assert "nothing is flown yet" in flight._repr_html_()
+    flight.advance(0.5).push([1, 2], [1.0, 0.0]).remove(3)
+    page = flight._repr_html_()
+    assert "vasarhelyi_2018/4ms, seed 3: 0.5 of 1 s, 4 agents</b> (1 × push, 1 × remove, 1 absent)" in page
+    speed = flight.scores()["phi_vel"]
+    assert f"<td>phi_vel</td><td>{speed:.4g}</td><td>m/s</td><td>mean speed</td>" in page
+    assert repr(flight.snapshot()) == "<Snapshot of vasarhelyi_2018/4ms, seed 3, at 0.5 s>"
+    assert "inf" not in page and all(f"<td>{name}</td>" in page for name in flight.scores())
+
+    study = load_study("vasarhelyi_2018/6ms")
+    assert repr(study).startswith("<Study of vasarhelyi_2018/6ms: 11 parameters for fitness, 150 generations of 100 ")
+    assert "<td>model.p_rep</td><td>0.01 … 0.5</td><td>1/s</td><td>linear</td>" in study._repr_html_()
+
+    toy, executor = toys.study(), InProcess(toys.bowl, 1)
+    (tmp_path / "a").mkdir()
+    with Store(tmp_path / "a") as store:
+        found = conclude(toy, store, executor, search(toy, store, executor), tmp_path / "a")
+    executor.close()
+    assert repr(found).startswith(f"<Result {tmp_path / 'a'}: ") and f"on {found.seeds} fresh seeds>" in repr(found)
+    for key, value in found.parameters.items():
+        assert f"<td>{key}</td><td>{value:.4g}</td><td>" in found._repr_html_()

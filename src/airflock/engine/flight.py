@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from airflock.core.view import View
-from airflock.engine import failure
+from airflock.engine import failure, portrait
 from airflock.engine.acting import Acting
 from airflock.engine.course import Course
 from airflock.engine.look import view
@@ -72,6 +72,10 @@ class Flight(Acting):
         scenario = self.scenario
         flown = f"{self.time:g} of {scenario.flight.duration:g} s"
         return f"<Flight {scenario.name}, seed {self.seed}: {flown}, {scenario.agents} agents>"
+
+    def _repr_html_(self) -> str:
+        """Where it stands and its scores so far, for a notebook."""
+        return portrait.html(self)
 
     @property
     def ready(self) -> bool:

@@ -45,6 +45,11 @@ class Snapshot:
     sampled: tuple[NDArray[Any], ...]
     due: tuple[Onset, ...]
 
+    def __repr__(self) -> str:
+        """Of which flight it is, and when."""
+        time = self.step * self.scenario.flight.dt
+        return f"<Snapshot of {self.origin[0].name}, seed {self.origin[1]}, at {time:g} s>"
+
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled. Raises FlightError where another process could not import a law."""
         sendable(self.origin[0], self.scenario)

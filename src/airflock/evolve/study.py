@@ -11,6 +11,7 @@ from typing import Any
 
 from airflock import __version__
 from airflock.errors import ScenarioError, StudyError
+from airflock.evolve import portrait
 from airflock.evolve.fitness import Objective
 from airflock.evolve.objective_table import read_limits, read_objectives
 from airflock.evolve.search_table import ALONE, SEED_BITS, Search, search_faults
@@ -47,6 +48,13 @@ class Study:
     over_scenarios: str = "mean"
     labels: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<{portrait.study_sentence(self)}>"
+
+    def _repr_html_(self) -> str:
+        """A table of what varies, for a notebook."""
+        return portrait.study_html(self)
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:

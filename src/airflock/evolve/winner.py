@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from airflock import atomic
 from airflock.errors import StudyError
-from airflock.evolve import tables
+from airflock.evolve import portrait, tables
 from airflock.evolve.folder import plain, write
 from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import dead
@@ -72,6 +72,13 @@ class Result:
     dead: str = ""
     scenarios: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     limits: tuple[Mapping[str, Any], ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<{portrait.result_sentence(self)}>"
+
+    def _repr_html_(self) -> str:
+        """A table of the winner's parameters, for a notebook."""
+        return portrait.result_html(self)
 
     def document(self) -> dict[str, Any]:
         """The result as plain values, for result.toml and --json."""

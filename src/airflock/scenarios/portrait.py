@@ -1,5 +1,6 @@
 """A scenario for a person to read: one sentence, and a table for notebooks."""
 
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -40,17 +41,27 @@ def changed(record: object) -> list[tuple[str, str, str]]:
     return rows
 
 
+def number(value: float) -> str:
+    """A number with four digits, as tables show it."""
+    return f"{value:.4g}"
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in HTML, of plain texts."""
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
 def html(scenario: "Scenario") -> str:
     """A table with everything that differs from the defaults, section by section, and the notes."""
     records = {"top": scenario.flight, "model": scenario.parameters, "body": scenario.body}
     records |= {name: getattr(scenario, name) for name in SECTIONS if name != "body"}
     rows = [
-        f"<tr><td>{escape(name if section == 'top' else f'{section}.{name}')}</td><td>{escape(value)}</td>"
-        f"<td>{escape(meaning)}</td></tr>"
+        (name if section == "top" else f"{section}.{name}", value, meaning)
         for section, record in records.items()
         for name, value, meaning in changed(record)
     ]
     notes = "".join(f"<li>{escape(note)}</li>" for note in scenario.notes)
-    heads = "<tr><th>changed key</th><th>value</th><th>meaning</th></tr>"
-    table = f"<table><thead>{heads}</thead><tbody>{''.join(rows)}</tbody></table>"
-    return f"<p><b>{escape(sentence(scenario))}</b></p>{table}{f'<ul>{notes}</ul>' if notes else ''}"
+    keys = table(("changed key", "value", "meaning"), rows)
+    return f"<p><b>{escape(sentence(scenario))}</b></p>{keys}{f'<ul>{notes}</ul>' if notes else ''}"
