@@ -147,3 +147,45 @@ def test_tables_of_px4_with_origins_of_their_own_meet_and_invalid_rows_are_left_
     found = airflock.load_tracks([tmp_path / "a.csv", tmp_path / "b.csv"], same_clock=True, accept=["down"])
     np.testing.assert_allclose(values(found, who=0), values(found, who=1), atol=1e-3)
     assert found.sizes["time"] == 260
+
+
+def test_estimates_and_fixes_of_ardupilot_as_tables_are_read_by_their_own_names():
+    """The columns of mavlogdump.py --format csv --types XKF1, and of GPS, whose U (used) is no height."""
+    ned, speed = motion()
+    fields = dict(zip(("VN", "VE", "VD", "PN", "PE", "PD"), np.hstack([speed, ned]).T, strict=True))
+    for time in ({"timestamp": 1.7e9 + TIME}, {"TimeUS": 1e6 * TIME}):
+        found = airflock.load_tracks(pd.DataFrame({**time, "C": 0, "Roll": 0.0, **fields, "GX": 0.0}), precision=64)
+        np.testing.assert_allclose(values(found), enu(ned), atol=1e-6)
+        np.testing.assert_allclose(values(found, "velocity"), enu(speed), atol=1e-6)
+    told = []
+    fix = {"Lat": 47.5 + ned[:, 0] / 111_200.0, "Lng": 19.0 + 0.0 * TIME, "Alt": 120.0, "Spd": 5.0, "U": 1}
+    found = airflock.load_tracks(pd.DataFrame({"TimeUS": 1e6 * TIME, **fix}), say=told.append)
+    assert np.ptp(values(found)[:, 1]) == pytest.approx(20.0, rel=1e-2) and np.ptp(values(found)[:, 2]) < 1e-3
+    assert not [note for note in told if "without a unit" in note]
+
+
+def test_a_log_of_ardupilot_without_positions_says_what_to_do(tmp_path):
+    pytest.importorskip("pymavlink")
+    (tmp_path / "noise.bin").write_bytes(b"no log at all" * 100)
+    (tmp_path / "old.log").write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n")
+    ned, speed = motion()
+    write_dataflash(tmp_path / "whole.bin", TIME, ned, speed, speed)
+    whole = (tmp_path / "whole.bin").read_bytes()
+    (tmp_path / "plane.bin").write_bytes(whole[:89] if whole[:2] == b"\xa3\x95" else whole)
+    for name, said in (
+        ("noise.bin", "is no DataFlash log of ArduPilot"),
+        ("old.log", "of ArduPilot give the .bin that it was made from"),
+        ("plane.bin", "mavlogdump.py --format csv --types XKF1 plane.bin > plane.csv"),
+    ):
+        with pytest.raises(RecordingError) as fault:
+            airflock.load_tracks(tmp_path / name)
+        assert said in str(fault.value) and "\n" not in str(fault.value)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_drone_that_flies_along_one_axis_does_not_jump(axis, seed):
+    """Half of its steps are nothing, which says nothing of the other half."""
+    place = np.random.default_rng(seed).normal(0.0, 1e-5, (300, 2))
+    place[:, axis] += 10.0 * np.sin(0.5 * TIME)
+    table = {"t": TIME, "Lat": 47.5 + place[:, 0] / 111_200.0, "Lng": 19.0 + place[:, 1] / 75_000.0}
+    assert airflock.load_tracks(pd.DataFrame(table)).sizes["time"] == 300

@@ -123,6 +123,9 @@ def _recognised(found: Layout, columns: Sequence[str], options: Options) -> None
         found.datum = told.datum or found.datum
         if told.target in POSITION and not told.unit and not options.unit:
             unsaid.append(column)
+    if {"lat", "lon", "alt", "z"} <= set(found.trees) and "z" not in options.map and "x" not in found.trees:
+        unsaid = [column for column in unsaid if column != found.labels["z"]]  # such as U, used, of ArduPilot's GPS
+        _drop(found, "z")
     if faults:
         raise RecordingError("\n".join(faults))
     if unsaid:

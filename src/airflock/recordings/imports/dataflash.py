@@ -14,6 +14,7 @@ from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findi
 from airflock.recordings.isolated import Opening
 from airflock.recordings.reader import PARTS
 
+HEAD = b"\xa3\x95"  # of each message; source: ArduPilot, AP_Logger/LogStructure.h
 GPS_EPOCH = 315964800.0  # 6 January 1980 in seconds since 1970
 LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so that it cannot part them
 
@@ -21,10 +22,16 @@ LEAP_SECONDS = 18.0  # GPS ahead of UTC since 2017; the same for all drones, so 
 def read_dataflash(path: Path, options: Options, findings: Findings) -> list[Track]:
     """Track of a DataFlash log: PSCN, PSCE, PSCD (position, velocity, commanded velocity), ORGN and GPS."""
     _need_pymavlink(path)
+    with path.open("rb") as file:
+        if file.read(len(HEAD)) != HEAD:
+            raise RecordingError(f"{path}: is no DataFlash log of ArduPilot: it does not begin with its mark, A3 95")
     told = Opening(path, how="dataflash").answer(options.done)
     rows = {part: told[part].values for part in PARTS if part in told}
     if "PSCN" not in rows or "PSCE" not in rows:
-        raise RecordingError(f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later)")
+        raise RecordingError(
+            f"{path}: has no PSCN and PSCE (position control, Copter 4.2 and later); write its estimates as a table: "
+            f"mavlogdump.py --format csv --types XKF1 {path.name} > {path.stem}.csv"
+        )
     found = _joined(rows, path)
     found.clock, found.datum = "boot", "amsl"
     if "ORGN" in told:

@@ -34,8 +34,10 @@ for _axis, (_place, _speed, _wish, _words) in enumerate(
     ALIASES[_speed] = tuple(f"{p}{w}" for p in ("v", "v_", "vel_", "velocity_", "speed_") for w in _words)
     wishes = ("c", "c_", "cmd_", "cmd_v", "command_", "command_v", "target_v", "target_vel_", "set_v", "sp_v", "tv")
     ALIASES[_wish] = tuple(f"{p}{w}" for p in wishes for w in _words)
+for _axis, _field in (("x", "pe"), ("y", "pn")):  # of ArduPilot's XKF1, beside PD, VN, VE and VD
+    ALIASES[_axis] = (*ALIASES[_axis], _field)
 DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": "vz", "vel_d": "vz", "vel_down": "vz",
-        "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
+        "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
 DATUMS = {"height_above_msl": "amsl", "amsl": "amsl", "height_above_ellipsoid": "ellipsoid", "relative_alt": "home",
           "agl": "ground"}  # fmt: skip
 _TARGET = {alias: target for target, known in ALIASES.items() for alias in known}
@@ -58,6 +60,8 @@ def split(header: str) -> tuple[str, str]:
     if found:
         return _plain(found[1]), found[2].strip().lower()
     plain = _plain(text)
+    if plain == "timeus":  # as ArduPilot writes it
+        return "time", "us"
     if plain not in _TARGET:
         for unit in _SUFFIXES:
             if plain.endswith(f"_{unit}") and len(plain) > len(unit) + 1:

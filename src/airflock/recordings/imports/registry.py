@@ -37,6 +37,8 @@ def read(path: Path, options: Options, findings: Findings) -> list[Track]:
     if ending in (".pkl", ".pickle"):
         arrays.refuse_pickle(path)
     if ending not in READERS:
+        if ending == ".log":
+            raise RecordingError(f"{path}: .log: unknown format; of ArduPilot give the .bin that it was made from")
         known = ", ".join(READERS)
         raise RecordingError(f"{path}: {ending or 'a name without an ending'}: unknown format; known: {known}")
     with from_outside(path, RecordingError):  # libraries raise whatever they happen to where a file is damaged
