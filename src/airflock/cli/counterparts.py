@@ -38,8 +38,8 @@ COUNTERPARTS: dict[str, Counterpart] = {
     "score": Counterpart(
         "airflock.score(recording)", "score",
         {
-            "files": "what", "changes": "settings", **TABLE, "series": "airflock.over_time", "aero": "aero",
-            "groups": "groups", "body_length": "body_length",
+            "files": "what", "changes": "settings", "trust": "trust", **TABLE, "series": "airflock.over_time",
+            "aero": "aero", "groups": "groups", "body_length": "body_length",
         },
     ),
     "sweep": Counterpart(

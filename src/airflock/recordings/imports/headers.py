@@ -34,8 +34,7 @@ for _axis, (_place, _speed, _wish, _words) in enumerate(
     ALIASES[_speed] = tuple(f"{p}{w}" for p in ("v", "v_", "vel_", "velocity_", "speed_") for w in _words)
     wishes = ("c", "c_", "cmd_", "cmd_v", "command_", "command_v", "target_v", "target_vel_", "set_v", "sp_v", "tv")
     ALIASES[_wish] = tuple(f"{p}{w}" for p in wishes for w in _words)
-for _axis, _field in (("x", "pe"), ("y", "pn")):  # of ArduPilot's XKF1, beside PD, VN, VE and VD
-    ALIASES[_axis] = (*ALIASES[_axis], _field)
+ALIASES |= {"x": (*ALIASES["x"], "pe"), "y": (*ALIASES["y"], "pn")}  # of ArduPilot's XKF1, beside PD, VN, VE, VD
 DOWN = {"down": "z", "pos_d": "z", "pos_down": "z", "position_down": "z", "vd": "vz", "vel_d": "vz", "vel_down": "vz",
         "pd": "z", "cmd_d": "cz", "cmd_vd": "cz", "cmd_down": "cz"}  # fmt: skip
 DATUMS = {"height_above_msl": "amsl", "amsl": "amsl", "height_above_ellipsoid": "ellipsoid", "relative_alt": "home",
