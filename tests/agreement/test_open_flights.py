@@ -435,6 +435,9 @@ def test_what_is_done_to_several_agents_is_what_is_done_to_each(precision):
     assert [event.data["agent"] for event in once.events[1:]] == [agents] * 3
     again = airflock.open(small, 2, precision=precision, device="python", events=[e.plain() for e in once.events])
     assert np.array_equal(again.advance(1.2).state, once.state, equal_nan=True)
+    fewer, one_by_one = start.branch().remove([4, 1]), start.branch().remove(4).remove(1)
+    assert np.array_equal(fewer.advance(0.5).state, one_by_one.advance(0.5).state, equal_nan=True)
+    assert fewer.present.tolist() == [True, False, True, True, False, False]
     pushed = start.branch().push((1, 2), [3.0, -2.0])  # one velocity for both
     assert np.allclose((pushed.state - start.state)[2:, :5], np.outer([3.0, -2.0], [0, 1, 1, 0, 0]))
 

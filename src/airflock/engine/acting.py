@@ -128,16 +128,16 @@ class Acting(Standing):
         data = {"kind": kind, **given, **numbers}
         return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", data), wait)
 
-    def remove(self, agent: int, reason: str = "") -> Self:
-        """Let an agent drop out: it has landed or failed. From now on nobody meets, hears, feels or counts it.
+    def remove(self, agent: int | Sequence[int], reason: str = "") -> Self:
+        """Let an agent, or several, drop out: landed or failed. From now on nobody meets, hears, feels or counts them.
 
         reason : for the list of events
         """
-        number = self._there(agent)
+        numbers = self._those(agent)
         self._course.begin()
         self._course.let_come_and_go()
-        leave(self._state, [number])
-        self._course.note("remove", agent=number, **({"reason": str(reason)} if reason else {}))
+        leave(self._state, numbers)
+        self._course.note("remove", agent=_said(agent, numbers), **({"reason": str(reason)} if reason else {}))
         return self
 
     def add(self, agent: int, position: Any, velocity: Any = None) -> Self:

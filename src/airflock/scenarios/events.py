@@ -53,7 +53,7 @@ def vectors(what: str, given: Any, count: int, dimensions: int, unit: str) -> li
     if not each:
         return vector(what, rows, dimensions, unit)
     if len(rows) != count:
-        raise FlightError(f"{what}: {len(rows)} rows for {count} agents; give one for all, or one row for each")
+        raise FlightError(f"{what}: {len(rows)} rows for {count} agents; give one for all, or (agent, axis)")
     return [vector(f"{what}[{number}]", row, dimensions, unit) for number, row in enumerate(rows)]
 
 
