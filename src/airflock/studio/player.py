@@ -5,7 +5,8 @@ from time import perf_counter
 from typing import Any
 
 from airflock.engine import Snapshot
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, reason
+from airflock.spelling import raised
 from airflock.studio.flights import Flights
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
@@ -95,12 +96,19 @@ class Player(Flights):
         return True
 
     def _safely(self, action: Callable[[], None]) -> None:
-        """Do something; a fault of the user's is a note on the page and a line in the terminal, and nothing else."""
+        """Do something; what goes wrong is a note on the page and a line in the terminal, and the flight goes on."""
         try:
             action()
         except AirflockError as fault:
-            self.note = str(fault)
-            self.fault(self.note)
+            self._tell(str(fault))
+        except OSError as fault:  # a full disk, a folder that is gone
+            self._tell(": ".join(part for part in (fault.filename, reason(fault)) if part))
+        except Exception as fault:  # the last resort: somebody's flight must not be lost to one press of a button
+            self._tell(f"unexpected {raised(fault)}; please report it")
+
+    def _tell(self, line: str) -> None:
+        self.note = line
+        self.fault(line)
 
     def fly(self, steps: int) -> bool:
         """Fly so many steps, and keep a moment where one is due; a flight that fails stops and says why."""
