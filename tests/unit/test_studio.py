@@ -607,6 +607,18 @@ def test_an_axis_is_told_only_where_a_round_end_is_passed():
     assert handle.told < 30
 
 
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=50), st.integers(1, 50))
+def test_a_chart_with_missing_values_is_told_ends_that_hold_the_others(values, missing):
+    """B has no value of its own before it was changed: nan ends the axis of the page nowhere, and nothing is drawn."""
+    time = np.arange(float(len(values) + missing))
+    first, second = np.array([*values, *values[:1] * missing]), np.array([math.nan] * missing + values)
+    assert charts.told_ends((time, first)) == {"x": charts.ends(time)}
+    low, high = charts.told_ends((time, first, second))["y"]
+    assert low < high and low <= min(values) + 1e-6 * (high - low) and max(values) <= high + 1e-6 * (high - low)
+    low, high = charts.told_ends((time, np.full(len(time), math.nan)))["y"]
+    assert low < high
+
+
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))
 def test_shares_of_a_histogram_add_up_to_one(values):
     made = measures.Histogram(10.0)

@@ -22,17 +22,27 @@ def ends(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.floor(low / part + 1e-9) * part), float(np.ceil(high / part - 1e-9) * part)
 
 
+def told_ends(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[float, float]]:
+    """Ends of the axes that a page must be told: that of x always, that of y where a value is missing (nan)."""
+    found = {"x": ends(columns[0])}
+    values = np.concatenate(columns[1:]) if len(columns) > 1 else np.zeros(0)
+    known = np.isfinite(values)
+    return found if known.all() else {**found, "y": ends(np.sort(values[known]))}
+
+
 class Chart:
     """One chart of viser, whose axis is told.
 
     Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
     hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
-    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed.
+    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed. The other
+    axis scales itself as long as no value is missing; with one that is not a number it would end nowhere, and nothing
+    would be drawn at all.
     """
 
     def __init__(self, handle: Any):
         self._handle = handle
-        self._ends: tuple[float, float] | None = None
+        self._ends: dict[str, tuple[float, float]] = {}
 
     @property
     def data(self) -> tuple[NDArray[np.float64], ...]:
@@ -41,9 +51,9 @@ class Chart:
 
     @data.setter
     def data(self, columns: tuple[NDArray[np.float64], ...]) -> None:
-        if (told := ends(columns[0])) != self._ends:
+        if (told := told_ends(columns)) != self._ends:
             self._ends = told
-            self._handle.scales = {"x": uplot.Scale(time=False, range=told)}
+            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in told.items()}
         self._handle.data = columns
 
     def remove(self) -> None:
