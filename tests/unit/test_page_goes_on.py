@@ -1,13 +1,16 @@
 """A page goes on: whatever a hand on it asks for, the flight of everybody who looks is not lost."""
 
 import errno
+from types import SimpleNamespace
 
 import pytest
 
 from airflock import atomic
 from airflock.engine import Flight
 from airflock.studio.opening import Opening
+from airflock.studio.panel import Panel
 from airflock.studio.player import Player
+from airflock.studio.playing import Playing
 
 PRESET = "vasarhelyi_2018/4ms"
 
@@ -73,3 +76,32 @@ def test_what_nobody_foresaw_is_told_and_the_flight_goes_on(player, monkeypatch)
     monkeypatch.setattr(Player, "_open", breaks)
     (line,) = asked(player, lambda: player.reset(seed=8))
     assert line == "unexpected ZeroDivisionError: division by zero; please report it" and player.seed == 3
+
+
+class Fields:
+    """Stands for viser's: a number field that tells what a client typed."""
+
+    def add_number(self, label, value, **_):
+        field = SimpleNamespace(value=value)
+        field.on_update = lambda told: setattr(field, "told", told)
+        return field
+
+
+def typed(field, value):
+    field.value = value
+    field.told(SimpleNamespace(target=field, client=object()))
+
+
+def test_a_number_beyond_the_ends_of_its_field_is_not_heard():
+    heard = []
+    field = Panel(SimpleNamespace(gui=Fields())).number("agents", 10, 1, 1000, heard.append)
+    for value in (25, 999_999, 0, -3, 1000, 1):
+        typed(field, value)
+    assert heard == [25, 1000, 1]
+
+
+def test_a_field_shows_what_flies_where_another_number_is_refused(player):
+    room = object.__new__(Playing)
+    room.player, room.seed, room.agents = player, SimpleNamespace(value=3), SimpleNamespace(value=1000)
+    (line,) = asked(player, lambda: room.reset(agents=1000))
+    assert "do not fit" in line and room.agents.value == 5
