@@ -2,9 +2,11 @@
 
 import math
 import re
+import shlex
 import socket
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,10 +40,20 @@ from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Origin, Side, value_of
-from airflock.studio.tuning import pair
+from airflock.studio.tuning import EXAMPLE, pair
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
+LAW = """
+from dataclasses import dataclass
+import airflock
+COMMAND = "velocity"
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    pull: float = airflock.quantity(1.0, "m/s", low=0.0, high=9.0, meaning="how fast it flies")
+def decide(own, p):
+    return p.pull * own.hx, p.pull * own.hy, 0.0
+"""
 
 
 @pytest.fixture
@@ -118,11 +130,34 @@ def test_any_key_is_set_as_on_the_command_line(interpreted, player):
     scenario = player.scenario
     assert pair("delay = 400 ms", scenario) == ("radio.delay", "400 ms")
     assert pair("goals.points=[[0, 5]]", scenario) == ("goals.points", [[0, 5]])
-    for wrong, word in (("p_rap = 1", "p_rep"), ("p_rep", "KEY = VALUE"), ("", "KEY = VALUE"), ("= 3", "KEY = VALUE")):
+    for wrong, word in (
+        ("p_rap = 1", "p_rep"), ("p_rep", "KEY = VALUE"), ("", "KEY = VALUE"), ("= 3", "KEY = VALUE"),
+        ("agents = 5", "under Play"), ("dt = 0.1", "motion step"), ("duration = 5", "scenario file"),
+    ):  # fmt: skip
         with pytest.raises(ScenarioError, match=word):
             pair(wrong, scenario)
     player.change(*pair("delay = 400 ms", scenario))
     assert player.scenario.radio.delay == 0.4 and "--set 'radio.delay=400 ms'" in player.command
+
+
+def test_the_example_in_the_hint_of_any_key_can_be_set(interpreted, player):
+    for example in re.findall(r"[a-z.]+ = .*?(?=, or |$)", EXAMPLE):
+        player.change(*pair(example, player.scenario))
+    assert player.scenario.radio.delay == 0.4 and player.scenario.goals.points == ((0.0, 50.0, 0.0),)
+
+
+@pytest.mark.parametrize("name", ["my flock's $(x); é.toml", "-rf.toml", "-h"])
+def test_the_command_that_opens_a_scenario_again_is_safe_to_paste(interpreted, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_bytes(presets()[PRESET].read_bytes())
+    law = tmp_path / "a law.py"
+    law.write_text(LAW)
+    made = Player(name, {"agents": 3}, seed=5, law=str(law), trust=True)
+    made.change("radio.delay", "400 ms")
+    words = shlex.split(made.command)
+    assert words[:2] == ["airflock", "watch"] and Path(words[2]) == Path(name) and not words[2].startswith("-")
+    assert words[3:6] == ["--law", str(law), "--trust"]
+    assert words[6:] == ["--set", "agents=3", "--set", "radio.delay=400 ms", "--seed", "5"]
 
 
 @pytest.mark.parametrize(
