@@ -71,7 +71,7 @@ def move(cx, cy, cz, b):
 """
 
 
-@pytest.mark.parametrize("name", ["my-law", "a law", "3law", "c'est \"ça\"; #", "class", "v1.2"])
+@pytest.mark.parametrize("name", ["my-law", "a law", "3law", 'c\'est "ça"; #', "class", "v1.2"])
 def test_a_file_of_any_name_flies_as_one_of_a_plain_name(tmp_path, name):
     """Its name stands in the text of the driver, where a blank or a hyphen ended it."""
     for stem in ("plain", name):

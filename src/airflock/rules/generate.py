@@ -20,8 +20,8 @@ from airflock.errors import RuleError
 from airflock.rules import law
 from airflock.rules.integers import free, tree_of
 from airflock.rules.nodes import walk
-from airflock.spelling import as_name
 from airflock.rules.unrolled import Unrolled
+from airflock.spelling import as_name
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
