@@ -647,11 +647,24 @@ def test_a_chart_with_missing_values_is_told_ends_that_hold_the_others(values, m
     """B has no value of its own before it was changed: nan ends the axis of the page nowhere, and nothing is drawn."""
     time = np.arange(float(len(values) + missing))
     first, second = np.array([*values, *values[:1] * missing]), np.array([math.nan] * missing + values)
-    assert charts.told_ends((time, first)) == {"x": charts.ends(time)}
     low, high = charts.told_ends((time, first, second))["y"]
     assert low < high and low <= min(values) + 1e-6 * (high - low) and max(values) <= high + 1e-6 * (high - low)
     low, high = charts.told_ends((time, np.full(len(time), math.nan)))["y"]
     assert low < high
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0.0, 1e-6), st.integers(1, 50))
+def test_a_chart_of_equal_values_is_told_ends_apart_from_each_other(value, share, count):
+    """Fish fly at 3 m/s but for rounding; ends that the page found itself were the same number, and it hung."""
+    time = np.arange(float(count))
+    values = value * (1.0 + share * np.linspace(-1.0, 1.0, count))
+    low, high = charts.told_ends((time, values, values[::-1]))["y"]
+    assert low - 1e-12 <= values.min() and values.max() <= high + 1e-12 and high - low >= max(abs(value), 1e-12)
+
+
+def test_a_page_scales_the_values_of_a_chart_itself_where_it_can():
+    time = np.arange(30.0)
+    assert charts.told_ends((time, time**2, np.sqrt(time))) == {"x": charts.ends(time)}
 
 
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))
