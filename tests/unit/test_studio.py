@@ -406,6 +406,28 @@ def test_only_the_token_or_its_cookie_opens_the_page():
         assert door.admitted(path, cookie, name, token)[0] is False
 
 
+@pytest.mark.parametrize("path", ["//[", "//[v1.x]:1]/?token=abc", "/?token=%ff", "", "?", "//a:b:c/?token"])
+def test_what_is_no_address_is_turned_away(path):
+    assert door.admitted(path, "airflock_8080=abd", "airflock_8080", "abc") == (False, False)
+    assert door.admitted("/", "airflock_8080=abc", "airflock_8080", "abc", "http://[", "localhost:8080")[0] is False
+
+
+def test_a_page_of_another_port_cannot_use_the_cookie():
+    given = "/", "airflock_8080=abc", "airflock_8080", "abc"
+    assert door.admitted(*given, "http://localhost:8080", "localhost:8080") == (True, False)
+    for origin in ("http://localhost:9999", "http://evil.example", "null"):
+        assert door.admitted(*given, origin, "localhost:8080")[0] is False
+
+
+@pytest.mark.parametrize("host", ["256.1.1.1", "::1", "192.0.2.1"])
+def test_a_host_that_is_not_this_machine_is_named_in_one_line(host):
+    from airflock.studio.view import View
+
+    for port in (0, 8080):
+        with pytest.raises(StudioError, match=f"host = {re.escape(host)}: .*; give"):
+            View(host, port, "page")
+
+
 def test_a_port_in_use_is_one_line():
     from airflock.studio.view import View
 
