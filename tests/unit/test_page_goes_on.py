@@ -105,3 +105,37 @@ def test_a_field_shows_what_flies_where_another_number_is_refused(player):
     room.player, room.seed, room.agents = player, SimpleNamespace(value=3), SimpleNamespace(value=1000)
     (line,) = asked(player, lambda: room.reset(agents=1000))
     assert "do not fit" in line and room.agents.value == 5
+
+
+def test_the_end_of_the_longest_flight_is_told(player, monkeypatch):
+    assert not player.over and player.status == ""
+    monkeypatch.setattr("airflock.studio.side.LONGEST", 1.0)
+    player.reset()
+    player.fly(100)
+    then = player.flight.step
+    assert player.tick(1.0) is False and player.flight.step == then
+    assert player.over and player.status == "no page flies longer than 1 s; Reset begins anew"
+    player.back(0.5)
+    assert not player.over and player.time == pytest.approx(0.5)
+
+
+def test_whoever_goes_back_further_than_is_kept_is_told_so(player):
+    for _ in range(10):
+        player.fly(100)
+    player.back(3.0)
+    assert player.note == "back at t = 3 s"
+    player.fork()
+    player.fly(20)
+    player.join()
+    player.back(1.0)
+    assert player.note == "no earlier moment is kept" and player.time == pytest.approx(3.2)
+    player.fly(100)
+    player.fly(100)
+    player.back(1.0)
+    assert player.note == "back at t = 3.2 s; no earlier moment is kept"
+
+
+def test_the_command_holds_every_digit(player):
+    number = 0.1234567890123456
+    player.change("model.p_rep", number)
+    assert f"--set model.p_rep={number!r}" in player.command and "agents=5" in player.command

@@ -61,7 +61,14 @@ class Player(Flights):
             return self.failure
         if self.compiling:
             return "compiling … (flying interpreted meanwhile, with other rounding)"
+        if self.over:
+            return f"no page flies longer than {self.time:g} s; Reset begins anew"
         return "compiling …" if any(side.flight.waiting for side in self.sides) else self.note
+
+    @property
+    def over(self) -> bool:
+        """Whether the longest time that a page flies has been reached."""
+        return any(side.flight.over for side in self.sides)
 
     # ------------------------------------------------------------------------------------------------ playing
 
@@ -78,7 +85,7 @@ class Player(Flights):
         asked = self._asked.answer(self._safely)
         if self.compiling and all(side.compiled for side in self.sides):
             asked = self._settled() or asked
-        if self.paused or self.failure or any(side.flight.over for side in self.sides):
+        if self.paused or self.failure or self.over:
             return asked
         steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
         if not steps:
@@ -144,16 +151,19 @@ class Player(Flights):
         time = min(max(time, 0.0), self.time)
         moment = self.moments.at(time)
         if moment is None:
+            self.note = "no earlier moment is kept"
             return
         del self.sides[len(moment) :]
         self.hand = min(self.hand, len(self.sides) - 1)
+        failed = self.failure
         for side, kept in zip(self.sides, moment, strict=True):
-            if self.failure:
+            if failed:
                 side.restore(kept)
             else:
                 side.again(kept, time)
         self.moments.forget_after(time + 1e-6)
-        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s", True
+        least = "; no earlier moment is kept" if self.time > time + 1e-6 and not failed else ""
+        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s{least}", True
 
     # ---------------------------------------------------------------------------------------------- comparing
 
