@@ -1,5 +1,7 @@
 """Spelling: which of the known words was meant by one that is not known."""
 
+import re
+import unicodedata
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -33,3 +35,13 @@ def raised(fault: BaseException) -> str:
     if isinstance(fault, AttributeError) and fault.name is not None:
         line += meant(fault.name, (name for name in dir(fault.obj) if not name.startswith("_")), lead="; ")
     return line
+
+
+def as_name(text: str) -> str:
+    """A text as a name in a program: whatever no name may hold becomes _.
+
+    >>> as_name("my-law 2"), as_name("3law"), as_name("couzin_2002")
+    ('my_law_2', '_3law', 'couzin_2002')
+    """
+    name = re.sub(r"\W", "_", unicodedata.normalize("NFKC", text))
+    return name if name.isidentifier() else f"_{name}"

@@ -211,6 +211,8 @@ def test_sliders_of_a_group_change_that_group_alone(browser, tab):
         for folder, number in (("group heavy: body", "tau"), ("group repelled: model", "p_rep")):
             tab.get_by_text(folder, exact=True).click()
             slider = tab.locator(f'[role=slider][aria-label*="{number}"]').last
+            slider.wait_for(timeout=PATIENCE * 1000)
+            tab.wait_for_timeout(1000)  # the folder unfolds
             slider.focus(timeout=PATIENCE * 1000)
             slider.press("ArrowRight")
         keys = {"groups.heavy.body.tau", "groups.repelled.model.p_rep"}

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+import airflock
 from airflock.errors import RuleError, ScenarioError
 from airflock.scenarios.own_code import own_module
 
@@ -37,3 +38,48 @@ def test_a_fault_of_its_own_names_the_line_and_the_word_that_was_meant(tmp_path)
         own_module(path, "model.kind", trust=True)
     said = "AttributeError: module 'airflock' has no attribute 'quantiti'; did you mean quantity?"
     assert str(fault.value) == f"{path}:5: {said}"
+
+
+LAW = """
+from dataclasses import dataclass
+from typing import NamedTuple
+import airflock
+COMMAND = "velocity"
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    pull: float = airflock.quantity(1.0, "m/s", low=0.0, high=9.0, meaning="how fast it flies")
+class Sums(NamedTuple):
+    x: float
+    y: float
+def lean(x):
+    return 0.1 * x
+def neighbour(dx, dy):
+    return Sums(lean(dx), lean(dy))
+def decide(own, sums, p):
+    return p.pull * own.hx + sums.x, p.pull * own.hy + sums.y, 0.0
+"""
+BODY = """
+from dataclasses import dataclass
+import airflock
+ACCEPTS = "velocity"
+INTEGRATION = "new"
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    gain: float = airflock.quantity(0.5, "1", low=0.0, high=1.0, meaning="share of the command")
+def move(cx, cy, cz, b):
+    return b.gain * cx, b.gain * cy, b.gain * cz
+"""
+
+
+@pytest.mark.parametrize("name", ["my-law", "a law", "3law", 'c\'est "ça"; #', "class", "v1.2"])
+def test_a_file_of_any_name_flies_as_one_of_a_plain_name(tmp_path, name):
+    """Its name stands in the text of the driver, where a blank or a hyphen ended it."""
+    for stem in ("plain", name):
+        (tmp_path / f"{stem}.py").write_text(LAW)
+        (tmp_path / f"{stem} body.py").write_text(BODY)
+    flown = []
+    for stem in ("plain", name):
+        settings = {"agents": 4, "body.kind": str(tmp_path / f"{stem} body.py")}
+        scenario = airflock.load("vasarhelyi_2018/4ms", settings, tmp_path / f"{stem}.py", trust=True)
+        flown.append(airflock.open(scenario, 7, device="python").advance(steps=120).state)
+    assert flown[0].std() > 0.0 and (flown[0] == flown[1]).all()

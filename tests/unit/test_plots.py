@@ -5,6 +5,7 @@ import gc
 import json
 import math
 import sys
+import warnings
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -33,6 +34,7 @@ from airflock.plots.series import Pen, rotations, series
 from airflock.plots.trajectories import trajectories
 from airflock.plots.transfer import transfer
 from airflock.plots.video import frame_count, video
+from airflock.recordings.files import save
 from airflock.recordings.layout import dataset
 from airflock.recordings.scores import courses, scenario_of
 from airflock.scenarios.families import Given
@@ -609,3 +611,26 @@ def test_a_picture_of_panels_needs_axes_of_a_grid():
 def test_a_misspelled_kind_of_picture_is_guessed():
     with pytest.raises(AirflockError, match="did you mean series"):
         airflock.plot("vasarhelyi_2018/4ms", "seriez")
+
+
+@pytest.mark.parametrize(
+    ("verb", "rest", "said"),
+    [
+        ("plot", ["--kind", "space"], "tracks have no scene"),
+        ("plot", ["--begin", "50"], "window from 50 to 2 s"),
+        ("video", ["--begin", "50"], "window from 50 to 2 s"),
+    ],
+)
+def test_a_fault_of_a_recording_names_its_file(tmp_path, monkeypatch, verb, rest, said):
+    monkeypatch.chdir(tmp_path)
+    tracks = airflock.load_tracks({"t": [0.0, 1.0, 2.0], "id": ["a"] * 3, "x": [0.0, 1.0, 2.0], "y": [0.0, 0.0, 1.0]})
+    save(tracks, "my tracks.nc")
+    fault = CliRunner().invoke(app, [verb, "my tracks.nc", *rest]).exception
+    assert isinstance(fault, RecordingError) and str(fault).startswith("my tracks.nc: ") and said in str(fault)
+
+
+def test_tracks_of_one_frame_are_drawn_without_a_warning():
+    tracks = airflock.load_tracks({"t": [0.0, 0.0], "id": ["a", "b"], "x": [0.0, 1.0], "y": [0.0, 1.0]})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert airflock.plot(tracks).axes

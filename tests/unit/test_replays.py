@@ -79,6 +79,21 @@ def test_close_pairs_become_collisions_once(recording):
     assert len(collisions) == 1 and collisions[0][0] == pytest.approx(50 * period)
 
 
+@pytest.mark.parametrize("axes", ["xy", "xyz"])
+def test_tracks_far_from_their_origin_are_drawn_like_near_ones(axes):
+    """In a grid of maps a flock lies 5,000 km north: on a graphics card its darts had no length any more."""
+    time = np.arange(10.0)
+    columns = {"t": np.tile(time, 2), "id": np.repeat(["a", "b"], 10)}
+    columns |= {axis: np.r_[time, 3.0 * time] + 7.0 * number for number, axis in enumerate(axes)}
+    near = about(airflock.replay(airflock.load_tracks(columns)))
+    far = about(
+        airflock.replay(airflock.load_tracks({**columns, "x": columns["x"] + 2**19, "y": columns["y"] + 2**22}))
+    )
+    assert far["low"] == near["low"] and far["stage"] == near["stage"] and far["quantum"] == near["quantum"]
+    assert near["height"][0] == pytest.approx(7.0 * (len(axes) - 1)) and np.abs(near["low"][:2]).max() < 30.0
+    assert near["stage"]["centre"][2] == pytest.approx(14.0 + 13.5 if axes == "xyz" else 0.0)
+
+
 def test_names_cannot_break_out_of_the_page(recording):
     odd = recording.assign_attrs(airflock_name="</script><b>@DATA@ & co")
     page = airflock.replay(odd)

@@ -2,9 +2,11 @@
 
 import math
 import re
+import shlex
 import socket
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,10 +40,20 @@ from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Origin, Side, value_of
-from airflock.studio.tuning import pair
+from airflock.studio.tuning import EXAMPLE, pair
 
 PRESET = "vasarhelyi_2018/4ms"
 FEW = {"agents": 12}
+LAW = """
+from dataclasses import dataclass
+import airflock
+COMMAND = "velocity"
+@dataclass(frozen=True, kw_only=True)
+class Parameters(airflock.Parameters):
+    pull: float = airflock.quantity(1.0, "m/s", low=0.0, high=9.0, meaning="how fast it flies")
+def decide(own, p):
+    return p.pull * own.hx, p.pull * own.hy, 0.0
+"""
 
 
 @pytest.fixture
@@ -118,11 +130,34 @@ def test_any_key_is_set_as_on_the_command_line(interpreted, player):
     scenario = player.scenario
     assert pair("delay = 400 ms", scenario) == ("radio.delay", "400 ms")
     assert pair("goals.points=[[0, 5]]", scenario) == ("goals.points", [[0, 5]])
-    for wrong, word in (("p_rap = 1", "p_rep"), ("p_rep", "KEY = VALUE"), ("", "KEY = VALUE"), ("= 3", "KEY = VALUE")):
+    for wrong, word in (
+        ("p_rap = 1", "p_rep"), ("p_rep", "KEY = VALUE"), ("", "KEY = VALUE"), ("= 3", "KEY = VALUE"),
+        ("agents = 5", "under Play"), ("dt = 0.1", "motion step"), ("duration = 5", "scenario file"),
+    ):  # fmt: skip
         with pytest.raises(ScenarioError, match=word):
             pair(wrong, scenario)
     player.change(*pair("delay = 400 ms", scenario))
     assert player.scenario.radio.delay == 0.4 and "--set 'radio.delay=400 ms'" in player.command
+
+
+def test_the_example_in_the_hint_of_any_key_can_be_set(interpreted, player):
+    for example in re.findall(r"[a-z.]+ = .*?(?=, or |$)", EXAMPLE):
+        player.change(*pair(example, player.scenario))
+    assert player.scenario.radio.delay == 0.4 and player.scenario.goals.points == ((0.0, 50.0, 0.0),)
+
+
+@pytest.mark.parametrize("name", ["my flock's $(x); é.toml", "-rf.toml", "-h"])
+def test_the_command_that_opens_a_scenario_again_is_safe_to_paste(interpreted, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_bytes(presets()[PRESET].read_bytes())
+    law = tmp_path / "a law.py"
+    law.write_text(LAW)
+    made = Player(name, {"agents": 3}, seed=5, law=str(law), trust=True)
+    made.change("radio.delay", "400 ms")
+    words = shlex.split(made.command)
+    assert words[:2] == ["airflock", "watch"] and Path(words[2]) == Path(name) and not words[2].startswith("-")
+    assert words[3:6] == ["--law", str(law), "--trust"]
+    assert words[6:] == ["--set", "agents=3", "--set", "radio.delay=400 ms", "--seed", "5"]
 
 
 @pytest.mark.parametrize(
@@ -371,6 +406,28 @@ def test_only_the_token_or_its_cookie_opens_the_page():
         assert door.admitted(path, cookie, name, token)[0] is False
 
 
+@pytest.mark.parametrize("path", ["//[", "//[v1.x]:1]/?token=abd", "/?token=%ff", "", "?", "//a:b:c/?token"])
+def test_what_is_no_address_is_turned_away(path):
+    assert door.admitted(path, "airflock_8080=abd", "airflock_8080", "abc") == (False, False)
+    assert door.admitted("/", "airflock_8080=abc", "airflock_8080", "abc", "http://[", "localhost:8080")[0] is False
+
+
+def test_a_page_of_another_port_cannot_use_the_cookie():
+    given = "/", "airflock_8080=abc", "airflock_8080", "abc"
+    assert door.admitted(*given, "http://localhost:8080", "localhost:8080") == (True, False)
+    for origin in ("http://localhost:9999", "http://evil.example", "null"):
+        assert door.admitted(*given, origin, "localhost:8080")[0] is False
+
+
+@pytest.mark.parametrize("host", ["256.1.1.1", "::1", "192.0.2.1"])
+def test_a_host_that_is_not_this_machine_is_named_in_one_line(host):
+    from airflock.studio.view import View
+
+    for port in (0, 8080):
+        with pytest.raises(StudioError, match=f"host = {re.escape(host)}: .*; give"):
+            View(host, port, "page")
+
+
 def test_a_port_in_use_is_one_line():
     from airflock.studio.view import View
 
@@ -605,6 +662,31 @@ def test_an_axis_is_told_only_where_a_round_end_is_passed():
         low, high = handle.scales["x"]["range"]
         assert low <= time[0] and time[-1] <= high
     assert handle.told < 30
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=50), st.integers(1, 50))
+def test_a_chart_with_missing_values_is_told_ends_that_hold_the_others(values, missing):
+    """B has no value of its own before it was changed: nan ends the axis of the page nowhere, and nothing is drawn."""
+    time = np.arange(float(len(values) + missing))
+    first, second = np.array([*values, *values[:1] * missing]), np.array([math.nan] * missing + values)
+    low, high = charts.told_ends((time, first, second))["y"]
+    assert low < high and low <= min(values) + 1e-6 * (high - low) and max(values) <= high + 1e-6 * (high - low)
+    low, high = charts.told_ends((time, np.full(len(time), math.nan)))["y"]
+    assert low < high
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0.0, 1e-6), st.integers(1, 50))
+def test_a_chart_of_equal_values_is_told_ends_apart_from_each_other(value, share, count):
+    """Fish fly at 3 m/s but for rounding; ends that the page found itself were the same number, and it hung."""
+    time = np.arange(float(count))
+    values = value * (1.0 + share * np.linspace(-1.0, 1.0, count))
+    low, high = charts.told_ends((time, values, values[::-1]))["y"]
+    assert low - 1e-12 <= values.min() and values.max() <= high + 1e-12 and high - low >= max(abs(value), 1e-12)
+
+
+def test_a_page_scales_the_values_of_a_chart_itself_where_it_can():
+    time = np.arange(30.0)
+    assert charts.told_ends((time, time**2, np.sqrt(time))) == {"x": charts.ends(time)}
 
 
 @given(st.lists(st.floats(0.0, 30.0), min_size=1, max_size=200))

@@ -99,7 +99,7 @@ def video(
     """
     options.writable((out, VIDEOS))
     from airflock.plots.film_stage import check_chart
-    from airflock.plots.picture import flight_of
+    from airflock.plots.picture import flight_of, named
     from airflock.plots.video import ffmpeg, frame_count
     from airflock.plots.video import video as make_video
     from airflock.recordings.scores import courses
@@ -116,7 +116,7 @@ def video(
             check_chart(chart, courses(scenario) if chart else [], scenario.name)
             recording = flight_of(scenario, seed)
     choice: dict[str, Any] = {"fps": fps, "speed": speed, "start": begin, "stop": end}
-    with options.progress("pictures", frame_count(recording, **choice)) as done:
+    with named(what), options.progress("pictures", frame_count(recording, **choice)) as done:
         make_video(recording, out, done=done, space=space, chart=chart, **choice)
     tables.say(f"saved {out}")
 
@@ -142,7 +142,7 @@ def replay(
     Example: airflock replay flight.nc --html show.html --colour cluster
     """
     options.writable((page, PAGES))
-    from airflock.plots.picture import flight_of
+    from airflock.plots.picture import flight_of, named
     from airflock.replays import check_colour
     from airflock.replays import replay as make_replay
     from airflock.scenarios.files import load
@@ -156,6 +156,7 @@ def replay(
             tables.say_notes(scenario.notes)
             check_colour(scenario, colour)
             recording = flight_of(scenario, seed)
-    made = make_replay(recording, rate=rate, colour=colour)
+    with named(what):
+        made = make_replay(recording, rate=rate, colour=colour)
     made.save(page)
     tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")

@@ -1,14 +1,15 @@
 """One door to the pictures of a scenario or a recording, by the name of the kind."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, RecordingError
 from airflock.plots.exposure import exposure
 from airflock.plots.flocked import flocked
 from airflock.plots.rays import rays
@@ -92,7 +93,9 @@ def plot(
         scenario = _scenario(what, settings, law, trust)
         return rules(scenario, ax=ax) if kind == "rules" else transfer(scenario, ax=ax)
     keep = ("heard",) if kind == "reception" else ()
-    return _of_recording(flight_of(what, seed, settings, law, trust=trust, keep=keep), kind, start, stop, ax)
+    recording = flight_of(what, seed, settings, law, trust=trust, keep=keep)
+    with named(what):
+        return _of_recording(recording, kind, start, stop, ax)
 
 
 def _of_recording(recording: xr.Dataset, kind: str, start: float | None, stop: float | None, ax: Axes | None) -> Figure:
@@ -135,6 +138,18 @@ def flight_of(
             )
         return what if isinstance(what, xr.Dataset) else load_recording(what)  # type: ignore[arg-type]
     return simulate(_scenario(what, settings, law, trust), seed, keep=keep)
+
+
+@contextmanager
+def named(what: Any) -> Iterator[None]:
+    """Faults of a recording that are told inside begin with the name of its file, where it is one."""
+    try:
+        yield
+    except RecordingError as fault:
+        before, colon, said = str(fault).partition(": ")
+        if before != "recording" or not colon or not _is_file(what):
+            raise
+        raise RecordingError(f"{what}: {said}") from fault
 
 
 def _name(what: Any) -> str:

@@ -106,7 +106,8 @@ def trajectories(
 
 def _legible(shown: Paths) -> float:
     """Window of time in which all paths together are not so long that they cover each other, s."""
-    length = float(np.nanmean(shown.speed)) * shown.agents
+    known = shown.speed[np.isfinite(shown.speed)]  # of one frame of tracks there is none
+    length = float(known.mean()) * shown.agents if known.size else 0.0
     extent = float(np.max(np.nanmax(shown.position, axis=(0, 2)) - np.nanmin(shown.position, axis=(0, 2))))
     window = INK_MOST * extent / max(length, 1e-12)
     return WINDOW if window >= WINDOW else float(f"{max(window, 1e-9):.1g}")

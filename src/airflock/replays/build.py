@@ -91,12 +91,16 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
     scenario = scenario_of(recording) if recording.attrs.get("airflock_scenario") else None
     rows = layers(recording, scenario, kept[:, :axes], there, stride)
     whole = there.all()
+    flat = np.zeros((kept.shape[2], 3))
+    flat[:, :axes] = kept[0, :axes].T
+    stage = _stage(scenario, kept[:, :axes], flat)
     packed = pack(kept[:, :axes], [layer.bytes for layer in rows] + ([] if whole else [there.astype(np.uint8)]))
+    if scenario is None:  # tracks may lie at 5,000 km north, where a graphics card tells places half a metre apart
+        packed = packed._replace(low=[*np.subtract(packed.low[:2], stage["centre"][:2]).tolist(), *packed.low[2:]])
+        stage["centre"][:2] = 0.0, 0.0
     own = [layer.shade.name for layer in rows]
     ways = [*_motion(axes), *own]
     _check_colour(colour, ways, "this recording")
-    flat = np.zeros((kept.shape[2], 3))
-    flat[:, :axes] = kept[0, :axes].T
     first = float(recording["time"].values[0])
     name = attributes.name_of(recording)
     speed = np.sqrt((frames[::stride, axes:] ** 2).sum(1))
@@ -109,7 +113,7 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
         "layers": [_told_layer(layer.shade) for layer in rows], "whole": bool(whole),
         "height": [float(np.nanmin(frames[:, axes - 1])), float(np.nanmax(frames[:, axes - 1]))],
         "leap": _leap(scenario), "collisions": [[first + t, i, j] for t, i, j in collisions],
-        "events": _events(recording, scenario), "stage": _stage(scenario, kept[:, :axes], flat),
+        "events": _events(recording, scenario), "stage": stage,
         "charts": [["mean speed (m/s)", _short(_mean(speed))], ["nearest pair (m)", _short(nearest[::stride])]],
     }  # fmt: skip
     return Replay(_page(name, about, packed.data), name)

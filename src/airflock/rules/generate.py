@@ -21,6 +21,7 @@ from airflock.rules import law
 from airflock.rules.integers import free, tree_of
 from airflock.rules.nodes import walk
 from airflock.rules.unrolled import Unrolled
+from airflock.spelling import as_name
 
 # A solver is called from several places and would be compiled as often: minutes instead of seconds.
 ALONE = '@njit(fastmath=True, error_model="numpy", nogil=True, **INNER)'
@@ -80,7 +81,8 @@ class Source:
         if drawn and item.__name__ in random_streams.PRIMITIVES:
             return str(item.__name__)  # bound by the device
         module = str(getattr(item, "__module__", "")).rpartition(".")[2].strip("_")
-        name = base = "_".join([module, item.__name__, *(text for text in chosen.values() if text.isidentifier())])
+        said = [text for text in chosen.values() if text.isidentifier()]
+        name = base = as_name("_".join([module, item.__name__, *said]))
         count = 1
         while name in self._names.values():
             count += 1

@@ -9,6 +9,8 @@ from viser import uplot
 ROUND = (1.0, 2.0, 5.0, 10.0)  # times a power of ten
 PARTS = 4  # an axis ends within a part, so large, of the span that is shown
 LEAST = 1e-9  # a span below this share of its ends is none
+NOTHING = 1e-12  # values nearer to 0 are drawn as 0
+FLAT = 1e-4  # of values, which are numbers of seven digits
 
 
 def ends(values: NDArray[np.float64]) -> tuple[float, float]:
@@ -22,17 +24,34 @@ def ends(values: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.floor(low / part + 1e-9) * part), float(np.ceil(high / part - 1e-9) * part)
 
 
+def told_ends(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[float, float]]:
+    """Ends of the axes that a page must be told: that of x always, that of y where the page finds none itself.
+
+    That is where a value is missing (nan), and where all are the same but for rounding, as the speeds of fish.
+    """
+    found = {"x": ends(columns[0])}
+    values = np.concatenate([column[np.isfinite(column)] for column in columns[1:]])
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    size = max(abs(low), abs(high))
+    if high - low <= FLAT * size or size < NOTHING:
+        far = ends(np.array([0.0, 1.5 * size]))[1] if size >= NOTHING else 1.0
+        return {**found, "y": (-far, 0.0) if low < -NOTHING else (0.0, far)}
+    return found if len(values) == sum(map(len, columns[1:])) else {**found, "y": ends(np.array([low, high]))}
+
+
 class Chart:
     """One chart of viser, whose axis is told.
 
     Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
     hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
-    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed.
+    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed. The other
+    axis scales itself unless a value is not a number, with which it would end nowhere and nothing would be drawn, or
+    all are the same but for rounding, at which the page looks for ticks until its memory is full.
     """
 
     def __init__(self, handle: Any):
         self._handle = handle
-        self._ends: tuple[float, float] | None = None
+        self._ends: dict[str, tuple[float, float]] = {}
 
     @property
     def data(self) -> tuple[NDArray[np.float64], ...]:
@@ -41,9 +60,9 @@ class Chart:
 
     @data.setter
     def data(self, columns: tuple[NDArray[np.float64], ...]) -> None:
-        if (told := ends(columns[0])) != self._ends:
+        if (told := told_ends(columns)) != self._ends:
             self._ends = told
-            self._handle.scales = {"x": uplot.Scale(time=False, range=told)}
+            self._handle.scales = {axis: uplot.Scale(time=False, range=given) for axis, given in told.items()}
         self._handle.data = columns
 
     def remove(self) -> None:

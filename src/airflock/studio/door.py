@@ -66,20 +66,24 @@ addEventListener("DOMContentLoaded", () => {
 </script>"""
 
 
-def admitted(path: str, cookies: str, name: str, token: str) -> tuple[bool, bool]:
+def admitted(path: str, cookies: str, name: str, token: str, origin: str = "", host: str = "") -> tuple[bool, bool]:
     """Whether a request may pass, and whether it came with the token in its address.
 
-    path : with its query; cookies : the header; name : of the cookie that holds the token
+    path   : with its query; cookies : the header; name : of the cookie that holds the token
+    origin : header that names the page that asks, if any; host : header that names the address that it asks
+
+    A browser sends the cookie also for pages of other ports of the same machine: they are turned away.
     """
-    given = parse_qs(urlsplit(path).query).get("token", [""])[0]
-    if hmac.compare_digest(given.encode(), token.encode()):
-        return True, True
     try:
+        given = parse_qs(urlsplit(path).query).get("token", [""])[0]
+        if hmac.compare_digest(given.encode(), token.encode()):
+            return True, True
         kept = SimpleCookie(cookies)
-    except CookieError:
+        asks = urlsplit(origin).netloc
+    except (CookieError, ValueError):  # what a stranger sends may be no address at all
         return False, False
     value = kept[name].value if name in kept else ""
-    return hmac.compare_digest(value.encode(), token.encode()), False
+    return hmac.compare_digest(value.encode(), token.encode()) and (not origin or asks == host), False
 
 
 @contextmanager
@@ -89,7 +93,8 @@ def guarded(token: str, port: int) -> Iterator[None]:
 
     def with_check(handler: Any, *where: Any, process_request: Callable[..., Any], **rest: Any) -> Any:
         def check(connection: Any, request: Any) -> Any:
-            passes, anew = admitted(request.path, request.headers.get("Cookie", ""), name, token)
+            cookies, origin, host = ("; ".join(request.headers.get_all(n)) for n in ("Cookie", "Origin", "Host"))
+            passes, anew = admitted(request.path, cookies, name, token, origin, host)
             if not passes:
                 return Response(HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Type": "text/plain"}), REFUSED)
             page = urlsplit(request.path).path in ("", "/", "/index.html")

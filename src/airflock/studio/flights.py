@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airflock import atomic
 from airflock.engine import Flight, Snapshot
-from airflock.errors import AirflockError, StudioError
+from airflock.errors import StudioError
 from airflock.recordings.files import save
 from airflock.replays import replay
 from airflock.scenarios.scenario import Scenario
@@ -132,7 +132,7 @@ class Flights:
         self.origins = [replace(o, settings={**o.settings, **(settings or {})}) for o in self.origins]
         try:
             self._open()
-        except AirflockError:
+        except Exception:
             self.seed, self.origins = known
             raise
         self.note = ""
@@ -146,7 +146,7 @@ class Flights:
         self.origins = [Origin.of(where, {})]
         try:
             self._open(start=True)
-        except AirflockError:
+        except Exception:
             self.origins = known
             raise
         self.note = f"opened {where}"

@@ -4,7 +4,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING
 
 from airflock import atomic
-from airflock.errors import AirflockError, StudioError
+from airflock.errors import StudioError, printable
 from airflock.scenarios.files import presets
 from airflock.studio.room import Room, note
 from airflock.studio.saving import free
@@ -44,7 +44,7 @@ class Opening(Room):
         atomic.write(path, text)
         try:
             self._opened(str(path))
-        except AirflockError:
+        except Exception:
             path.unlink()
             raise
         self.player.fault(f"saved {path.absolute()}")
@@ -75,6 +75,8 @@ def scenario_text(name: str, content: bytes) -> str:
         raise StudioError(f"{name}: is not a scenario file (TOML): {fault}") from fault
     except TextError as fault:
         raise StudioError(f"{name}: {fault}") from fault
+    if "\0" in name:
+        raise StudioError(f"{printable(name)}: holds a letter (NUL) that no name of a file may have")
     if not name.lower().endswith(".toml"):
         raise StudioError(f"{name}: is not a scenario file; its name must end with .toml")
     return text

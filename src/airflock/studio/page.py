@@ -119,12 +119,13 @@ class Page:
     def _told(self) -> None:
         """Say where the flight is, what is wrong, and what has happened."""
         player = self.player
-        state = "paused" if player.paused else "stopped" if player.failure else "flying"
-        agents = " and ".join(str(side.flight.agents) for side in player.sides)
+        state = "paused" if player.paused else "stopped" if player.failure or player.over else "flying"
+        counts = [side.flight.agents for side in player.sides]
+        agents = f"{' and '.join(map(str, counts))} agent{'s' * (counts != [1])}"
         done = " and ".join(str(len(side.flight.events)) for side in player.sides)
         self.title.content = (
             f"<div style='padding:0 0.75em'><b>{html.escape(player.where)}</b><br><small>t = {player.time:.1f} s · "
-            f"{agents} agents · seed {player.seed} · {state} · events: {done}</small></div>"
+            f"{agents} · seed {player.seed} · {state} · events: {done}</small></div>"
         )
         said = player.status
         self.rescue.visible = bool(player.failure)

@@ -63,9 +63,14 @@ class Panel:
         return made
 
     def number(self, label: str, value: int, low: int, high: int, told: Callable[[int], None], hint: str = "") -> Any:
-        """A field for a whole number."""
+        """A field for a whole number; a number beyond its ends is not heard: whoever leaves the field gets the end."""
         made = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
-        made.on_update(lambda event: told(int(event.target.value)) if event.client is not None else None)
+
+        @made.on_update
+        def _(event: Any) -> None:
+            if event.client is not None and low <= event.target.value <= high:
+                told(int(event.target.value))
+
         return made
 
     def field(self, label: str, hint: str = "") -> Any:
@@ -106,7 +111,7 @@ class Panel:
         shade = (uplot.Band(series=(len(names) - 1, len(names)), fill="rgba(230,159,0,0.2)"),) if band else None
         zero = np.zeros(2)
         return Chart(self.server.gui.add_uplot(
-            (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade,
+            (zero, *[zero] * len(names)), tuple(series), title=title, aspect=2.1, bands=shade, padding=(8, 8, 0, 0),
             scales={"x": uplot.Scale(time=False, range=(0.0, 1.0))}, legend=uplot.Legend(show=True),
             axes=(uplot.Axis(stroke=colours.INK, size=28), uplot.Axis(stroke=colours.INK, size=46)),
         ))  # fmt: skip

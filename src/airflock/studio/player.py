@@ -5,7 +5,8 @@ from time import perf_counter
 from typing import Any
 
 from airflock.engine import Snapshot
-from airflock.errors import AirflockError
+from airflock.errors import AirflockError, reason
+from airflock.spelling import raised
 from airflock.studio.flights import Flights
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
@@ -60,7 +61,14 @@ class Player(Flights):
             return self.failure
         if self.compiling:
             return "compiling … (flying interpreted meanwhile, with other rounding)"
+        if self.over:
+            return f"no page flies longer than {self.time:g} s; Reset begins anew"
         return "compiling …" if any(side.flight.waiting for side in self.sides) else self.note
+
+    @property
+    def over(self) -> bool:
+        """Whether the longest time that a page flies has been reached."""
+        return any(side.flight.over for side in self.sides)
 
     # ------------------------------------------------------------------------------------------------ playing
 
@@ -77,7 +85,7 @@ class Player(Flights):
         asked = self._asked.answer(self._safely)
         if self.compiling and all(side.compiled for side in self.sides):
             asked = self._settled() or asked
-        if self.paused or self.failure or any(side.flight.over for side in self.sides):
+        if self.paused or self.failure or self.over:
             return asked
         steps = min(self.pace.due(elapsed), max(1, int(self._rate * MOST_BUSY)))
         if not steps:
@@ -95,12 +103,19 @@ class Player(Flights):
         return True
 
     def _safely(self, action: Callable[[], None]) -> None:
-        """Do something; a fault of the user's is a note on the page and a line in the terminal, and nothing else."""
+        """Do something; what goes wrong is a note on the page and a line in the terminal, and the flight goes on."""
         try:
             action()
         except AirflockError as fault:
-            self.note = str(fault)
-            self.fault(self.note)
+            self._tell(str(fault))
+        except OSError as fault:  # a full disk, a folder that is gone
+            self._tell(": ".join(part for part in (fault.filename, reason(fault)) if part))
+        except Exception as fault:  # the last resort: somebody's flight must not be lost to one press of a button
+            self._tell(f"unexpected {raised(fault)}; please report it")
+
+    def _tell(self, line: str) -> None:
+        self.note = line
+        self.fault(line)
 
     def fly(self, steps: int) -> bool:
         """Fly so many steps, and keep a moment where one is due; a flight that fails stops and says why."""
@@ -136,16 +151,19 @@ class Player(Flights):
         time = min(max(time, 0.0), self.time)
         moment = self.moments.at(time)
         if moment is None:
+            self.note = "no earlier moment is kept"
             return
         del self.sides[len(moment) :]
         self.hand = min(self.hand, len(self.sides) - 1)
+        failed = self.failure
         for side, kept in zip(self.sides, moment, strict=True):
-            if self.failure:
+            if failed:
                 side.restore(kept)
             else:
                 side.again(kept, time)
         self.moments.forget_after(time + 1e-6)
-        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s", True
+        least = "; no earlier moment is kept" if self.time > time + 1e-6 and not failed else ""
+        self.failure, self.note, self.paused = "", f"back at t = {self.time:g} s{least}", True
 
     # ---------------------------------------------------------------------------------------------- comparing
 

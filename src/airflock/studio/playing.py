@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from airflock.errors import StudioError
+from airflock.errors import AirflockError, StudioError
 from airflock.studio.collisions import BOTH, Collision
 from airflock.studio.drawing import FOLLOWED, LINKS, NAMES
 from airflock.studio.room import Room, note
@@ -58,7 +58,7 @@ class Playing(Room):
     def stand(self) -> None:
         """What may colour the agents of these flights; whom the camera follows in a scenario that is new here."""
         player = self.player
-        self.seed.value, self.agents.value = player.seed, player.flight.agents
+        self._shown()
         if self._known != player.side.origin.where:
             self._known = player.side.origin.where
             free = player.scenario.world.arena == "none" and not self.drawing.stages[0].solids
@@ -68,6 +68,10 @@ class Playing(Room):
             self.way.options = known
             self.drawing.shading.way = self.drawing.shading.way if self.drawing.shading.way in known else known[0]
             self.way.value = self.drawing.shading.way
+
+    def _shown(self) -> None:
+        """Show seed and number of agents of what flies."""
+        self.seed.value, self.agents.value = self.player.seed, self.player.flight.agents
 
     def _follow(self, whom: str) -> None:
         self.drawing.follow = whom
@@ -93,8 +97,12 @@ class Playing(Room):
         self.page.elsewhere()
 
     def reset(self, seed: int | None = None, agents: int | None = None) -> None:
-        """Begin another flight."""
-        self.player.reset(seed, {} if agents is None else {"agents": agents})
+        """Begin another flight; where that is refused, the fields show what flies."""
+        try:
+            self.player.reset(seed, {} if agents is None else {"agents": agents})
+        except AirflockError:
+            self._shown()
+            raise
         self.drawing.collisions.clear()
         self.page.stand()
 

@@ -1,5 +1,7 @@
 """Side: one open flight that is tuned, and what was changed on it. A page shows one of them, or two side by side."""
 
+import os
+import shlex
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -151,7 +153,11 @@ class Side:
 
     def command(self, seed: int) -> str:
         """The command that opens the present scenario again."""
-        parts = ["airflock watch", self.origin.where, fields(self.settings), f"--seed {seed}"]
+        origin = self.origin
+        where = f"./{origin.where}" if origin.where.startswith("-") else origin.where  # not an option
+        law = f"--law {shlex.quote(str(origin.law))}" if isinstance(origin.law, str | os.PathLike) else ""
+        trust = "--trust" if origin.trust else ""
+        parts = ["airflock watch", shlex.quote(where), law, trust, fields(self.settings), f"--seed {seed}"]
         return " ".join(part for part in parts if part)
 
     # ----------------------------------------------------------------------------------------------- flying

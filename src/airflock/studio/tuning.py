@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from airflock.errors import AirflockError, ScenarioError
 from airflock.evolve.bounds import studied
+from airflock.scenarios.change import LASTING
+from airflock.scenarios.document import TOP
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.short_keys import whole_keys
 from airflock.studio.controls import Control, controls_of
@@ -18,6 +20,9 @@ from airflock.untrusted import from_outside, toml_value
 
 if TYPE_CHECKING:
     from airflock.studio.page import Page
+
+EXAMPLE = "radio.delay = 400 ms, or goals.points = [[0, 50, 0]]"
+ANEW = {"agents": "“agents” under Play begins another flight", "dt": "write it into the scenario file"}
 
 
 class Tuning(Room):
@@ -44,7 +49,7 @@ class Tuning(Room):
             }
         )
         self.command = panel.text()
-        self.typed = panel.field("any key", "for instance radio.delay = 400 ms, or goals.points = [[0, 50]]")
+        self.typed = panel.field("any key", f"for instance {EXAMPLE}")
         panel.row({"Set": self.ask(self._set)})
 
     def stand(self) -> None:
@@ -128,6 +133,10 @@ def pair(text: str, scenario: Scenario) -> tuple[str, Any]:
         found = toml_value(value)
     if "." in key:
         return key, found
+    if key in LASTING:
+        raise ScenarioError([f"{key} = {value}: {LASTING[key]} cannot change in flight; {ANEW[key]}"])
+    if key in TOP:
+        raise ScenarioError([f"{key}: cannot be set while a flock flies; write it into the scenario file"])
     records = {section: type(record) for section, record in scenario.records.items()}
     whole, _, faults = whole_keys({key: found}, records, ())
     if faults:

@@ -33,7 +33,8 @@ class View:
     """
 
     def __init__(self, host: str, port: int, title: str):
-        port = port or _free_port(host)
+        free = _free_port(host)  # also where a port is given: a host that is not this machine is told as such
+        port = port or free
         _refuse_used(host, port)
         token = secrets.token_urlsafe(12)
         console = rich.get_console()
@@ -244,7 +245,12 @@ def _linear(colour: NDArray[Any]) -> NDArray[np.uint8]:
 
 def _free_port(host: str) -> int:
     with socket.socket() as probe:
-        probe.bind((host, 0))
+        try:
+            probe.bind((host, 0))
+        except OSError as fault:
+            raise StudioError(
+                f"host = {host}: {fault.strerror or fault}; give a name or IPv4 address of this machine, or 0.0.0.0"
+            ) from fault
         return int(probe.getsockname()[1])
 
 
