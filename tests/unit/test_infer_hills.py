@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airflock.infer.fit import FINE, climb
-from airflock.infer.hills import distinct, groups, hills, onward
+from airflock.infer.hills import by_company, distinct, groups, hills, onward, redrawn
 from airflock.infer.ridges import ridges
 from airflock.infer.search import profile
 from line_laws import Line, quietly
@@ -27,6 +27,28 @@ def test_a_hill_that_no_single_number_leads_to_is_found_where_both_are_drawn_ane
     assert profile(model, beside, [0], quietly).loss > best.loss + 20.0
     assert groups(model, beside, [0]) == [[0, 1]]
     assert hills(model, beside, [0], [0], quietly).loss < best.loss + 0.5
+
+
+def test_a_hill_is_found_from_which_a_group_alone_climbs_back_beside_a_wrong_rest():
+    def law(x, a, c):  # a must be near c; of their mean two are likely, the larger one more
+        t = 0.5 * (a + c)
+        height = np.exp(-60.0 * (t - 0.8) ** 2) + 0.5 * np.exp(-60.0 * (t - 0.3) ** 2)
+        return np.where(x < 0.5, 5.0 * x * (a - c), x * height)
+
+    model = Line(law, ("a", "c"), (0.8, 0.8))
+    best = climb(model, np.array([0.8, 0.8]), [0, 1])
+    beside = climb(model, np.array([0.3, 0.3]), [0, 1])
+    assert beside.loss > best.loss + 20.0
+    for a in np.linspace(0.0, 1.0, 21):
+        alone = climb(model, np.array([a, beside.place[1]]), [0])
+        assert climb(model, alone.place, [0, 1]).loss > best.loss + 20.0
+    ends = [climb(model, u, [0, 1]) for u in redrawn(model, beside, [0], [0])]
+    assert min(end.loss for end in ends) < best.loss + 0.5
+
+
+def test_groups_that_say_the_same_come_after_those_that_say_something_new():
+    friction, the_same, wall, sharing = [1, 2, 3, 4], [2, 3, 4, 5], [7, 8], [4, 7, 9, 10]
+    assert by_company([friction, the_same, wall, sharing]) == [friction, wall, sharing, the_same]
 
 
 def test_a_step_at_an_edge_does_not_part_numbers_that_act_together():

@@ -1,8 +1,9 @@
 """Hills: numbers that act together, such as those of a wall, looked for anew over their whole ranges.
 
 Such numbers have several hills, and long narrow ridges that bend between them: no single number leads along one, and a
-climb ends wherever on the ridge it has arrived. So many climbs are made, first with the numbers of the group alone,
-then with all; and where their ends lie apart, the way from one to the better one is gone on beyond it.
+climb ends wherever on the ridge it has arrived. So many climbs are made: some with the numbers of the group alone at
+first, others, in a race, with all at once, since beside a wrong rest of the fit the group alone climbs back to where it
+came from. Where their ends lie apart, the way from one to the better one is gone on beyond it.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,8 +19,11 @@ Array = NDArray[np.float64]
 TOGETHER = 4  # numbers that are drawn anew together, at most
 ALIKE = 0.8  # overlap of where two numbers act, from which they are
 GROUPS = 3  # of them, those told worst first
+SHARED = 0.5  # of a group: where more of it stands in an earlier one, other groups come first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
-ALONE, ALL, WHOLE = (16, 10), (10, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
+ALONE, ALL, WHOLE = (16, 10), (6, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
+RACE = ((24, 4), (8, 8))  # the same of a race with all numbers
+KEPT = 4  # of its ends
 SAME = 0.1  # of a range: places whose numbers of a group are all nearer than this are of one hill
 UNLIKELY = 20.0  # loss above the best on few frames, beyond which a hill is left
 BEYOND = (0.5, -0.5)  # of the way from another end to the best one: how far is looked past it, and between the two
@@ -32,25 +36,43 @@ def hills(model: Model, fit: Fit, few: Sequence[int], spans: Sequence[int], say:
 
     few, spans : on which is looked, and on which is fitted
     """
-    from scipy.stats import qmc
-
     met: list[Fit] = []
     for group in groups(model, fit, few):
-        places = np.tile(fit.place, (2**REDRAWN, 1))
-        places[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
-        best = sorted(places, key=lambda u: loss_at(model, u, fit.free, few))[: ALONE[0]]
-        ends = sorted((climb(model, u, group, few, ALONE[1], slopes=(WIDE, FINE)) for u in best), key=lambda e: e.loss)
-        # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
-        apart = distinct([fit.place, *(end.place for end in ends)], group)[1 : 1 + ALL[0]]
+        apart = redrawn(model, fit, group, few)
+        say()
         rough = sorted((climb(model, u, fit.free, few, ALL[1], slopes=CAREFUL) for u in apart), key=lambda e: e.loss)
         say()
         worst = loss_at(model, fit.place, fit.free, few) + UNLIKELY
-        likely = distinct([fit.place, *(end.place for end in rough if end.loss < worst)], group)[1 : 1 + WHOLE[0]]
+        likely = distinct([end.place for end in rough if end.loss < worst], group)[: WHOLE[0]]
         found = [climb(model, u, fit.free, spans, WHOLE[1], slopes=(FINE, BOTH)) for u in likely]
         say()
         found = onward(model, [fit, *found], group, few, spans, say)
         fit, met = found[0], [*met, *found[1:]]
     return replace(fit, others=tuple(end.place for end in met))
+
+
+def redrawn(model: Model, fit: Fit, group: Sequence[int], few: Sequence[int]) -> list[Array]:
+    """Places from which all are to climb, after a group was drawn anew: ends of a race, and of the group by itself."""
+    from scipy.stats import qmc
+
+    drawn = np.tile(fit.place, (2**REDRAWN, 1))
+    drawn[:, group] = qmc.Sobol(len(group), seed=0).random_base2(REDRAWN)
+    places = sorted(drawn, key=lambda u: loss_at(model, u, fit.free, few))
+    raced = [end.place for end in race(model, distinct(places, group, [fit.place]), fit.free, few)][:KEPT]
+    ends = (climb(model, u, group, few, ALONE[1], slopes=(WIDE, FINE)) for u in places[: ALONE[0]])
+    alone = [end.place for end in sorted(ends, key=lambda end: end.loss)]
+    # each hill once, and not that of the fit: beside the rest of this fit, a higher hill may seem lower
+    return [*raced, *distinct(alone, group, [fit.place, *raced])][: ALL[0]]
+
+
+def race(model: Model, places: Sequence[Array], free: Sequence[int], spans: Sequence[int]) -> list[Fit]:
+    """Ends of climbs over all numbers, best first: of the first of some places, the better ones of which go on."""
+    found: list[Fit] = []
+    for count, steps in RACE:
+        found = [climb(model, u, free, spans, steps, slopes=(WIDE,)) for u in places[:count]]
+        found.sort(key=lambda end: end.loss)
+        places = [end.place for end in found]
+    return found
 
 
 def onward(
@@ -80,13 +102,13 @@ def onward(
     return found
 
 
-def distinct(places: Sequence[Array], group: Sequence[int]) -> list[Array]:
-    """Places that differ from all before them in some number of a group."""
-    found: list[Array] = []
+def distinct(places: Sequence[Array], group: Sequence[int], known: Sequence[Array] = ()) -> list[Array]:
+    """Places that differ from known ones, and from all before them, in some number of a group."""
+    found = list(known)
     for u in places:
         if all(np.abs(u - other)[list(group)].max() > SAME for other in found):
             found.append(u)
-    return found
+    return found[len(known) :]
 
 
 def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
@@ -101,6 +123,18 @@ def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
     for k in np.argsort(-errors).tolist():
         near = [f for f in np.argsort(-overlap[k]).tolist() if f != k and overlap[k, f] > ALIKE][: TOGETHER - 1]
         group = sorted(named[f] for f in (k, *near))
-        if near and not any(named[k] in other for other in found) and len(found) < GROUPS:
+        if near and not any(named[k] in other for other in found):
             found.append(group)
-    return found
+    return by_company(found)[:GROUPS]
+
+
+def by_company(groups: Sequence[list[int]]) -> list[list[int]]:
+    """Groups in their order, but those that mostly stand in earlier ones last.
+
+    Else the numbers of friction, told worst, would come three times in other company, and those of a wall never.
+    """
+    first: list[list[int]] = []
+    for group in groups:
+        if all(len({*group} & {*other}) <= SHARED * len(group) for other in first):
+            first.append(group)
+    return first + [group for group in groups if group not in first]
