@@ -89,7 +89,8 @@ def test_every_preset_flies_with_agents_that_come_and_go(name):
         flight.advance(steps=2).remove(1)
         while flight.step < 9:
             flight.advance(steps=min(steps, 9 - flight.step))
-        place = [1000.0] * scenario.dimensions
+        far = 0.5 if scenario.world.edges == "bounce" else 1000.0  # m; nobody is put beyond faces that bounce
+        place = [far] * scenario.dimensions
         flight.add(1, place).advance(steps=1).remove(0)
         while not flight.over:
             flight.advance(steps=steps)

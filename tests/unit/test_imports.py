@@ -407,3 +407,18 @@ def test_the_same_frames_whatever_kind_of_time_tells_them(how, rate):
     assert found.sizes == same.sizes and found["time"].values == pytest.approx(t, abs=1e-12)
     for name in ("position", "velocity", "confidence"):
         assert found[name].values == pytest.approx(same[name].values, abs=1e-4, nan_ok=True)
+
+
+def test_far_from_the_origin_distances_are_those_of_the_file():
+    t = np.repeat(0.1 * np.arange(30), 2)
+    who = np.tile([0, 1], 30)
+    east, north = 5e5 + 0.3 * t + 1.1 * who, 5e6 + 0.4 * t  # metres of a map, where single precision steps by 0.5 m
+    notes = []
+    recording = airflock.load_tracks(
+        {"t": t, "id": who, "x": east, "y": north}, unit="m", time_unit="s", say=notes.append
+    )  # fmt: skip
+    place = recording["position"].values[:, :, 0]
+    assert np.abs(np.linalg.norm(place[:, :, 1] - place[:, :, 0], axis=1) - 1.1).max() < 1e-6
+    assert any("64 bits" in note for note in notes)
+    near = airflock.load_tracks({"t": t, "id": who, "x": east - 5e5, "y": north - 5e6}, unit="m", time_unit="s")
+    assert near["position"].dtype == np.float32

@@ -16,6 +16,7 @@ MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap
 NTSC = 1.001  # colour television is slower than its nominal rate by this factor (SMPTE 170M)
 SAME_RATE = 2e-5  # relative: times in whole microseconds, at 30 Hz, are 1e-5 off
+COARSE = 0.01  # m; where places are farther apart in single precision, they are kept in double
 
 
 def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: float | None) -> tuple[Any, float]:
@@ -52,6 +53,13 @@ def _round(period: float) -> float:
     rates = [float(f"{slower / period:.4g}") / slower for slower in (1.0, NTSC)]
     rate = min(rates, key=lambda rate: abs(rate * period - 1.0))
     return 1.0 / rate if abs(rate * period - 1.0) < SAME_RATE else float(f"{period:.4g}")
+
+
+def bits(tracks: list[Track], asked: int) -> tuple[int, float]:
+    """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m."""
+    farthest = max(float(np.nanmax(np.abs(track.stack(POSITION, 3)), initial=0.0)) for track in tracks)
+    step = float(np.spacing(np.float32(farthest)))
+    return (64 if step > COARSE else asked), step
 
 
 def recording(

@@ -96,7 +96,7 @@ def load_tracks(
     decimal, delimiter : str
         Of a text file: its decimal point, and what stands between columns, which is found out by default.
     precision : int
-        Bits per number, 32 or 64.
+        Bits per number, 32 or 64; far from the origin, where 32 do not tell a centimetre, 64.
     say, done : callable, optional
         Called with each note, and with the share that has been read.
 
@@ -138,7 +138,10 @@ def load_tracks(
         findings.notes.append("no velocity: differentiated from positions; axes and units could not be checked by it")
     times, period = grid.grid_of(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
-    found, shares = grid.recording(tracks, times, period, bridge, precision)
+    kept, step = grid.bits(tracks, precision)
+    if kept != precision:
+        findings.notes.append(f"far from the origin: kept with 64 bits, since 32 place individuals {step:.2g} m apart")
+    found, shares = grid.recording(tracks, times, period, bridge, kept)
     absent = 1.0 - shares["present"]
     findings.notes.append(
         f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
