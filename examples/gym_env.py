@@ -9,7 +9,7 @@ import numpy as np
 
 import airflock
 
-NEAREST, FASTEST = 5, 8.0
+NEAREST, FASTEST = 5, 8.0  # drones; m/s
 
 
 class FlockMember(gymnasium.Env):

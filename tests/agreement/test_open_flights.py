@@ -487,3 +487,10 @@ def test_a_place_beyond_a_periodic_box_is_the_same_place_in_it_and_beyond_soft_w
     assert np.array_equal(flights[0].state, flights[1].state)
     soft = airflock.open(load("vasarhelyi_2018/4ms", {"agents": 3}), 2, device="python").place(1, [300.0, 0.0])
     assert soft.state[0, 1] == 300.0
+
+
+def test_nobody_joins_faster_than_a_flight_can_hold():
+    flight = airflock.open("vasarhelyi_2018/4ms", 1, device="python").remove(3)
+    with pytest.raises(FlightError, match="lies outside"):
+        flight.add(3, [500.0, 500.0], [1e39, 0.0])
+    assert not flight.present[3]

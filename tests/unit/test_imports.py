@@ -422,3 +422,11 @@ def test_far_from_the_origin_distances_are_those_of_the_file():
     assert any("64 bits" in note for note in notes)
     near = airflock.load_tracks({"t": t, "id": who, "x": east - 5e5, "y": north - 5e6}, unit="m", time_unit="s")
     assert near["position"].dtype == np.float32
+
+
+@pytest.mark.parametrize("far", [2e9, 1e39, 1e308])
+def test_places_that_nobody_flies_at_are_refused_in_one_line(far):
+    table = flock(2)
+    table["x"] += far
+    line = refused(table.drop(columns=["vx", "vy", "cx", "cy"]))
+    assert "\n" not in line and "m from the origin" in line and "bird_" in line

@@ -152,6 +152,7 @@ class Acting(Standing):
         at = vector("position", position, dims, "m")
         spot = self._free("add", [number], at)[0].tolist()
         v = vector("velocity", [0.0] * dims if velocity is None else velocity, dims, "m/s")
+        _within("velocity", v, FASTEST, "m/s", "an agent joins at most so fast")
         join(self._state, number, spot, v)
         self._course.note("add", agent=number, position=at, velocity=v)
         return self

@@ -16,6 +16,7 @@ MOST = 2_000_000_000  # numbers of one recording
 NORMAL = 1.5  # times the usual step: longer is a gap
 NTSC = 1.001  # colour television is slower than its nominal rate by this factor (SMPTE 170M)
 SAME_RATE = 2e-5  # relative: times in whole microseconds, at 30 Hz, are 1e-5 off
+FARTHEST = 1e9  # m from the origin; our choice: no animal and no drone has been there
 COARSE = 0.01  # m; where places are farther apart in single precision, they are kept in double
 
 
@@ -56,8 +57,18 @@ def _round(period: float) -> float:
 
 
 def bits(tracks: list[Track], asked: int) -> tuple[int, float]:
-    """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m."""
-    farthest = max(float(np.nanmax(np.abs(track.stack(POSITION, 3)), initial=0.0)) for track in tracks)
+    """Bits per number that tracks need, at least those asked for; and the step of places in single precision, m.
+
+    Raises RecordingError for places that nobody flies at.
+    """
+    far = [float(np.nanmax(np.abs(track.stack(POSITION, 3)), initial=0.0)) for track in tracks]
+    farthest = max(far)
+    if farthest > FARTHEST:
+        track = tracks[far.index(farthest)]
+        raise RecordingError(
+            f"{track.source}: {track.name}: a position of {farthest:.3g} m; at most {FARTHEST:g} m from the origin; "
+            "check the unit and which columns are read"
+        )
     step = float(np.spacing(np.float32(farthest)))
     return (64 if step > COARSE else asked), step
 

@@ -140,7 +140,7 @@ def load_tracks(
     sources = sorted({track.source for track in tracks})
     kept, step = grid.bits(tracks, precision)
     if kept != precision:
-        findings.notes.append(f"far from the origin: kept with 64 bits, since 32 place individuals {step:.2g} m apart")
+        findings.notes.append(f"far from the origin: kept with 64 bits; 32 tell places there to {step:.2g} m")
     found, shares = grid.recording(tracks, times, period, bridge, kept)
     absent = 1.0 - shares["present"]
     findings.notes.append(

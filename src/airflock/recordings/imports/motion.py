@@ -198,9 +198,8 @@ def surprises(track: Track) -> tuple[NDArray[np.float64], float]:
     off = np.nan_to_num(moved - predicted)
     off[steps > 1.5 * step] = 0.0
     near = np.abs(off[steps <= 1.5 * step])
-    scale = 1.4826 * float(
-        np.median(near, axis=0).max()
-    )  # of the livelier axis: who flies along one rests in the other
+    # of the livelier axis: who flies along one rests in the other
+    scale = 1.4826 * float(np.median(near, axis=0).max())
     steps_of = np.abs(moved[moved != 0.0])
     quantum = float(steps_of.min()) if steps_of.size else 0.0  # of positions that come in steps
     return off, max(scale, quantum, 0.1 * float(np.median(np.abs(moved), axis=0).max()), 1e-9)

@@ -13,8 +13,6 @@ from airflock.recordings.imports.track import POSITION, VELOCITY, Options
 FIELDS = {"timestamp", *POSITION, *VELOCITY}
 # fields of vehicle_local_position that no other table has; source: PX4, msg/VehicleLocalPosition.msg
 MARKS = {"ref_timestamp", "xy_valid", "z_valid", "v_xy_valid", "xy_reset_counter", "vxy_reset_counter", "z_deriv"}
-
-
 ORIGIN = ("ref_lat", "ref_lon", "ref_alt")
 VALID = ("xy_valid", "v_xy_valid")
 
