@@ -91,10 +91,10 @@ def crowd(world, side, duration=0.1):
     })  # fmt: skip
 
 
-def both(found, seed, start=None):
-    """Final states by all pairs, interpreted, and by cells, compiled; their order parameters are the same."""
+def both(found, seed, start=None, by_cells="python"):
+    """Final states by all pairs, interpreted, and by cells on that device; their order parameters are the same."""
     flown, values = [], []
-    for grid, device in ((False, "python"), (True, "cpu")):
+    for grid, device in ((False, "python"), (True, by_cells)):
         plan = plan_of(found, precision=64, grid=grid, near=grid, given_start=start is not None)
         assert plan.grid == plan.near == grid
         done = cpu.fly(plan, tables(found, plan, seed), start, device)
@@ -104,14 +104,18 @@ def both(found, seed, start=None):
     return flown
 
 
+def scattered(side, seed):
+    """A start: 300 agents at random places of a box."""
+    rng = np.random.default_rng(seed)
+    return np.concatenate([rng.uniform(-0.5 * side, 0.5 * side, (3, 300)), rng.normal(0.0, 0.1, (3, 300))])
+
+
 @pytest.mark.parametrize("world", ["bounce", "periodic"])
 @pytest.mark.parametrize("side", [1.3, 3.0])
 def test_grid_is_all_pairs(world, side, seed):
-    start = None  # drawn; the driver of flocks that bounce is that of the stretched ones, which are given theirs
-    if world == "bounce":
-        rng = np.random.default_rng(seed)
-        start = np.concatenate([rng.uniform(-0.5 * side, 0.5 * side, (3, 300)), rng.normal(0.0, 0.1, (3, 300))])
-    one, two = both(crowd(world, side), seed, start)
+    """In a box without edges cells are interpreted, between walls compiled: one driver for all flocks that bounce."""
+    start = scattered(side, seed) if world == "bounce" else None  # or drawn
+    one, two = both(crowd(world, side), seed, start, "cpu" if world == "bounce" else "python")
     assert np.abs(one[3:]).max() > 0.0
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12)
 
@@ -132,7 +136,7 @@ def test_a_flock_along_a_line_or_in_a_plane_is_met_in_full(shape, seed):
     place = rng.uniform(-0.5, 0.5, (300, 3)) * STRETCHED[shape]
     place[1::2] = place[::2] + rng.normal(0.0, 0.1, (150, 3))  # everybody has company
     start = np.concatenate([place.T, rng.normal(0.0, 0.1, (3, 300))])
-    one, two = both(found, seed, start)
+    one, two = both(found, seed, start, "cpu")
     assert np.abs(one[:3] - start[:3]).max() > 1e-3
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-12 * STRETCHED[shape][0])
 
@@ -150,21 +154,21 @@ def test_groups_by_cells_are_those_of_all_pairs(together, seed):
     frames = np.concatenate([place, rng.normal(0.0, 0.1, (3, 300))])[None]
     plans = [plan_of(found, precision=64, grid=near, near=near) for near in (False, True)]
     one, two = (
-        measuring.measured(plan, tables(found, plan, 0), frames, device=device)[0]
-        for plan, device in zip(plans, ("python", "cpu"), strict=True)
+        measuring.measured(plan, tables(found, plan, 0), frames, device="python")[0]
+        for plan in plans
     )
     assert one["n_groups"] > 5.0 and one["share_alone"] > 0.0
     assert two == pytest.approx(one, rel=1e-9, abs=1e-9)
 
 
 def test_the_number_of_threads_changes_no_bit_of_a_grid(seed):
-    found = crowd("periodic", 3.0)
-    plan = plan_of(found, precision=64, grid=True, near=True)
+    found, start = crowd("bounce", 3.0), scattered(3.0, seed)
+    plan = plan_of(found, precision=64, grid=True, near=True, given_start=True)
     most = numba.get_num_threads()
     states, values = [], []
     for threads in sorted({1, min(2, most), most}):
         numba.set_num_threads(threads)
-        flown = cpu.fly(plan, tables(found, plan, seed))
+        flown = cpu.fly(plan, tables(found, plan, seed), start)
         states.append(flown.state)
         values.append(flown.values)
     numba.set_num_threads(most)

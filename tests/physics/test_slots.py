@@ -27,8 +27,7 @@ def test_agents_of_a_grid_fly_and_are_recorded_as_those_of_all_pairs(seed):
     found = load(DISPLAY, DRONES)
     pairs, cells = (plan_of(found, precision=64, record=True, grid=grid) for grid in (False, True))
     assert slotted(cells) and not slotted(pairs)
-    one = cpu.fly(pairs, tables(found, pairs, seed), device="python")
-    two = cpu.fly(cells, tables(found, cells, seed))
+    one, two = (cpu.fly(plan, tables(found, plan, seed), device="python") for plan in (pairs, cells))
     assert one.status == two.status == 0
     assert one.frames is not None and two.frames is not None and len(one.frames) > EVERY
     np.testing.assert_allclose(one.frames, two.frames, rtol=0.0, atol=1e-8)

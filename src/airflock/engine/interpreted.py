@@ -6,6 +6,7 @@ The text lies in a file of the driver cache (`__file__` of the driver), where a 
 """
 
 import hashlib
+import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
@@ -24,6 +25,7 @@ from airflock.core.vectors import as_properties, vectors_of
 from airflock.core.vocabulary import BOUND
 from airflock.engine.passes import driver as drivers
 from airflock.engine.passes.build import Builder
+from airflock.engine.passes.grid import BLOCK
 from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
 from airflock.engine.stages import words
@@ -41,6 +43,7 @@ class Table:
 
     def __init__(self, array: NDArray[Any]):
         self.shape: tuple[int, ...] = array.shape
+        self.dtype = array.dtype
         self.elements: Any = _numbers(array)
         self.array = array
         self.rows: dict[int, Any] = {}
@@ -71,6 +74,11 @@ def opened(given: Any) -> Any:
     return given.item() if isinstance(given, np.generic) else given
 
 
+def _given(name: str, given: Any) -> Any:
+    """What a driver is given for an argument: cells stay arrays, which are cut, reshaped and seen as integers."""
+    return given if name == "cells" else opened(given)
+
+
 def _numbers(array: NDArray[Any]) -> Any:
     """An array whose elements are plain numbers; it writes through."""
     return memoryview(array)  # type: ignore[arg-type]
@@ -81,11 +89,17 @@ def _uncompiled(*function: Callable[..., Any], **_: Any) -> Any:
     return function[0] if function else lambda rule: rule
 
 
+def _copy_block(to: Any, at: int, source: Any, first: int, shift: float) -> None:
+    """A few neighbours in a row, moved by a shift."""
+    to[at : at + BLOCK] = source[first : first + BLOCK] + shift
+
+
 PLAIN: Mapping[str, Any] = {
     "njit": _uncompiled,
     "JIT": {},
     "prange": range,
     "math": math,
+    "np": np,
     "real": float,
     "integer": int,
     "u64": int,
@@ -95,6 +109,7 @@ PLAIN: Mapping[str, Any] = {
     "choose": words.choose,
     "wide_vectors": lambda: None,
     "apart": lambda: None,
+    "copy_block": lambda to, row, at, source, first, shift: _copy_block(to[row], at, source[row], first, shift),
     **{name: getattr(random, name) for name in random.PRIMITIVES},
 }
 
@@ -116,8 +131,8 @@ def replay_driver(plan: Plan) -> ModuleType:
 
 
 def _plainly(plan: Plan) -> Plan:
-    if plan.grid or plan.bits != 64:
-        raise RuleError("an interpreted flight is one of all pairs in double precision")
+    if plan.bits != 64:
+        raise RuleError("an interpreted flight is one in double precision")
     return plan
 
 
@@ -126,7 +141,7 @@ def _driver(build: Builder, label: str, exact: bool) -> ModuleType:
     text = "\n\n".join([HEAD.format(label=label), *build.functions]) + "\n"
     text = must_replace(text, drivers.SPAN, "m = n  # no vectors to fill")
     if build.slots:  # numbers of agents: as a row of plain numbers is seen as integers
-        text = must_replace(text, ".view(np.int64)", '.cast("B").cast("q")')
+        text = must_replace(text, "].view(np.int64)", '].cast("B").cast("q")')
     text = text if exact else _skipping(text)
     folder = cache_folder() / hashlib.sha256(text.encode()).hexdigest()[:20]
     folder.mkdir(parents=True, exist_ok=True)
@@ -142,7 +157,7 @@ def _driver(build: Builder, label: str, exact: bool) -> ModuleType:
     _let_perceive(build, space)
     last = build.functions[-1].partition("def ")[2].partition("(")[0]
     entry = space[last]
-    space[last] = lambda *given: entry(*map(opened, given))
+    space[last] = lambda *given: entry(*map(_given, inspect.signature(entry).parameters, given))
     driver.ROWS = dict(build.rows)  # type: ignore[attr-defined]
     return driver
 
