@@ -80,17 +80,18 @@ def silent(seed):
     generator, _ = truth(seed)
     walk = scenario.sensors.noise * scenario.sensors.damping
     ahead = replace(logs, velocity=logs.command + generator.normal(0.0, 0.05, logs.command.shape))
+    period = scenario.sensors.period
     short = synthetic.stand(seed, 2, 10.0, scenario.sensors, LOGGER, generator)
-    slow = logs_of(seed, **{"metrics.period": scenario.sensors.period})[1]
+    slow = logs_of(seed, **{"metrics.period": period})[1]
     one_way = heard[heard["receiver"] < heard["sender"]]
     near = heard[heard["distance"] < NEAR]
     tries = {
         "limit never reached": (("a_max",), body.fit_body(logs, scenario.flight.dt, walk).refused),
         "runs ahead of its commands": (("tau", "a_max", "noise"), body.fit_body(ahead, scenario.flight.dt).refused),
-        "10 s of standing": (("noise", "damping", "scale"), sensors.fit_sensors(short, scenario.sensors.period).refused),
+        "10 s of standing": (("noise", "damping", "scale"), sensors.fit_sensors(short, period).refused),
         "packets one way": (("delay",), {"delay": packets.fit_delay(one_way).reason}),
         "all pairs near": (("near", "far", "received_far"),
-                           packets.fit_links(near, scenario.sensors.period, scenario.radio).refused),
+                           packets.fit_links(near, period, scenario.radio).refused),
         "logged once a decision": (("period",), {"period": periods.decision_period(slow)[2]}),
     }  # fmt: skip
     told = [f"{state}: {name}" for state, (names, reasons) in tries.items() for name in names if not reasons.get(name)]

@@ -153,10 +153,7 @@ def test_groups_by_cells_are_those_of_all_pairs(together, seed):
     place = (centres + rng.normal(0.0, 0.1, (3, 300)) + 2.0) % 4.0 - 2.0
     frames = np.concatenate([place, rng.normal(0.0, 0.1, (3, 300))])[None]
     plans = [plan_of(found, precision=64, grid=near, near=near) for near in (False, True)]
-    one, two = (
-        measuring.measured(plan, tables(found, plan, 0), frames, device="python")[0]
-        for plan in plans
-    )
+    one, two = (measuring.measured(plan, tables(found, plan, 0), frames, device="python")[0] for plan in plans)
     assert one["n_groups"] > 5.0 and one["share_alone"] > 0.0
     assert two == pytest.approx(one, rel=1e-9, abs=1e-9)
 

@@ -14,7 +14,8 @@ NAMES = ("phi_corr", "n_clust", "n_disc", "r_min", "phi_vel", "phi_wall", "phi_c
 
 @pytest.fixture(scope="module")
 def recording():
-    return airflock.simulate(load("vasarhelyi_2018/4ms", {"agents": 8, "duration": 12.0, "start.kind": "ball"}), 3)
+    keys = {"agents": 8, "duration": 12.0, "start.kind": "ball"}
+    return airflock.simulate(load("vasarhelyi_2018/4ms", keys), 3, device="python")
 
 
 def without(recording, missing):

@@ -74,6 +74,7 @@ def test_a_second_writer_is_refused_in_one_line(tmp_path):
     try:
         while landed(tmp_path / "a") < 1 and running.poll() is None:
             time.sleep(0.05)
+        running.send_signal(signal.SIGSTOP)  # it has the folder, and flies nothing meanwhile
         second = subprocess.run([*asked, "--resume"], capture_output=True, text=True, timeout=120)
         assert second.returncode == 2 and second.stderr.count("\n") == 1
         assert f"another process (process {running.pid} on" in second.stderr

@@ -122,7 +122,7 @@ def test_whoever_is_absent_is_not_shown_and_stays_where_it_was(recording):
 def test_layers_hold_clusters_faults_groups_and_what_the_recording_knows_of_each():
     given = {"agents": 12, "duration": 6.0, "groups": [{"agents": [4, 5], "name": "slow"}, {"name": "rest"}]}
     scenario = airflock.load("vasarhelyi_2018/4ms", given)
-    recording = airflock.simulate(scenario, 1, events=[{"step": 200, "kind": "fault", "data": MOTOR}])
+    recording = airflock.simulate(scenario, 1, events=[{"step": 200, "kind": "fault", "data": MOTOR}], device="python")
     speed = np.sqrt((recording["velocity"] ** 2).sum("space")).isel(keypoint=0, drop=True)
     page = airflock.replay(recording.assign(pace=speed), colour="pace")
     told, rows = {layer["name"]: layer for layer in about(page)["layers"]}, shown(page)
