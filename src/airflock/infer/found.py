@@ -57,7 +57,7 @@ class Law:
     price       : gain that so many numbers bring by chance: half of each times log(steps) (Schwarz 1978)
     criterion   : Akaike's, of the fit, below that of going straight on; negative is better
     inside      : share of held-out differences within the 95 % that are predicted
-    missed      : share of what is explained with a free answer to neighbours added that the law alone leaves over, 0 to 1
+    missed      : share of what is explained with a free answer to neighbours beside the law that it leaves over, 0 to 1
     numbers     : fitted; with intervals for the best law alone
     """
 
@@ -139,7 +139,9 @@ def verdict_of(laws: list[Law]) -> tuple[Law | None, str]:
     as_well = [law for law in rivals(laws, SIMPLER) if _explains(law)]
     best = min([first, *as_well], key=lambda law: len(law.numbers))  # of equally many the first
     missed = (
-        f"; a free answer to neighbours would explain {best.missed:.0%} of the whole beside it" if best.missed > 0.05 else ""
+        f"; a free answer to neighbours would explain {best.missed:.0%} of the whole beside it"
+        if best.missed > 0.05
+        else ""
     )
     if best is not first:
         few, many = f"{best.name} explains the tracks with {len(best.numbers)} numbers", len(first.numbers)
