@@ -187,6 +187,18 @@ def test_presets_are_sound_and_every_number_has_a_source(name):
                 assert value.get("source"), f"{name}: {section}.{key} has no source"
 
 
+@pytest.mark.parametrize("name", presets())
+def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(name):
+    """Also where the preset says `kind = { value = "links", source = ... }`; the kind of today leaves all as it is."""
+    plain = load(name)
+    now = {"radio.kind": plain.transceiver.name, "sensors.kind": plain.sensor.name}
+    again = load(name, now)
+    assert again.radio == plain.radio and again.sensors == plain.sensors
+    other = load(name, {"radio.kind": "constant", "sensors.kind": "perfect"})
+    assert (other.transceiver.name, other.radio.delay, other.sensor.name) == ("constant", plain.radio.delay, "perfect")
+    assert not any("{" in note for note in other.notes)
+
+
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():
     found = load("vasarhelyi_2018/4ms", {
         "agents": np.int64(3), "model.v_flock": np.float32(5), "world.arena": "polygon", "world.walls": "every_edge",

@@ -23,8 +23,7 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
             continue
         kept = family.kept(given, str(settings[key]))
         if set(given) - {"kind", *kept}:
-            kind = given.get("kind", family.usual)
-            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {kind} are left out")
+            notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
         document = {**document, section: kept}
     return document, tuple(notes)
 

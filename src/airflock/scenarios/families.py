@@ -89,9 +89,10 @@ class Family(Generic[T]):
 
     def kept(self, table: Mapping[str, Any], other: str) -> dict[str, Any]:
         """The keys of a section that stay when its kind becomes another: all where both have the same numbers."""
-        ours = [self.known[kind] for kind in (table.get("kind", self.usual), other) if kind in self.known]
+        before = self.kind({self.section: table})
+        ours = [self.known[kind] for kind in (before, other) if isinstance(kind, str) and kind in self.known]
         alike = len(ours) == 2 and len({getattr(one, "Parameters", None) for one in ours}) == 1
-        every = self.shared is None or alike or other == table.get("kind", self.usual)
+        every = self.shared is None or alike or other == before
         return {key: value for key, value in table.items() if key != "kind" and (every or key in (self.shared or ()))}
 
 
