@@ -159,7 +159,8 @@ class World:
         )  # fmt: skip
         surfaces.boundaries(range(n), flock, numbers, whole, self.rest["faces"], around, plan=plan, model=model)
         deciding.decide(
-            range(n), flock, numbers, whole, around, step, 0.7, None, None, plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
+            range(n), flock, numbers, whole, around, step, 0.7, None, None,
+            plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
         )  # fmt: skip
         state["fastest"] = motion.move(
             range(n), range(n), flock, numbers, step, n,

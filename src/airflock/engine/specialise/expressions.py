@@ -7,7 +7,7 @@ import math
 import operator
 import types
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -227,8 +227,8 @@ class Expressions:
                 return called(*arguments)
             return self.helper(called, node, arguments, scope)
         keywords = {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg}
-        if is_dataclass(called) and called.__module__ == records.__name__:
-            return called(*arguments, **keywords)  # taken apart again wherever it is read
+        if isinstance(called, type) and called.__module__ == records.__name__:
+            return called(*arguments, **keywords)  # taken apart again wherever a field is read
         late = residual(called) or isinstance(called, types.FunctionType) or _record(called)
         if not late and not any(residual(a) for a in (*arguments, *keywords.values())):
             return called(*arguments, **keywords)

@@ -49,9 +49,7 @@ def shade(
         flock.clear[j] = open_way
 
 
-def unshaded(
-    i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan
-) -> Any:
+def unshaded(i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan) -> Any:
     """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
     x = flock.position
     open_way = ONE

@@ -41,9 +41,8 @@ def tried(
     for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
         s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
     free = (
-        excursion(
-            s[X], s[Y], s[Z], w, around.edges, around.spans, whole.corners, whole.obstacles, around.scene
-        ) <= -w.wall_clearance
+        excursion(s[X], s[Y], s[Z], w, around.edges, around.spans, whole.corners, whole.obstacles, around.scene)
+        <= -w.wall_clearance
         if plan.bounded
         else True
     )
