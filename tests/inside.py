@@ -98,6 +98,7 @@ NAMES = {
     "clusters_of": ("stages.clusters", "clusters_of"),
     "EVERY": ("stages.flight", "EVERY"),
     "Flock": ("stages.state", "Flock"),
+    "Surroundings": ("stages.records", "Surroundings"),
     "Itself": ("stages.words", "Itself"),
     "ZERO": ("stages.words", "ZERO"),
     "ask": ("stages.words", "ask"),

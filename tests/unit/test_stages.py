@@ -13,7 +13,7 @@ import pytest
 from airflock.core import random
 from airflock.engine import plan_of
 from flocks import ISLANDS, NOTCHED, scenario
-from inside import WHOLE, Flock, Itself, clusters_of, stages, tables
+from inside import WHOLE, Flock, Itself, Surroundings, clusters_of, stages, tables
 from inside import passes_decide as decide
 from inside import passes_driver as driver
 from inside import passes_measure as measure
@@ -148,18 +148,18 @@ class World:
 
         fields = decide._asked(self.build, words.live(model.Sums, plan.dimensions))
         sums = tuple((c, model.reduce.get(model.Sums._fields[c], "sum")) for c in fields)
-        around = [self.rest[name] for name in ("edges", "spans", "scene")]
+        around = self.around()
 
         def pick(i):
-            meet.meet(flock, numbers, whole, i, range(n), n, n, step, *around, plan=plan)
+            meet.meet(flock, numbers, whole, around, i, range(n), n, n, step, plan=plan)
 
         neighbours.neighbours(
-            range(n), range(n), flock, numbers, whole, n, step, 0.7, 0.2, *around, state["words"], draw, None, pick,
+            range(n), range(n), flock, numbers, whole, around, n, step, 0.7, 0.2, state["words"], draw, None, pick,
             plan=plan, model=model, sums=sums, images=plan.periodic,
         )  # fmt: skip
-        surfaces.boundaries(range(n), flock, numbers, whole, *self.rest.values(), plan=plan, model=model)
+        surfaces.boundaries(range(n), flock, numbers, whole, self.rest["faces"], around, plan=plan, model=model)
         deciding.decide(
-            range(n), flock, numbers, whole, step, 0.7, None, *list(self.rest.values())[1:], None,
+            range(n), flock, numbers, whole, around, step, 0.7, None, None,
             plan=plan, model=model, summed=fields, walled=words.live(model.Walls, plan.dimensions),
         )  # fmt: skip
         state["fastest"] = motion.move(
@@ -182,6 +182,10 @@ class World:
 
         return Flock(take, self.plan.dimensions, Itself())
 
+    def around(self):
+        """What stands in the world."""
+        return Surroundings(*(self.rest[name] for name in ("edges", "spans", "scene")))
+
     def numbers(self):
         """Records of numbers as a stage reads them."""
         found, at = types.SimpleNamespace(wing=None, aero=None), 0
@@ -198,7 +202,7 @@ class World:
         ended = [self.text()["begin"](n, n, self.row, self.tables.whole.tolist(), text, *rest[:2], None, rest[2])]
         flock = self.flock(direct)
         far = partial(start.excursion, plan=self.plan)
-        ended += [start.begin(flock, self.numbers(), self.whole, n, n, *rest[:2], None, rest[2], far, plan=self.plan)]
+        ended += [start.begin(flock, self.numbers(), self.whole, self.around(), n, n, None, far, plan=self.plan)]
         return ended, text, direct
 
     def samples(self, clock):
@@ -208,13 +212,13 @@ class World:
         whole = self.tables.whole.tolist()
         for text in (True, False):
             work, values, memory = self.state["work"].copy(), np.zeros(40), np.ones((9, n))
-            parts = (edges, spans, scene, memory, np.zeros((2, n), int), values)
+            parts = (memory, np.zeros((2, n), int), values)
             if text:
-                least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, *parts)
+                least = self.text()[f"measure_{clock}"](0.7, n, n, self.row, whole, work, edges, spans, scene, *parts)
             else:
                 metrics = measure.measured(self.plan, clock)
                 least = judging.measure(
-                    self.flock(work), self.numbers(), self.whole, 0.7, n, n, *parts,
+                    self.flock(work), self.numbers(), self.whole, self.around(), 0.7, n, n, *parts,
                     partial(start.excursion, plan=self.plan), {}, {one.metric.name: clusters_of for one in metrics},
                     plan=self.plan, metrics=metrics, nearest=clock == "collision", over=None, abreast=True,
                     summed="xvh",

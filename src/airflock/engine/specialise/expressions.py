@@ -25,7 +25,7 @@ from airflock.engine.specialise.values import (
     residual,
     text_of,
 )
-from airflock.engine.stages import words
+from airflock.engine.stages import records, words
 from airflock.engine.stages.words import Itself, Named, Nothing
 
 # of the driver, whatever they are called with
@@ -227,6 +227,8 @@ class Expressions:
                 return called(*arguments)
             return self.helper(called, node, arguments, scope)
         keywords = {k.arg: self.value(k.value, scope) for k in node.keywords if k.arg}
+        if isinstance(called, type) and called.__module__ == records.__name__:
+            return called(*arguments, **keywords)  # taken apart again wherever a field is read
         late = residual(called) or isinstance(called, types.FunctionType) or _record(called)
         if not late and not any(residual(a) for a in (*arguments, *keywords.values())):
             return called(*arguments, **keywords)

@@ -27,11 +27,13 @@ from airflock.engine.specialise.values import (
     text_of,
 )
 from airflock.engine.stages import words
+from airflock.engine.stages.records import Cells, Surroundings
 from airflock.engine.stages.state import SCENE, Flock, own_row
 from airflock.engine.stages.words import Itself, Named
 from airflock.rules.nodes import walk
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
+CELLS = ("starts", "whose", "flat", "count")  # what a driver calls what it has sorted
 UNROLLED = (range, tuple, list, enumerate, zip)
 
 
@@ -97,13 +99,16 @@ class _Statements(Expressions):
         kinds = {letter: self.build.kind(letter, plan.records[letter]) for letter in letters}
         own = {"own": {letter: ast.Name(kind, LOAD) for letter, kind in kinds.items()}}
         number: object = given("order", "number") if self.build.slots else Itself()
+        scene = Bundle("scene", SCENE)
         standing = {
             "plan": plan,
             "model": plan.model,
             "flock": Flock(take, plan.dimensions, number),
             "numbers": SimpleNamespace(**{letter: given(letter, "record") for letter in plan.records} | own),
             "whole": SimpleNamespace(**{name: given(name, "whole") for name in WHOLE}),
-            "scene": Bundle("scene", SCENE),
+            "scene": scene,
+            "around": Surroundings(given("edges", "argument"), given("spans", "argument"), scene),
+            "cells": Cells(*(given(name, "argument") for name in CELLS)),
             "agents": Loop("n", agents=True, law=plan.law),
             "lanes": Loop("m", agents=True),
             "others": Loop("m", agents=False),

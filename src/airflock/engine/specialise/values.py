@@ -83,7 +83,8 @@ def argument(name: str) -> ast.Name:
 def given(name: str, kind: str, item: object = None) -> ast.Name:
     """A name that the driver binds for a stage.
 
-    kind : row, number, record, whole or scene; or rule, the plain function or class `item`, which is named at the end
+    kind : row, number, record, whole or scene; argument, of the driver's function; or rule, the plain function or class
+           `item`, which is named at the end
     """
     made = ast.Name(name, LOAD)
     made.kind, made.item = kind, item  # type: ignore[attr-defined]

@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.meet import free_way
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import ONE, SIDES, TINY, ZERO, X, Y, Z, choose, integer, least, vector
 from airflock.world.edges import nearest_image
@@ -40,18 +41,15 @@ def crowd(i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, *, p
 
 
 def shade(
-    i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any,
-    *, plan: Plan,
-) -> None:  # fmt: skip
+    i: int, others: Iterable[int], range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan
+) -> None:
     """Between agent i and whom obstacles or the scene stand, as both truly are: row `clear`."""
     for j in others:
-        open_way = unshaded(i, j, range2, flock, w, whole, edges, spans, scene, plan=plan)
+        open_way = unshaded(i, j, range2, flock, w, whole, around, plan=plan)
         flock.clear[j] = open_way
 
 
-def unshaded(
-    i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan
-) -> Any:
+def unshaded(i: int, j: int, range2: Any, flock: Flock, w: Any, whole: Any, around: Surroundings, *, plan: Plan) -> Any:
     """Whether nothing stands between two agents in range of each other, as both truly are, 1 or 0."""
     x = flock.position
     open_way = ONE
@@ -64,6 +62,6 @@ def unshaded(
         ux = o[X] / r
         uy = o[Y] / r
         uz = o[Z] / r
-        free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
+        free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, around, plan=plan)
         open_way = ZERO if free < r else ONE
     return open_way

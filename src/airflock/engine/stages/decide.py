@@ -9,6 +9,7 @@ from airflock.core.contract import Model
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Own
 from airflock.engine.plan import Plan
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.state import Columns, Flock, entry_of, numbers_of, tree
 from airflock.engine.stages.words import ONE, ZERO, X, Y, Z, ask, fields, real, vector, wants
 from airflock.world import bvh
@@ -58,8 +59,8 @@ def add(
 
 
 def decide(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, decision: int, time: float, mem: Any,
-    edges: Any, spans: Any, scene: Any, percept_of: Callable[..., Any],
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, around: Surroundings, decision: int, time: float,
+    mem: Any, percept_of: Callable[..., Any],
     *, plan: Plan, model: Model, summed: Iterable[int], walled: Iterable[int],
 ) -> None:  # fmt: skip
     """Ask each agent's law for a command, and keep what it remembers.
@@ -68,7 +69,7 @@ def decide(
     percept_of     : makes a record of what is perceived; its fields are those of `passes.percept.record`, in order
     summed, walled : fields of Sums and Walls that neighbours and surfaces have summed
     """
-    axes, m, w = range(plan.dimensions), flock.measured_position, numbers.w
+    axes, m, w, scene = range(plan.dimensions), flock.measured_position, numbers.w, around.scene
     perceives = asks(model, "percept")
     for i in agents:
         own_p = numbers_of(i, "p", flock, numbers, plan=plan)
@@ -97,7 +98,7 @@ def decide(
                 time, *[-m[a][i] if a in axes else ZERO for a in (X, Y, Z)],
                 *[offset(i, a, flock, scene, plan=plan) for a in (X, Y, Z)], w.half_x, w.half_y, w.half_z,
                 flock.number[i], decision, whole.world, whole.seed_low, whole.seed_high, whole.corners,
-                whole.obstacles, edges, spans, *seen, *casts,
+                whole.obstacles, around.edges, around.spans, *seen, *casts,
             )  # fmt: skip
         o = ask(
             model.decide, own=own, sums=sums, walls=walls, shared=shared, memory=memory,

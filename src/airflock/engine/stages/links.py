@@ -14,42 +14,41 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.clusters import mean_over, member
 from airflock.engine.stages.measure import add, clear, filled
 from airflock.engine.stages.near import apart, placed, wrapped
+from airflock.engine.stages.records import Cells, Growing
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import ZERO, X, Y, Z, ask, real, totals, vector
 
 
 def joined(
-    here: int, tail: int, own: Any, numbers: Any, starts: Any, flat: Any, left: Any, places: Any, reached: Any,
-    cell: Any, *, plan: Plan, metric: Metric,
+    here: int, tail: int, own: Any, numbers: Any, cells: Cells, grown: Growing, *, plan: Plan, metric: Metric
 ) -> Any:  # fmt: skip
     """Take whoever is left in a cell and linked to a place into the cluster; returns how many have been reached."""
-    k = starts[here]
-    end = k + left[here]
+    k = cells.starts[here]
+    end = k + grown.left[here]
     while k < end:
-        f = places[k]
+        f = grown.places[k]
         d = vector()
-        r2 = apart(d, own, flat, f, numbers.w, plan=plan)
+        r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
         r = math.sqrt(r2)
         if ask(metric.linked, r=r, r2=r2, q=numbers.q):
             end -= 1
-            places[k] = places[end]
-            reached[tail] = f
-            cell[tail] = here
+            grown.places[k] = grown.places[end]
+            grown.reached[tail] = f
+            grown.cell[tail] = here
             tail += 1
         else:
             k += 1
-    left[here] = end - starts[here]
+    grown.left[here] = end - cells.starts[here]
     return tail
 
 
 def expanded(
-    f: int, own_cell: int, tail: int, numbers: Any, starts: Any, flat: Any, left: Any, places: Any, count: Any,
-    reached: Any, cell: Any, *, plan: Plan, metric: Metric,
+    f: int, own_cell: int, tail: int, numbers: Any, cells: Cells, grown: Growing, *, plan: Plan, metric: Metric
 ) -> Any:  # fmt: skip
     """The same of all cells around that of the agent at place f."""
-    own, at, low, high = vector(), vector(), vector(), vector()
+    own, at, low, high, count = vector(), vector(), vector(), vector(), cells.count
     for a in range(plan.dimensions):
-        own[a] = flat[a, f]
+        own[a] = cells.flat[a, f]
     placed(at, own_cell, count)
     for a in range(plan.dimensions):
         low[a] = at[a] - 1 if plan.periodic else max(at[a] - 1, 0)
@@ -62,9 +61,7 @@ def expanded(
             row = wrapped(qz, count[Z], plan=plan) * count[Y] + wrapped(qy, count[Y], plan=plan)
             for qx in range(low[X], high[X]):
                 here = row * count[X] + wrapped(qx, count[X], plan=plan)
-                tail = joined(
-                    here, tail, own, numbers, starts, flat, left, places, reached, cell, plan=plan, metric=metric
-                )  # fmt: skip
+                tail = joined(here, tail, own, numbers, cells, grown, plan=plan, metric=metric)
     return tail
 
 
@@ -106,18 +103,18 @@ def members_of(
 
 
 def clusters_by_cells(
-    metric: Metric, mean: Mean, flock: Flock, numbers: Any, n: int, labels: Any, starts: Any, tally: Any, whose: Any,
-    ident: Any, flat: Any, count: Any, *, plan: Plan,
+    metric: Metric, mean: Mean, flock: Flock, numbers: Any, n: int, labels: Any, cells: Cells, tally: Any, ident: Any,
+    *, plan: Plan,
 ) -> Any:  # fmt: skip
-    """Sum the cluster rule of one metric over all clusters.
+    """Sum the cluster rule of one metric over all clusters, by cells that are no smaller than links are long.
 
     labels       : two rows of integers, scratch: places of all agents, cluster by cluster, and their cells
     tally, ident : integers, scratch: how many of a cell are left, and at which places
-    starts, whose, flat, count : as for `pairs_by_cells`, of cells that are no smaller than links are long
     """
-    u = totals()
+    u, count, starts = totals(), cells.count, cells.starts
     reached = labels[0]
     cell = labels[1]
+    grown = Growing(tally, ident, reached, cell)
     clear(u, metric.Cluster, metric)
     for c in range(count[X] * count[Y] * count[Z]):
         tally[c] = starts[c + 1] - starts[c]
@@ -132,15 +129,12 @@ def clusters_by_cells(
             tail = done + 1
             e = done
             while e < tail:
-                tail = expanded(
-                    reached[e], cell[e], tail, numbers, starts, flat, tally, ident, count, reached, cell, plan=plan,
-                    metric=metric,
-                )  # fmt: skip
+                tail = expanded(reached[e], cell[e], tail, numbers, cells, grown, plan=plan, metric=metric)
                 e += 1
             s, v, h = vector(), vector(), vector()
-            hh = sums_over(done, tail, s, v, h, flock, whose, reached, plan=plan, metric=metric)
+            hh = sums_over(done, tail, s, v, h, flock, cells.whose, reached, plan=plan, metric=metric)
             own_mean = mean_over(tail - done, s, v, h, mean, plan=plan, metric=metric)
-            members = members_of(done, tail, own_mean, flock, numbers, whose, reached, metric=metric)
+            members = members_of(done, tail, own_mean, flock, numbers, cells.whose, reached, metric=metric)
             t = ask(
                 metric.cluster, n=real(tail - done), hx=h[X], hy=h[Y], hz=h[Z], hh=hh, members=members, mean=own_mean,
                 q=numbers.q,

@@ -8,6 +8,7 @@ from airflock.core.contract import Metric
 from airflock.core.maths import norm
 from airflock.core.vocabulary import Mean
 from airflock.engine.plan import Plan
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.scene import contacts
 from airflock.engine.stages.state import Axes, Flock, entry_of
 from airflock.engine.stages.words import (
@@ -230,8 +231,8 @@ def agents_of(metric: Metric, row: int, mean: Any, flock: Flock, numbers: Any, n
 
 
 def measure(
-    flock: Flock, numbers: Any, whole: Any, time: float, n: int, m: int, edges: Any, spans: Any, scene: Any,
-    memory: Any, labels: Any, values: Any,
+    flock: Flock, numbers: Any, whole: Any, around: Surroundings, time: float, n: int, m: int, memory: Any, labels: Any,
+    values: Any,
     excursion: Callable[..., Any], survey: Mapping[str, Callable[[], None]],
     clustered: Mapping[str, Callable[..., Any]],
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool, over: Callable[[], Any] | None,
@@ -257,10 +258,11 @@ def measure(
     if any(wants(one.metric.agent, "excursion") for one in metrics):
         for i in range(n):
             flock.excursion[i] = excursion(
-                x[X][i], x[Y][i], x[Z][i], numbers.w, edges, spans, whole.corners, whole.obstacles, scene
-            )
+                x[X][i], x[Y][i], x[Z][i], numbers.w, around.edges, around.spans, whole.corners, whole.obstacles,
+                around.scene,
+            )  # fmt: skip
     if any(wants(one.metric.agent, "touches") for one in metrics):
-        contacts(flock, numbers, n, scene, plan=plan)
+        contacts(flock, numbers, n, around.scene, plan=plan)
     for one in metrics:
         if one.metric.survey is not None:
             survey[one.metric.name]()

@@ -7,6 +7,7 @@ from typing import Any
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.percept import to_obstacle
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
 from airflock.world import bvh
@@ -20,22 +21,19 @@ def pair_number(i: int, j: int, n: int, flock: Flock, whole: Any, *, plan: Plan)
 
 
 def free_way(
-    x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, r: Any, whole: Any, edges: Any, spans: Any, scene: Any,
-    *, plan: Plan,
-) -> Any:  # fmt: skip
+    x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, r: Any, whole: Any, around: Surroundings, *, plan: Plan
+) -> Any:
     """How far (m) obstacles and the scene leave a ray free on its first r metres."""
     free = r
     if plan.obstacles:
         for o in range(whole.obstacles):
-            free = least(free, to_obstacle(x, y, z, ux, uy, uz, edges, spans, o, plan=plan))
+            free = least(free, to_obstacle(x, y, z, ux, uy, uz, around.edges, around.spans, o, plan=plan))
     if plan.scene:
-        free = least(free, bvh.cast(x, y, z, ux, uy, uz, r, ZERO, *tree(scene)))
+        free = least(free, bvh.cast(x, y, z, ux, uy, uz, r, ZERO, *tree(around.scene)))
     return free
 
 
-def hide(
-    i: int, others: Iterable[int], flock: Flock, whole: Any, edges: Any, spans: Any, scene: Any, *, plan: Plan
-) -> None:
+def hide(i: int, others: Iterable[int], flock: Flock, whole: Any, around: Surroundings, *, plan: Plan) -> None:
     """Whom obstacles or the scene hide from agent i, as it believes both to be placed: row `hidden`."""
     x = flock.measured_position
     for j in others:
@@ -45,7 +43,7 @@ def hide(
             ux = flock.away[X][j] / r
             uy = flock.away[Y][j] / r
             uz = flock.away[Z][j] / r
-            free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, edges, spans, scene, plan=plan)
+            free = free_way(x[X][i], x[Y][i], x[Z][i], ux, uy, uz, r, whole, around, plan=plan)
             flock.hidden[j] = ONE if free < r else ZERO
 
 
@@ -61,12 +59,12 @@ def fade(i: int, others: Iterable[int], n: int, decision: int, flock: Flock, who
 
 
 def meet(
-    flock: Flock, numbers: Any, whole: Any, i: int, others: Iterable[int], n: int, m: int, decision: int, edges: Any,
-    spans: Any, scene: Any, *, plan: Plan,
+    flock: Flock, numbers: Any, whole: Any, around: Surroundings, i: int, others: Iterable[int], n: int, m: int,
+    decision: int, *, plan: Plan,
 ) -> None:  # fmt: skip
     """Whom agent i meets of those whom it hears, as it believes them to be placed: row `met`."""
     if plan.hides:
-        hide(i, others, flock, whole, edges, spans, scene, plan=plan)
+        hide(i, others, flock, whole, around, plan=plan)
     if plan.fades:
         fade(i, others, n, decision, flock, whole, plan=plan)
     ask(

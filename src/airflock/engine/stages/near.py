@@ -11,6 +11,7 @@ import numpy as np
 
 from airflock.engine.plan import Plan
 from airflock.engine.stages.measure import Measured, names_of, ways
+from airflock.engine.stages.records import Cells, Home
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import (
     FAR,
@@ -62,19 +63,19 @@ def apart(d: Any, own: Any, flat: Any, f: int, w: Any, *, plan: Plan) -> Any:
 
 
 def in_run(
-    first: Any, last: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, whose: Any,
-    flat: Any, *, plan: Plan, paired: list[Measured], nearest: bool,
+    first: Any, last: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, cells: Cells,
+    *, plan: Plan, paired: list[Measured], nearest: bool,
 ) -> Any:  # fmt: skip
     """Add all pairs with those at places first to last - 1 to the sums of the agent at place e; its least square."""
     for f in range(first, last):
         d = vector()
-        r2 = apart(d, own, flat, f, numbers.w, plan=plan)
+        r2 = apart(d, own, cells.flat, f, numbers.w, plan=plan)
         r = math.sqrt(r2)
         ok = f != e
         for metric, _, _, start in paired:
             t = ask(
                 metric.pair, dx=d[X], dy=d[Y], dz=d[Z], r=r, r2=r2, q=numbers.q,
-                lower=(ONE if integer(flock.number[whose[f]]) < ii else ZERO),
+                lower=(ONE if integer(flock.number[cells.whose[f]]) < ii else ZERO),
             )  # fmt: skip
             for c, way in enumerate(ways(metric.Pair, metric)):
                 sums[start + c] = reduced(way, sums[start + c], choose(ok, t[c], START[way]))
@@ -84,16 +85,14 @@ def in_run(
 
 
 def in_ring(
-    ring: int, at: Any, low: Any, high: Any, count: Any, e: int, ii: Any, near2: Any, own: Any, sums: Any,
-    flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any,
+    ring: int, home: Home, e: int, ii: Any, near2: Any, own: Any, sums: Any, flock: Flock, numbers: Any, cells: Cells,
     *, plan: Plan, paired: list[Measured], nearest: bool,
 ) -> Any:  # fmt: skip
     """The same of all cells of a ring around the cell of the agent, of the first ring with what is inside of it.
 
     Cells side by side along x are one run of places; a run that goes over the ends of a periodic box is cut there.
-
-    low, high : how many cells there are below and above its own, along each axis
     """
+    at, low, high, count, starts = home.at, home.low, home.high, cells.count, cells.starts
     for oz in range(max(-ring, low[Z]), min(ring, high[Z]) + 1):
         for oy in range(max(-ring, low[Y]), min(ring, high[Y]) + 1):
             row = wrapped(at[Z] + oz, count[Z], plan=plan) * count[Y] + wrapped(at[Y] + oy, count[Y], plan=plan)
@@ -109,7 +108,7 @@ def in_ring(
                     if begin < stop:
                         near2 = in_run(
                             starts[row * count[X] + begin], starts[row * count[X] + stop], e, ii, near2, own, sums,
-                            flock, numbers, whose, flat, plan=plan, paired=paired, nearest=nearest,
+                            flock, numbers, cells, plan=plan, paired=paired, nearest=nearest,
                         )  # fmt: skip
     return near2
 
@@ -128,15 +127,15 @@ def unsettled(beyond: Any, near2: Any, sums: Any, numbers: Any, *, paired: list[
 
 
 def pairs_of_place(
-    e: int, at: Any, low: Any, high: Any, flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any, side: Any,
-    rings: int, count: Any, *, plan: Plan, paired: list[Measured], nearest: bool,
+    e: int, home: Home, flock: Flock, numbers: Any, cells: Cells, side: Any, rings: int,
+    *, plan: Plan, paired: list[Measured], nearest: bool,
 ) -> Any:  # fmt: skip
     """Sum the pair rules for the agent at place e, ring by ring; returns the square of its least distance, m²."""
-    i = whose[e]
+    i = cells.whose[e]
     ii = integer(flock.number[i])
     own, sums = vector(), totals()
     for a in range(plan.dimensions):
-        own[a] = flat[a, e]
+        own[a] = cells.flat[a, e]
     for metric, _, _, first in paired:
         for c, way in enumerate(ways(metric.Pair, metric)):
             sums[first + c] = START[way]
@@ -145,8 +144,7 @@ def pairs_of_place(
     going = 1
     while going == 1:
         near2 = in_ring(
-            ring, at, low, high, count, e, ii, near2, own, sums, flock, numbers, starts, whose, flat, plan=plan,
-            paired=paired, nearest=nearest,
+            ring, home, e, ii, near2, own, sums, flock, numbers, cells, plan=plan, paired=paired, nearest=nearest
         )  # fmt: skip
         beyond = real(SURE) * real(ring) * side
         open_ = unsettled(beyond, near2, sums, numbers, paired=paired, nearest=nearest)
@@ -159,15 +157,15 @@ def pairs_of_place(
 
 
 def pairs_by_cells(
-    flock: Flock, numbers: Any, starts: Any, whose: Any, flat: Any, sides: Any, count: Any,
+    flock: Flock, numbers: Any, cells: Cells, sides: Any,
     *, plan: Plan, metrics: tuple[Measured, ...], nearest: bool,
 ) -> Any:  # fmt: skip
     """What `pairs` finds, for metrics that say when their pairs are `settled`.
 
-    starts, whose, flat : first place of each cell, who is at each place, and their states
-    sides, count        : size of a cell (m), and number of cells, along each axis
+    sides : size of a cell along each axis, m
     """
     paired = [one for one in metrics if one.metric.pair is not None]
+    count, starts = cells.count, cells.starts
     total = count[X] * count[Y] * count[Z]
     side = sides[X]
     rings = count[X]
@@ -178,6 +176,7 @@ def pairs_by_cells(
     for part in repeat(PARTS):
         part2 = FAR
         at, low, high = vector(), vector(), vector()
+        home = Home(at, low, high)
         for here in range(total * part // PARTS, total * (part + 1) // PARTS):
             if starts[here] < starts[here + 1]:
                 placed(at, here, count)
@@ -186,8 +185,7 @@ def pairs_by_cells(
                     high[a] = count[a] // 2 if plan.periodic else count[a] - 1 - at[a]
                 for e in range(starts[here], starts[here + 1]):
                     near2 = pairs_of_place(
-                        e, at, low, high, flock, numbers, starts, whose, flat, side, rings, count, plan=plan,
-                        paired=paired, nearest=nearest,
+                        e, home, flock, numbers, cells, side, rings, plan=plan, paired=paired, nearest=nearest
                     )  # fmt: skip
                     if nearest:
                         part2 = least(part2, near2)

@@ -9,6 +9,7 @@ from airflock.engine.plan import Plan
 from airflock.engine.stages.air import crowd, shade
 from airflock.engine.stages.pair import ADD, BOTH, HEAR, pair
 from airflock.engine.stages.receive import first_of_four, sent
+from airflock.engine.stages.records import Decision, Hearer, Reach, Surroundings
 from airflock.engine.stages.state import Flock, numbers_of
 from airflock.engine.stages.words import (
     LIMIT,
@@ -72,15 +73,14 @@ def draw_words(i: int, flock: Flock, draw: Callable[[int], None], *, plan: Plan)
 
 
 def neighbours(
-    agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, whole: Any, n: int, decision: int,
-    time: float, late: float, edges: Any, spans: Any, scene: Any, words: Any, draw: Callable[[int], None] | None,
+    agents: Iterable[int], others: Iterable[int], flock: Flock, numbers: Any, whole: Any, around: Surroundings, n: int,
+    decision: int, time: float, late: float, words: Any, draw: Callable[[int], None] | None,
     drawn: Callable[[int, int], Any] | None, meet: Callable[[int], None],
     *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
 ) -> None:  # fmt: skip
     """Sum the neighbour rule over all others in range of each agent, or over those that its topology lets it meet.
 
     late   : how old is what is heard on arrival, s
-    edges, spans, scene : what stands in the world, where it shades the radio
     draw   : where packets are lost, fills the rows of `words` for agent i and the others of its four
     drawn  : instead of it, draws the random word of what agent j sends agent i; each pair is then looked at by itself,
              also for what stands between the two
@@ -100,6 +100,7 @@ def neighbours(
         near2 = LIMIT
     fast = sent(decision, getattr(k, plan.radio.rates[0]), numbers) if len(plan.radio.rates) > 0 else ZERO
     slow = sent(decision, getattr(k, plan.radio.rates[1]), numbers) if len(plan.radio.rates) > 1 else ZERO
+    at = Decision(decision, n, time, late, fast, slow, drawn)
     for i in agents:
         ii = integer(i)
         own_p = numbers_of(i, "p", flock, numbers, plan=plan)
@@ -119,13 +120,14 @@ def neighbours(
         else:
             talkers = ZERO
         if plan.shades and drawn is None:
-            shade(i, others, range_ * range_, flock, w, whole, edges, spans, scene, plan=plan)
+            shade(i, others, range_ * range_, flock, w, whole, around, plan=plan)
+        me = Hearer(i, ii, own, v, h, true, own_p, talkers, lot)
+        reach = Reach(range_ * range_, range2, near2)
         for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
             for j in others:
                 pair(
-                    i, j, ii, part, own, v, true, h, total, own_p, talkers, fast, slow, range_, range2, near2, lot,
-                    drawn, late, time, flock, numbers, whole, edges, spans, scene, decision, n, plan=plan, model=model,
-                    sums=sums, images=images,
+                    me, j, part, total, reach, at, flock, numbers, whole, around, plan=plan, model=model, sums=sums,
+                    images=images,
                 )  # fmt: skip
             if part == HEAR:
                 meet(i)

@@ -1,12 +1,13 @@
 """Receive: which packets of the others arrive at an agent, and where they are kept the newest that it has of each."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 from airflock.core import radio, random, silence
 from airflock.engine.plan import Plan
 from airflock.engine.stages.air import apart
 from airflock.engine.stages.meet import pair_number
+from airflock.engine.stages.records import Decision, Hearer
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import (
     GONE,
@@ -56,14 +57,19 @@ def word(i: int, j: int, decision: int, n: int, whole: Any) -> Any:
     return choose(i & 2 == 0, choose(i & 1 == 0, w0, w1), choose(i & 1 == 0, w2, w3))
 
 
-def word_of(i: int, j: int, lot: Any, drawn: Callable[[int, int], Any] | None) -> Any:
-    """Random word of what agent j sends agent i: of the row that was drawn for agent i, or drawn here."""
-    return lot[j] if drawn is None else drawn(i, j)
+def word_of(me: Hearer, j: int, at: Decision) -> Any:
+    """Random word of what agent j sends an agent: of the row that was drawn for it, or drawn here."""
+    return me.words[j] if at.drawn is None else at.drawn(me.i, j)
 
 
 def by_clock(time: Any, i: int, flock: Flock, *, plan: Plan) -> Any:
     """A time (s) as the clock of agent i tells it."""
     return time + flock.clock[i] if plan.suffers("clock") else time
+
+
+def sent_at(j: int, at: Decision, flock: Flock, *, plan: Plan) -> Any:
+    """When what comes in at a decision was sent by agent j, by its own clock, s."""
+    return by_clock(at.time - at.late, j, flock, plan=plan)
 
 
 def sent(decision: int, rate: Any, numbers: Any) -> Any:
@@ -83,14 +89,14 @@ def unheard(about: dict[str, Any], k: Any, *, plan: Plan) -> Any:
     )
 
 
-def chances(i: int, j: int, flock: Flock, whole: Any, decision: int, n: int, *, plan: Plan) -> dict[str, Any]:
+def chances(me: Hearer, j: int, flock: Flock, whole: Any, at: Decision, *, plan: Plan) -> dict[str, Any]:
     """Random numbers of one pair and decision that rules of the radio may ask for, by name."""
-    pair = pair_number(i, j, n, flock, whole, plan=plan)
+    pair = pair_number(me.i, j, at.agents, flock, whole, plan=plan)
     u, g = totals(), totals()
     if plan.rolls(UNIFORM):
-        u[0], u[1], u[2], u[3] = random.draw(pair, decision, AIR, whole.world, whole.seed_low, whole.seed_high)
+        u[0], u[1], u[2], u[3] = random.draw(pair, at.step, AIR, whole.world, whole.seed_low, whole.seed_high)
     if plan.rolls(NORMAL):
-        w0, w1, w2, w3 = random.draw(pair, decision, MORE, whole.world, whole.seed_low, whole.seed_high)
+        w0, w1, w2, w3 = random.draw(pair, at.step, MORE, whole.world, whole.seed_low, whole.seed_high)
         g[0], g[1] = random.normal_pair(w0, w1)
         g[2], g[3] = random.normal_pair(w2, w3)
     return {
@@ -100,51 +106,49 @@ def chances(i: int, j: int, flock: Flock, whole: Any, decision: int, n: int, *, 
 
 
 def hear(
-    i: int, j: int, apart2: Any, carried2: Any, about: dict[str, Any], lot: Any,
-    drawn: Callable[[int, int], Any] | None, late: Any, time: Any, packet: Any, flock: Flock, numbers: Any,
-    whole: Any, decision: int, n: int, *, plan: Plan,
+    me: Hearer, j: int, apart2: Any, carried2: Any, about: dict[str, Any], at: Decision, packet: Any, flock: Flock,
+    numbers: Any, whole: Any, *, plan: Plan,
 ) -> None:  # fmt: skip
-    """Where packets are kept: `packet` is then the newest that agent i has of agent j.
+    """Where packets are kept: `packet` is then the newest that an agent has of agent j.
 
     apart2, carried2 : squares of how far the two are apart, and of how far packets carry, m²
     about            : what rules of the radio may ask for of the two and of the decision
-    late, time       : how old a packet is that comes at once, and now, s
     """
     dims = plan.dimensions
     got = apart2 <= carried2
     if plan.draws:
         miss = unheard(about, numbers.k, plan=plan)
-    rolled = chances(i, j, flock, whole, decision, n, plan=plan)
+    rolled = chances(me, j, flock, whole, at, plan=plan)
     if plan.radio.receive is not None:
-        passed = received(i, j, got, {**about, **rolled}, time, flock, numbers, plan=plan)
+        passed = received(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
         got = got & passed
     if plan.draws:
-        got = got & (random.uniform(word_of(i, j, lot, drawn)) >= miss)
+        got = got & (random.uniform(word_of(me, j, at)) >= miss)
     if plan.radio.late is not None:
-        send(i, j, got, {**about, **rolled}, late, time, flock, numbers, plan=plan)
-        deliver(i, j, time, packet, flock, numbers, plan=plan)
+        send(me.i, j, got, {**about, **rolled}, at, flock, numbers, plan=plan)
+        deliver(me.i, j, at, packet, flock, numbers, plan=plan)
     elif plan.sees:
-        glimpse(i, j, got, rolled, late, time, packet, flock, numbers, plan=plan)
+        glimpse(me.i, j, got, rolled, at, packet, flock, numbers, plan=plan)
     else:
         for a in range(dims):
-            packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][i, j])
-            packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][i, j])
-        packet[2 * dims] = choose(got, by_clock(time - late, j, flock, plan=plan), flock.packet[2 * dims][i, j])
+            packet[a] = choose(got, flock.heard_position[a][j], flock.packet[a][me.i, j])
+            packet[a + dims] = choose(got, flock.heard_velocity[a][j], flock.packet[a + dims][me.i, j])
+        packet[2 * dims] = choose(got, sent_at(j, at, flock, plan=plan), flock.packet[2 * dims][me.i, j])
     for c in range(2 * dims + 1):
-        flock.packet[c][i, j] = packet[c]
+        flock.packet[c][me.i, j] = packet[c]
 
 
 def glimpse(
-    i: int, j: int, got: Any, rolled: dict[str, Any], late: Any, time: Any, packet: Any, flock: Flock, numbers: Any,
+    i: int, j: int, got: Any, rolled: dict[str, Any], at: Decision, packet: Any, flock: Flock, numbers: Any,
     *, plan: Plan,
 ) -> None:  # fmt: skip
-    """`packet` is then where agent i believes agent j by the newest picture that shows it, taken `late` (s) ago.
+    """`packet` is then where agent i believes agent j by the newest picture that shows it.
 
     Places are those that agent i believes in, so the error of its own position is in all of them alike.
     """
     dims, w = plan.dimensions, numbers.w
     then, off, expected, v, ev = vector(), vector(), vector(), vector(), vector()
-    since = by_clock(time - late, i, flock, plan=plan) - flock.packet[2 * dims][i, j]
+    since = sent_at(i, at, flock, plan=plan) - flock.packet[2 * dims][i, j]
     for a in range(dims):
         moved = apart(flock.position[a][i], flock.heard_position[a][i], a, w, plan=plan)
         then[a] = flock.measured_position[a][i] - moved
@@ -160,14 +164,14 @@ def glimpse(
     for a in range(dims):
         packet[a] = choose(got, then[a] + t[a], flock.packet[a][i, j])
         packet[a + dims] = choose(got, t[a + 3], flock.packet[a + dims][i, j])
-    packet[2 * dims] = choose(got, by_clock(time - late, i, flock, plan=plan), flock.packet[2 * dims][i, j])
+    packet[2 * dims] = choose(got, sent_at(i, at, flock, plan=plan), flock.packet[2 * dims][i, j])
 
 
 def received(
-    i: int, j: int, near: Any, about: dict[str, Any], time: Any, flock: Flock, numbers: Any, *, plan: Plan
+    i: int, j: int, near: Any, about: dict[str, Any], at: Decision, flock: Flock, numbers: Any, *, plan: Plan
 ) -> Any:
     """Whether a packet arrives by the radio's own rule; its Packet is then the new one, where packets carry so far."""
-    age = by_clock(time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
+    age = by_clock(at.time, i, flock, plan=plan) - flock.packet[2 * plan.dimensions][i, j]
     if plan.radio.Packet is not None:
         kept = plan.radio.Packet(*[flock.packet[plan.pocket + c][i, j] for c in fields(plan.radio.Packet)])
         hit = ask(plan.radio.receive, **about, age=age, packet=kept, k=numbers.k)
@@ -179,7 +183,7 @@ def received(
 
 
 def send(
-    i: int, j: int, got: Any, about: dict[str, Any], late: Any, time: Any, flock: Flock, numbers: Any, *, plan: Plan
+    i: int, j: int, got: Any, about: dict[str, Any], at: Decision, flock: Flock, numbers: Any, *, plan: Plan
 ) -> None:
     """What agent j sends agent i and is not lost goes under way, unless another packet of this pair is."""
     dims, first, due = plan.dimensions, plan.waiting, 2 * plan.waiting
@@ -191,15 +195,15 @@ def send(
             goes, flock.heard_velocity[a][j], flock.packet[first + a + dims][i, j]
         )
     flock.packet[first + 2 * dims][i, j] = choose(
-        goes, by_clock(time - late, j, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
+        goes, sent_at(j, at, flock, plan=plan), flock.packet[first + 2 * dims][i, j]
     )
-    flock.packet[due][i, j] = choose(goes, time + most(wait, ZERO), flock.packet[due][i, j])
+    flock.packet[due][i, j] = choose(goes, at.time + most(wait, ZERO), flock.packet[due][i, j])
 
 
-def deliver(i: int, j: int, time: Any, packet: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
+def deliver(i: int, j: int, at: Decision, packet: Any, flock: Flock, numbers: Any, *, plan: Plan) -> None:
     """What is due by now has come; half a step is as good as none."""
     first, due = plan.waiting, 2 * plan.waiting
-    come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= time + HALF * numbers.c.dt)
+    come = (flock.packet[due][i, j] > HALF * GONE) & (flock.packet[due][i, j] <= at.time + HALF * numbers.c.dt)
     for c in range(plan.waiting):
         packet[c] = choose(come, flock.packet[first + c][i, j], flock.packet[c][i, j])
     flock.packet[due][i, j] = choose(come, GONE, flock.packet[due][i, j])

@@ -6,6 +6,7 @@ from typing import Any
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.percept import level
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.state import Flock, tree
 from airflock.engine.stages.words import AWAY, HALF, LIMIT, ZERO, X, Y, Z, most, repeat, vector
 from airflock.scenarios.wings import FORMATIONS
@@ -33,15 +34,15 @@ def excursion(
 
 
 def tried(
-    i: int, attempt: int, s: Any, w: Any, whole: Any, edges: Any, spans: Any, scene: Any,
-    excursion: Callable[..., Any], *, plan: Plan,
-) -> Any:  # fmt: skip
+    i: int, attempt: int, s: Any, w: Any, whole: Any, around: Surroundings, excursion: Callable[..., Any], *, plan: Plan
+) -> Any:
     """Put a random place of agent i into the vector s, m; returns whether it lies in the region of the start."""
     w0, w1, w2, w3 = random.draw(i, attempt, START, whole.world, whole.seed_low, whole.seed_high)
     for a, word in zip(range(plan.dimensions), (w0, w1, w2), strict=False):
         s[a] = places.spread(random.uniform(word), -getattr(w, EXTENTS[a]), getattr(w, EXTENTS[a]))
     free = (
-        excursion(s[X], s[Y], s[Z], w, edges, spans, whole.corners, whole.obstacles, scene) <= -w.wall_clearance
+        excursion(s[X], s[Y], s[Z], w, around.edges, around.spans, whole.corners, whole.obstacles, around.scene)
+        <= -w.wall_clearance
         if plan.bounded
         else True
     )
@@ -80,7 +81,7 @@ def in_formation(i: int, s: Any, w: Any, whole: Any, *, plan: Plan) -> None:
 
 
 def begin(  # noqa: C901 - tests of the plan leave one way through
-    flock: Flock, numbers: Any, whole: Any, n: int, m: int, edges: Any, spans: Any, start: Any, scene: Any,
+    flock: Flock, numbers: Any, whole: Any, around: Surroundings, n: int, m: int, start: Any,
     excursion: Callable[..., Any], *, plan: Plan,
 ) -> int:  # fmt: skip
     """Place all agents at rest or at start speed; returns minus the first agent (from 1) that found no room.
@@ -112,10 +113,10 @@ def begin(  # noqa: C901 - tests of the plan leave one way through
         placed = False
         for attempt in repeat(ATTEMPTS):
             s = vector()
-            free = tried(i, attempt, s, w, whole, edges, spans, scene, excursion, plan=plan)
+            free = tried(i, attempt, s, w, whole, around, excursion, plan=plan)
             for j in range(i if w.separation > ZERO else 0):
                 free = free & (sum((s[a] - x[a][j]) * (s[a] - x[a][j]) for a in axes) >= w.separation * w.separation)
-            free = roomy(free, s, w, scene, plan=plan)
+            free = roomy(free, s, w, around.scene, plan=plan)
             if free:
                 for a in axes:
                     x[a][i] = s[a]

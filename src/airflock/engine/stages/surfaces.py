@@ -5,6 +5,7 @@ from typing import Any
 
 from airflock.core.contract import Model
 from airflock.engine.plan import Plan
+from airflock.engine.stages.records import Surroundings
 from airflock.engine.stages.state import Flock, numbers_of, tree
 from airflock.engine.stages.words import LIMIT, ONE, ZERO, X, Y, Z, ask, least, live, vector
 from airflock.world import bvh, polygon
@@ -69,7 +70,7 @@ def sides(
 
 
 def boundaries(
-    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, edges: Any, spans: Any, scene: Any,
+    agents: Iterable[int], flock: Flock, numbers: Any, whole: Any, faces: Any, around: Surroundings,
     *, plan: Plan, model: Model,
 ) -> None:  # fmt: skip
     """Sum the boundary rule over all surfaces: walls outside, agents inside the loop nest.
@@ -84,18 +85,18 @@ def boundaries(
             flock.walls[c][i] = ZERO
     faced(agents, flock, numbers, whole, faces, plan=plan, model=model)
     if plan.polygon:
-        sides(agents, flock, numbers, whole, edges, look, plan=plan, model=model)
+        sides(agents, flock, numbers, whole, around.edges, look, plan=plan, model=model)
     if plan.obstacles and model.sight is None:  # who casts meets them in the scene
         for o in range(whole.obstacles):
             for i in agents:
-                f = plan.obstacle(x[X][i], x[Y][i], x[Z][i], edges, spans[o, 0], spans[o, 1])
+                f = plan.obstacle(x[X][i], x[Y][i], x[Z][i], around.edges, around.spans[o, 0], around.spans[o, 1])
                 feel(i, f, flock, numbers, plan=plan, model=model)
     if plan.scene:
         for ground in (ZERO, ONE)[: plan.dimensions - 1]:
             for i in agents:
                 f = bvh.nearest_of(
                     x[X][i], x[Y][i], x[Z][i], reach_of(i, look, flock, numbers, plan=plan, model=model), ground,
-                    *tree(scene),
+                    *tree(around.scene),
                 )  # fmt: skip
                 if f.distance < reach_of(i, look, flock, numbers, plan=plan, model=model):
                     feel(i, f, flock, numbers, plan=plan, model=model)
