@@ -113,7 +113,7 @@ def test_stages_are_the_trees_on_record(name):
 
 CHANGES = (
     (receive, "real(decision), rate", "real(decision + 1), rate", "links"),
-    (pair, "integer(j) != me.ii", "integer(j) == me.ii", "quiet"),
+    (pair, "return integer(q) != me.ii", "return integer(q) == me.ii", "quiet"),
     (pair, "if plan.periodic:", "if plan.delayed:", "quiet"),
     (surfaces, "flock.walls[c][i] += t[c]", "flock.walls[c][i] += t[0]", "polygon"),
     (move, "x[a][i] += v[a][i] * numbers.c.dt", "x[a][i] += v[a][i] * numbers.c.period", "quiet"),

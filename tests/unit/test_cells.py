@@ -51,7 +51,7 @@ class Sorted:
             plan=self.plan, carried=((cells.WHO, who),),
         )  # fmt: skip
         assert found <= room
-        cells.filled_up(found, self.flock, plan=self.plan, carried=((cells.WHO, who),))
+        cells.filled_up(found, box, box[self.plan.dimensions :], plan=self.plan, carried=((cells.WHO, who),))
         return (oy, oz), box, who, slab, middle, found
 
 

@@ -9,8 +9,6 @@ from airflock.engine import plan_of
 from airflock.scenarios.files import load
 from inside import Across, CudaBuilder, ReplacementError, must_replace
 from inside import cuda_cells as cells
-from inside import passes_driver as driver
-from inside import passes_grid as grid
 
 LARGE = "couzin_2002/swarm"  # flown by cells where it is large
 
@@ -33,17 +31,11 @@ def respelled(lines):
     return [line.replace("integer(j)", "whole(j)") for line in lines]
 
 
-def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(monkeypatch):
-    """The grid and the kernel of a large flock look for spellings of `neighbours`; none may be missed in silence."""
+def test_a_stage_in_another_spelling_is_refused_where_a_kernel_takes_it(monkeypatch):
+    """The kernel of a large flock looks for spellings of `neighbours`; none may be missed in silence."""
     plan = plan_of(load(LARGE), precision=32).built(grid=True)
-    driver.flight(plan)
     cells.crowd(plan)
-    meet, add = grid.neighbours, CudaBuilder.function
-    monkeypatch.setattr(
-        grid,
-        "neighbours",
-        lambda build, lines, before, inner, *rest: meet(build, lines, before, respelled(inner), *rest),
-    )
+    add = CudaBuilder.function
     monkeypatch.setattr(
         CudaBuilder,
         "function",
@@ -51,8 +43,6 @@ def test_a_stage_in_another_spelling_is_refused_where_neighbours_come_by_cells(m
             build, head, *[body if isinstance(body, str) else respelled(body) for body in bodies]
         ),
     )
-    with pytest.raises(ReplacementError, match=r"integer\(j\)"):
-        driver.flight(plan)
     with pytest.raises(ReplacementError, match=r"integer\(j\)"):
         cells.crowd(plan)
 

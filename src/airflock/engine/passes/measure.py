@@ -71,7 +71,7 @@ def pairs(build: Builder, clock: str, metrics: tuple[Measured, ...]) -> Call:
     """Function near_<clock>: the pair rules of a clock by cells of about one agent each; its call."""
     made = specialise(build, pairs_by_cells, metrics=metrics, nearest=clock == "collision")
     called = f"near_{clock}({BY_CELLS})"
-    lines = [*grid.sort(build, "real(0.001)", "n"), *made.lines]
+    lines = [*grid.sorting(build, "real(0.001)", "n"), *made.lines]
     build.function(called, lines, f"return {made.answer}", parallel=True)
     return Call(called)
 
@@ -89,7 +89,7 @@ def clusters(build: Builder, metric: Metric, parts: dict[str, list[str]]) -> Any
         reach = f"least({build.call(metric.linked_within, 'linked_within', {})} / real({SURE}), LIMIT)"
         made = specialise(build, clusters_by_cells, metric=metric)
         called = f"{name}(mean, labels, {BY_CELLS})"
-        lines = [*build.records("q"), *grid.sort(build, reach, "n"), *made.lines]
+        lines = [*build.records("q"), *grid.sorting(build, reach, "n"), *made.lines]
         build.function(called, lines, f"return {made.answer}")
         return Call(called)
     if build.clusters and metric.cluster:

@@ -75,6 +75,11 @@ class Expressions:
             return ast.Call(ast.Name("real", LOAD), [ast.Constant(value)], [])
         if isinstance(value, (bool, int, str)):
             return ast.Constant(value)
+        if isinstance(value, slice):
+            ends = (
+                None if end is None else self.printed(end, node, scope) for end in (value.start, value.stop, value.step)
+            )
+            return ast.Slice(*ends)
         if isinstance(value, (tuple, list)):
             return ast.Tuple([self.printed(part, node, scope) for part in value], LOAD)
         if isinstance(value, types.BuiltinFunctionType) or value in (range, abs, min, max, int):

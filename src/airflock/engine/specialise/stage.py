@@ -33,7 +33,7 @@ from airflock.engine.stages.words import Itself, Named
 from airflock.rules.nodes import walk
 
 TABLES = {"u": "words", "packet": "store"}  # rows of other tables than that of states, by what their names begin with
-CELLS = ("starts", "whose", "flat", "count")  # what a driver calls what it has sorted
+CELLS = ("starts", "whose", "packed", "flat", "count")  # what a driver calls what it has sorted
 UNROLLED = (range, tuple, list, enumerate, zip)
 
 

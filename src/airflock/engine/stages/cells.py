@@ -243,11 +243,11 @@ def copied(
     return slab, middle, found
 
 
-def filled_up(found: int, flock: Flock, *, plan: Plan, carried: tuple[tuple[str, Any], ...]) -> None:
-    """Nobody, behind the last candidate: loops take them in whole blocks."""
+def filled_up(found: int, h: Any, hv: Any, *, plan: Plan, carried: tuple[tuple[str, Any], ...]) -> None:
+    """Nobody, behind the last candidate: loops take them in whole blocks. h, hv : rows of positions and velocities."""
     for s in range(found, found + BLOCK):
         for a in range(plan.dimensions):
-            flock.heard_position[a][s] = AWAY
-            flock.heard_velocity[a][s] = ZERO
+            h[a][s] = AWAY
+            hv[a][s] = ZERO
         for what, row in carried:
             row[s] = integer(-1) if what == WHO else ZERO

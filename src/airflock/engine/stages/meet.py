@@ -7,8 +7,8 @@ from typing import Any
 from airflock.core import random
 from airflock.engine.plan import Plan
 from airflock.engine.stages.percept import to_obstacle
-from airflock.engine.stages.records import Surroundings
-from airflock.engine.stages.state import Flock, tree
+from airflock.engine.stages.records import Others, Surroundings
+from airflock.engine.stages.state import Flock, everybody, tree
 from airflock.engine.stages.words import FAR, HALF, ONE, ZERO, X, Y, Z, ask, least
 from airflock.world import bvh
 
@@ -67,7 +67,12 @@ def meet(
         hide(i, others, flock, whole, around, plan=plan)
     if plan.fades:
         fade(i, others, n, decision, flock, whole, plan=plan)
+    chosen(m, everybody(flock), numbers, plan=plan)
+
+
+def chosen(n: int, others: Others, numbers: Any, *, plan: Plan) -> None:
+    """Ask the topology whom of these n an agent meets: row `met`."""
     ask(
-        plan.meets, n=m, dx=flock.away[X], dy=flock.away[Y], dz=flock.away[Z], r2=flock.square,
-        hidden=flock.hidden, fade=flock.fade, met=flock.met, heap=flock.heap, weak=flock.weak, t=numbers.topology,
+        plan.meets, n=n, dx=others.away[X], dy=others.away[Y], dz=others.away[Z], r2=others.square,
+        hidden=others.hidden, fade=others.fade, met=others.met, heap=others.heap, weak=others.weak, t=numbers.topology,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from airflock.engine.stages.air import crowd, shade
 from airflock.engine.stages.pair import ADD, BOTH, HEAR, pair
 from airflock.engine.stages.receive import first_of_four, sent
 from airflock.engine.stages.records import Decision, Hearer, Reach, Surroundings
-from airflock.engine.stages.state import Flock, numbers_of
+from airflock.engine.stages.state import Flock, everybody, numbers_of
 from airflock.engine.stages.words import (
     LIMIT,
     ONE,
@@ -38,11 +38,16 @@ def oneself(i: int, own: Any, v: Any, h: Any, true: Any, flock: Flock, *, plan: 
     for a in axes:
         own[a] = flock.measured_position[a][i]
         v[a] = flock.measured_velocity[a][i]
-    if plan.dimensions == 2:
-        v[Z] = ZERO
     if plan.perturbed or plan.packets:
         for a in axes:
             true[a] = flock.position[a][i]
+    headed(v, h, plan=plan)
+
+
+def headed(v: Any, h: Any, *, plan: Plan) -> None:
+    """Put the direction of the velocity v into the vector h; in a plane neither has a height."""
+    if plan.dimensions == 2:
+        v[Z] = ZERO
     f = ONE / norm(v[X], v[Y], v[Z])
     for a in (X, Y, Z):
         h[a] = f * v[a]
@@ -121,13 +126,13 @@ def neighbours(
             talkers = ZERO
         if plan.shades and drawn is None:
             shade(i, others, range_ * range_, flock, w, whole, around, plan=plan)
-        me = Hearer(i, ii, own, v, h, true, own_p, talkers, lot)
+        me = Hearer(i, ii, ii, None, own, v, h, true, own_p, talkers, lot)
         reach = Reach(range_ * range_, range2, near2)
         for part in (BOTH,) if plan.topology is None else (HEAR, ADD):
             for j in others:
                 pair(
-                    me, j, part, total, reach, at, flock, numbers, whole, around, plan=plan, model=model, sums=sums,
-                    images=images,
+                    me, j, j, part, total, reach, at, flock, everybody(flock), numbers, whole, around, plan=plan,
+                    model=model, sums=sums, images=images,
                 )  # fmt: skip
             if part == HEAR:
                 meet(i)

@@ -18,7 +18,7 @@ from airflock.engine.stages.receive import (
     unheard,
     word_of,
 )  # fmt: skip
-from airflock.engine.stages.records import Decision, Hearer, Other, Reach, Surroundings
+from airflock.engine.stages.records import Decision, Hearer, Other, Others, Reach, Surroundings
 from airflock.engine.stages.state import Flock
 from airflock.engine.stages.words import (
     FAR,
@@ -52,14 +52,14 @@ def heard_age(me: Hearer, j: int, at: Decision, flock: Flock, *, plan: Plan) -> 
     return at.late + flock.clock[me.i] - flock.clock[j] if plan.suffers("clock") else at.late
 
 
-def group_of(j: int, flock: Flock, *, plan: Plan) -> Any:
+def group_of(j: int, others: Others, *, plan: Plan) -> Any:
     """Number of the group of agent j; -1 where it is in none."""
-    return flock.own("", "group")[j] if plan.grouped else GONE
+    return others.group[j] if plan.grouped else GONE
 
 
-def kin(i: int, j: int, flock: Flock, *, plan: Plan) -> Any:
+def kin(i: int, j: int, flock: Flock, others: Others, *, plan: Plan) -> Any:
     """Whether two agents are of one group, 1 or 0; all are where nobody asks for groups."""
-    return (ONE if flock.own("", "group")[j] == flock.own("", "group")[i] else ZERO) if plan.grouped else ONE
+    return (ONE if others.group[j] == flock.own("", "group")[i] else ZERO) if plan.grouped else ONE
 
 
 def away(me: Hearer, j: int, o: Any, flock: Flock, w: Any, *, plan: Plan) -> Any:
@@ -74,8 +74,9 @@ def away(me: Hearer, j: int, o: Any, flock: Flock, w: Any, *, plan: Plan) -> Any
 
 
 def as_heard(
-    me: Hearer, j: int, d: Any, dv: Any, packet: Any, age: Any, at: Decision, k: Any, flock: Flock, *, plan: Plan
-) -> Any:
+    me: Hearer, j: int, d: Any, dv: Any, packet: Any, age: Any, at: Decision, k: Any, flock: Flock, others: Others,
+    *, plan: Plan,
+) -> Any:  # fmt: skip
     """Offset d (m) and relative velocity dv (m/s) of agent j by what an agent has of it, and how old that is, s."""
     axes = range(plan.dimensions)
     if plan.packets:
@@ -87,24 +88,29 @@ def as_heard(
             dv[a] = packet[a + plan.dimensions] - me.v[a]
     else:
         for a in axes:
-            d[a] = flock.heard_position[a][j] - me.own[a]
-            dv[a] = flock.heard_velocity[a][j] - me.v[a]
+            d[a] = others.heard_position[a][j] - me.own[a]
+            dv[a] = others.heard_velocity[a][j] - me.v[a]
     return age
 
 
+def another(me: Hearer, q: int) -> Any:
+    """Whether the one at place q among the others is there, and another agent."""
+    return integer(q) != me.ii if me.end is None else (integer(q) != me.ii) & (integer(q) < me.end)
+
+
 def counts(
-    me: Hearer, j: int, part: str, apart2: Any, other: Other, reach: Reach, packet: Any, numbers: Any, flock: Flock,
-    *, plan: Plan, model: Model,
+    me: Hearer, j: int, q: int, part: str, apart2: Any, other: Other, reach: Reach, packet: Any, numbers: Any,
+    flock: Flock, others: Others, *, plan: Plan, model: Model,
 ) -> Any:  # fmt: skip
     """Whether an agent hears agent j, or meets it, as far as distances say: in range, and within the law's reach."""
     if part == ADD:
-        ok = flock.met[j] > HALF
+        ok = others.met[q] > HALF
     elif plan.packets:  # the newest packet is heard on, as long as its sender is in range
-        ok = (apart2 <= reach.radio_) & on_record(other.age, packet, numbers, plan=plan) & (integer(j) != me.ii)
+        ok = (apart2 <= reach.radio_) & on_record(other.age, packet, numbers, plan=plan) & another(me, q)
     elif plan.perturbed:
-        ok = (apart2 <= carries(me.i, j, reach.radio_, flock, plan=plan)) & (integer(j) != me.ii)
+        ok = (apart2 <= carries(me.i, j, reach.radio_, flock, plan=plan)) & another(me, q)
     else:
-        ok = (other.r2 <= reach.radio_) & (integer(j) != me.ii)
+        ok = (other.r2 <= reach.radio_) & another(me, q)
     if model.reach is not None and (part != HEAR or plan.grid):
         ok = ok & (other.r2 <= reach.law)
     return ok
@@ -157,7 +163,7 @@ def arrives(me: Hearer, j: int, ok: Any, part: str, apart2: Any, r: Any, at: Dec
 
 
 def add_rule(
-    me: Hearer, j: int, ok: Any, other: Other, total: Any, flock: Flock,
+    me: Hearer, j: int, ok: Any, other: Other, total: Any, flock: Flock, others: Others,
     *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...],
 ) -> None:  # fmt: skip
     """Add what the neighbour rule says of a pair to the totals, if the pair counts."""
@@ -165,25 +171,26 @@ def add_rule(
     t = ask(
         model.neighbour, dx=d[X], dy=d[Y], dz=d[Z], r=other.r, r2=other.r2, dvx=dv[X], dvy=dv[Y], dvz=dv[Z],
         dv=other.speed, vx=v[X], vy=v[Y], vz=v[Z], hx=h[X], hy=h[Y], hz=h[Z], nhx=nh[X], nhy=nh[Y], nhz=nh[Z],
-        age=other.age, lower=ONE if integer(j) < me.ii else ZERO, kin=kin(me.i, j, flock, plan=plan),
-        group=group_of(j, flock, plan=plan), p=me.p,
+        age=other.age, lower=ONE if integer(others.number[j]) < me.number else ZERO,
+        kin=kin(me.i, j, flock, others, plan=plan), group=group_of(j, others, plan=plan), p=me.p,
     )  # fmt: skip
     for c, how in sums:
         total[c] = reduced(how, total[c], choose(ok, t[c], START[how]))
 
 
 def pair(
-    me: Hearer, j: int, part: str, total: Any, reach: Reach, at: Decision, flock: Flock, numbers: Any, whole: Any,
-    around: Surroundings, *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
+    me: Hearer, j: int, q: int, part: str, total: Any, reach: Reach, at: Decision, flock: Flock, others: Others,
+    numbers: Any, whole: Any, around: Surroundings,
+    *, plan: Plan, model: Model, sums: tuple[tuple[int, str], ...], images: bool,
 ) -> None:  # fmt: skip
-    """One other agent j of an agent: who is heard (part = HEAR), what it says (ADD), or both."""
+    """Agent j, at place q among the others of an agent: who is heard (part = HEAR), what it says (ADD), or both."""
     axes, k, w, v = range(plan.dimensions), numbers.k, numbers.w, me.v
     d, dv, o, nh, packet = vector(), vector(), vector(), vector(), totals()
     age = heard_age(me, j, at, flock, plan=plan)
     apart2 = truly_apart(me, j, part, o, flock, w, plan=plan)
     open_way = whether_open(me, j, reach, at, flock, w, whole, around, plan=plan)
     receive_packet(me, j, part, apart2, o, open_way, reach, at, packet, flock, numbers, whole, plan=plan)
-    age = as_heard(me, j, d, dv, packet, age, at, k, flock, plan=plan)
+    age = as_heard(me, j, d, dv, packet, age, at, k, flock, others, plan=plan)
     if images:
         for a in axes:
             d[a] = nearest_image(d[a], getattr(w, SIDES[a]))
@@ -198,13 +205,13 @@ def pair(
         nh[a] = g * (v[a] + dv[a])
     other = Other(d, dv, nh, r, r2, speed, age)
     if part == HEAR:
-        flock.square[j] = FAR  # and so it stays where an interpreted driver goes on to the next one
-    ok = counts(me, j, part, apart2, other, reach, packet, numbers, flock, plan=plan, model=model)
+        others.square[q] = FAR  # and so it stays where an interpreted driver goes on to the next one
+    ok = counts(me, j, q, part, apart2, other, reach, packet, numbers, flock, others, plan=plan, model=model)
     ok = arrives(me, j, ok, part, apart2, r, at, k, plan=plan)
     if part == HEAR:
         if plan.placed:
             for a in axes:
-                flock.away[a][j] = d[a]
-        flock.square[j] = choose(ok, r2, FAR)
+                others.away[a][q] = d[a]
+        others.square[q] = choose(ok, r2, FAR)
     else:
-        add_rule(me, j, ok, other, total, flock, plan=plan, model=model, sums=sums)
+        add_rule(me, j, ok, other, total, flock, others, plan=plan, model=model, sums=sums)

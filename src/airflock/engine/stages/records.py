@@ -37,7 +37,9 @@ class Decision:
 class Hearer:
     """An agent that goes through the others.
 
-    i, ii       : its place in the rows, and the same as wide as real numbers
+    i           : its place in the rows
+    ii, number  : its place among the others, and its number, as wide as real numbers
+    end         : how many the others are, where more are gone through, to fill vectors
     own, v, h   : where it believes that it is (m), how it moves (m/s) and heads
     true        : where it is, m
     p           : its numbers of the law
@@ -47,6 +49,8 @@ class Hearer:
 
     i: int
     ii: Any
+    number: Any
+    end: Any
     own: Any
     v: Any
     h: Any
@@ -54,6 +58,27 @@ class Hearer:
     p: Any
     talkers: Any
     words: Any
+
+
+@dataclass(frozen=True)
+class Others:
+    """Rows of those whom an agent goes through: all of a flock, or the candidates around a line of cells.
+
+    number, group : of each, and what it is heard to do
+    square, away  : what the agent makes of each, from here on by its place among the others (`stages.state.Flock`)
+    """
+
+    number: Any
+    group: Any
+    heard_position: Any
+    heard_velocity: Any
+    square: Any
+    away: Any
+    hidden: Any
+    fade: Any
+    met: Any
+    heap: Any
+    weak: Any
 
 
 @dataclass(frozen=True)
@@ -89,13 +114,15 @@ class Other:
 class Cells:
     """A flock sorted by cells.
 
-    starts      : first place of each cell
-    whose, flat : who is at each place, and their states, by component and place
-    count       : of cells along each axis
+    starts       : first place of each cell
+    whose        : who is at each place
+    packed, flat : their states, by place and component, and by component and place
+    count        : of cells along each axis
     """
 
     starts: Any
     whose: Any
+    packed: Any
     flat: Any
     count: Any
 
@@ -121,3 +148,17 @@ class Growing:
     places: Any
     reached: Any
     cell: Any
+
+
+@dataclass(frozen=True)
+class Line:
+    """All who lie in and around a line of cells.
+
+    others : their rows, side by side
+    slab   : where those of each cell and of the cells beside it across the line begin
+    middle : where in a slab those of the line's own cell begin
+    """
+
+    others: Others
+    slab: Any
+    middle: Any

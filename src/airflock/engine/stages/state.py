@@ -6,7 +6,8 @@ from functools import cached_property
 from typing import Any
 
 from airflock.engine.plan import Plan
-from airflock.engine.stages.words import NOTHING, fields
+from airflock.engine.stages.records import Others
+from airflock.engine.stages.words import NOTHING, Itself, fields
 
 Row = Any  # one number per agent: row[i]
 # The scene is one tuple of arrays: shapes, nodes and links (`world.bvh`); near, numbers of gathered shapes; counts
@@ -162,3 +163,11 @@ def numbers_of(i: int, letter: str, flock: Flock, numbers: Any, *, plan: Plan) -
         if plan.varies(letter)
         else getattr(numbers, letter)
     )
+
+
+def everybody(flock: Flock) -> Others:
+    """All of a flock, as each agent goes through them."""
+    return Others(
+        Itself(), flock.own("", "group"), flock.heard_position, flock.heard_velocity, flock.square, flock.away,
+        flock.hidden, flock.fade, flock.met, flock.heap, flock.weak,
+    )  # fmt: skip
