@@ -2,8 +2,8 @@
 
 Whatever lies at random in memory (the agents of a cell, their sums) is kept in rows of one agent, so that it costs one
 cache line and not one per number; `slots` keeps it from lying far apart. All that is kept from stage to stage lies in
-memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock anew, into cells of its own
-reach, and goes through those who fly by it. Only for perception without noise, delay and loss; there it equals all
+memory that lasts for a flight. Where groups have laws of their own, each law sorts the flock anew, into cells of its
+own reach, and goes through those who fly by it. Only for perception without noise, delay and loss; there it equals all
 pairs but for rounding and the order of sums.
 """
 
