@@ -364,20 +364,22 @@ def commands() -> None:
         listed |= {f"{name} {key}": found for key, found in inner.items()}
     for name, command in sorted(listed.items()):
         options = COUNTERPARTS[name].options if name in COUNTERPARTS else {}
-        pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{plain(_help(command.help or ''))}\n\n")
+        pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{_help(command.help or '')}\n\n")
         rows = []
         for option in command.params:
             named = option.opts[0].startswith("-")
             flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
             about = options.get(option.name, "")
             argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
-            rows.append((flag, plain(_help(getattr(option, "help", "") or "")), argument))
+            rows.append((flag, _help(getattr(option, "help", "") or ""), argument))
         pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")
     put("commands.md", "".join(pieces))
 
 
 def _help(text: str) -> str:
-    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text.replace("\\[", "["))  # a terminal's markup
+    """Help of a command as Markdown: without a terminal's markup, its examples as code that can be copied."""
+    pieces = re.split(r"Example: (airflock .*?)(?=,?$)", text.replace("\\[", "["), flags=re.M)
+    return "".join(f"\n\nExample: `{piece}`" if k % 2 else plain(piece) for k, piece in enumerate(pieces))
 
 
 def presets() -> None:
