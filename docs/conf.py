@@ -23,6 +23,7 @@ suppress_warnings = ["config.cache"]  # the gallery's order is a function, which
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 nitpicky = False
+default_role = "code"  # of single backticks in the texts of examples
 smartquotes = False  # options begin with two hyphens, and values are to be copied
 html_theme = "pydata_sphinx_theme"
 html_title = f"Airflock {release}"
