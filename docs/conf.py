@@ -15,7 +15,7 @@ project, author, release = "Airflock", "The Airflock authors", __version__
 copyright = author  # noqa: A001 - the name that sphinx asks for
 extensions = [
     "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery",
-    "mathml", "pages", "terms",
+    "docstrings", "mathml", "pages", "terms",
 ]  # fmt: skip
 exclude_patterns = ["_build", "_ext", "evolve.md", "equations", "decisions", "gallery", "notebooks", "tours"]
 exclude_patterns += ["generated/**/*.ipynb", "**/*.codeobj.json"]

@@ -7,7 +7,7 @@ from sphinx.application import Sphinx
 
 SILENT = (
     nodes.literal, nodes.literal_block, nodes.reference, nodes.title, nodes.math, nodes.math_block, nodes.term,
-    nodes.caption, nodes.table,
+    nodes.caption, nodes.table, nodes.strong,
 )  # fmt: skip
 
 
@@ -24,7 +24,9 @@ def link(app: Sphinx, doctree: nodes.document, page: str) -> None:
     if page == "glossary" or page.startswith("generated/project/changelog") or not known:
         return
     names = sorted(known, key=len, reverse=True)
-    pattern = re.compile(r"\b(" + "|".join(map(re.escape, names)) + r")s?\b")
+    pattern = re.compile(
+        r'(?<![\w."])(' + "|".join(map(re.escape, names)) + r')s?(?![\w"]|\.\w)'
+    )  # no key such as model.r
     seen: set[str] = set()
     for text in list(doctree.findall(nodes.Text)):
         if _silent(text):
