@@ -15,7 +15,7 @@ project, author, release = "Airflock", "The Airflock authors", __version__
 copyright = author  # noqa: A001 - the name that sphinx asks for
 extensions = [
     "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery",
-    "mathml", "pages", "terms",
+    "docstrings", "mathml", "pages", "terms",
 ]  # fmt: skip
 exclude_patterns = ["_build", "_ext", "evolve.md", "equations", "decisions", "gallery", "notebooks", "tours"]
 exclude_patterns += ["generated/**/*.ipynb", "**/*.codeobj.json"]
@@ -23,6 +23,8 @@ suppress_warnings = ["config.cache"]  # the gallery's order is a function, which
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 nitpicky = False
+default_role = "code"  # of single backticks in the texts of examples
+smartquotes = False  # options begin with two hyphens, and values are to be copied
 html_theme = "pydata_sphinx_theme"
 html_title = f"Airflock {release}"
 html_static_path = ["_static"]
@@ -32,11 +34,12 @@ html_theme_options = {
     "show_prev_next": False,
     "secondary_sidebar_items": ["page-toc"],
     "navbar_align": "left",
+    "header_links_before_dropdown": 9,
     "footer_start": ["copyright"],
     "footer_end": [],
     "pygments_light_style": "tango",
 }
-html_sidebars = {"index": []}
+html_sidebars = {"index": [], "start": []}
 html_copy_source = False
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"

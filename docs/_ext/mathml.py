@@ -1,6 +1,7 @@
 """Equations as MathML, which browsers draw by themselves: no script and no network."""
 
 import html
+import re
 
 from docutils import nodes
 from docutils.utils.math import MathError
@@ -10,7 +11,8 @@ from sphinx.errors import ExtensionError
 
 
 def mathml(text: str, *, inline: bool) -> str:
-    """MathML of an equation in LaTeX."""
+    """MathML of an equation in LaTeX; an index that is a word, such as `frict`, stands upright."""
+    text = re.sub(r"([_^])\{([A-Za-z]{3,})\}", r"\1{\\mathrm{\2}}", text)
     try:
         return str(tex2mathml(text, as_block=not inline))
     except MathError as fault:

@@ -153,7 +153,7 @@ def order_parameters() -> None:
 
     pieces = [
         "# Order parameters\n\nWhat a flight is scored with. The key `metrics.kind` picks a set; "
-        "`airflock keys metrics` lists what they can be told.\n\n",
+        "`airflock keys metrics` lists their parameters.\n\n",
         table(
             ("metrics.kind", "order parameters"),
             ((f"`{k}`", _names(registry.reports(found))) for k, found in registry.SETS.items()),
@@ -161,9 +161,9 @@ def order_parameters() -> None:
         "\nHere $N$ is the number of agents, $r_{ij}$ a distance, $h_i$ a heading (unit vector), a bar a mean over the "
         "flock, and $\\langle\\cdot\\rangle_t$ a mean over the samples of a flight. "
         "$\\Theta$ is 1 above zero, else 0.\n\n"
-        "An agent that is absent is measured by nothing: an instant is that of the smaller flock, and "
-        "one with fewer than two of several agents does not count. `present` tells the share that was there. "
-        "What is made of other order parameters, such as a fitness, is made of what they then are.\n",
+        "Absent agents are not measured: each instant is that of the smaller flock, and "
+        "one with fewer than two of several agents does not count. `present` is the share that was there. "
+        "What is computed from other order parameters, such as a fitness, uses these values.\n",
     ]
     for name, (unit, meaning) in units.items():
         about = known[name]
@@ -177,7 +177,7 @@ def order_parameters() -> None:
         rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
         rows += [("where some are absent", absent[name])] if name in absent else []
         rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
-        pieces.append(table(("what", "of it"), rows))
+        pieces.append(table(("property", "value"), rows))
         pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
         pieces.append(f"\n{_drawn(name)}\n")
     put("order_parameters.md", "".join(pieces))
@@ -188,11 +188,11 @@ def _drawn(name: str) -> str:
     if f'"{name}"' in (DOCS / "gallery" / f"{LOW_AND_HIGH}.py").read_text(encoding="utf-8"):
         return f"[A picture of low and high](/generated/gallery/{LOW_AND_HIGH}) shows two flocks with their values."
     if name == "present":
-        return "It has no picture: 1 where all are there, 0.5 where half of the agents dropped out at the start."
+        return "It has no picture: it is 1 if all are there, 0.5 if half of the agents dropped out at the start."
     example = next((example for example, names in DRAWN.items() if name in names), "")
     if not example:
         raise ExtensionError(f"order parameter {name}: no example of the gallery shows it")
-    return f"[A picture](/generated/gallery/{example}) of flights that it tells of is in the gallery."
+    return f"[A picture](/generated/gallery/{example}) in the gallery shows it."
 
 
 def _names(found: Iterable[str]) -> str:
@@ -213,8 +213,8 @@ def robots() -> None:
 
     pieces = [
         "# Bodies, sensors, radio, silence, wind\n\nA model commands; a body obeys as far as it can. "
-        "Neighbours hear of it through the radio, and an agent knows itself through its sensors "
-        "([how to choose and write one](../sensors.md); [the same of radios](../radios.md)).\n",
+        "Neighbours hear of it through the radio, and an agent knows itself through its sensors. "
+        "How to choose and write one: [sensors](../sensors.md), [radios](../radios.md).\n",
         _abilities(BODIES),
     ]
     for name, body in BODIES.items():
@@ -250,7 +250,7 @@ def _abilities(bodies: Mapping[str, Any]) -> str:
     """Table of what each body has, from what its rule asks for."""
     from inspect import signature
 
-    words = "body | takes | has inertia | sees its measured velocity | noise | wind | battery | remembers | has limits"
+    words = "body | takes | inertia | uses measured velocity | noise | wind | battery | remembers | limits"
     lines = ["", f"| {words} |", "|---|---|---|---|---|---|---|---|---|"]
     for name, body in bodies.items():
         asked = set(signature(body.move).parameters)
@@ -268,36 +268,36 @@ def vocabulary() -> None:
     told = {
         "reach": "of a model: the largest distance at which a neighbour matters, m",
         "sight": "of a model: how far `percept.cast` looks, m",
-        "wall_reach": "of a model: the distance beyond which a surface says nothing, m",
-        "neighbour": "of a model: asked for each neighbour that is heard; returns Sums",
-        "boundary": "of a model: asked for each wall and obstacle; returns Walls",
-        "flock": "of a model: asked once for the whole flock; fills the columns of Shared",
-        "decide": "of a model: returns the command, and its Memory where it has one",
+        "wall_reach": "of a model: the distance beyond which a surface does not matter, m",
+        "neighbour": "of a model: called for each neighbour that is heard; returns Sums",
+        "boundary": "of a model: called for each wall and obstacle; returns Walls",
+        "flock": "of a model: called once for the whole flock; fills the columns of Shared",
+        "decide": "of a model: returns the command, and its Memory if it has one",
         "meet": "of a topology: says whom of those that it hears an agent meets",
-        "missed": "of a radio: the probability that nothing of what one agent sends another in a decision arrives",
-        "missed_few": "of a radio: the same, where few packets are sent in a decision",
-        "receive": "of a radio: 1 if a packet arrives, else 0, and its Packet where it has one",
+        "missed": "of a radio: the probability that nothing arrives of what one agent sends another at a decision",
+        "missed_few": "of a radio: the same, if few packets are sent at a decision",
+        "receive": "of a radio: 1 if a packet arrives, else 0, and its Packet if it has one",
         "late": "of a radio: how much later than the delay a packet comes, s",
         "see": "of a radio: offset (m) and velocity (m/s) of a neighbour that is seen, after a picture of it",
         "lasts": "of a radio: 1.0 while the newest packet counts, by its age",
         "carry": "of a radio: where the sender of the newest packet is believed to be now, m",
         "move": "of a body: returns the velocity after a step",
-        "pair": "of an order parameter: asked for each pair of agents",
+        "pair": "of an order parameter: called for each pair of agents",
         "linked": "of an order parameter: whether two agents belong to one cluster",
-        "agent": "of an order parameter: asked for each agent",
-        "member": "of an order parameter: asked for each member of a cluster",
-        "cluster": "of an order parameter: asked for each cluster",
+        "agent": "of an order parameter: called for each agent",
+        "member": "of an order parameter: called for each member of a cluster",
+        "cluster": "of an order parameter: called for each cluster",
         "sample": "of an order parameter: the values of one instant",
-        "survey": "of an order parameter: asked once for the whole flock",
+        "survey": "of an order parameter: called once for the whole flock",
         "within": "of an order parameter: distance beyond which it contributes nothing, m",
         "linked_within": "of an order parameter: distance beyond which no two agents are linked, m",
         "settled": "of an order parameter: whether nobody farther than `beyond` (m) can change its Pair",
         "fitness": "of a metric set: named values of a whole flight, from its order parameters",
-        "limits": "of a body: what of a scenario it cannot fly, as lines",
-        "measure": "of a sensor: the position and velocity that an agent believes, and its Memory where it has one",
+        "limits": "of a body: what it cannot fly of a scenario, as lines of text",
+        "measure": "of a sensor: the position and velocity that an agent believes, and its Memory if it has one",
         "error": "of a sensor: the errors of position and velocity along one axis after one more measurement",
-        "exact": "of a sensor: whether it tells the truth with these numbers",
-        "bounds": "of a sensor: what of a scenario it cannot measure, as lines",
+        "exact": "of a sensor: whether it has no error with these numbers",
+        "bounds": "of a sensor: what it cannot measure of a scenario, as lines of text",
         "sense": "of a fault: the position and velocity that an agent believes, after its sensors",
         "tell": "of a fault: the position and velocity that it sends to the others",
         "radio": "of a fault: how far its radio hears and is heard",
@@ -305,14 +305,14 @@ def vocabulary() -> None:
         "overrule": "of a fault: the command that reaches the body",
         "motion": "of a fault: the velocity after a step of motion",
         "leaves": "of a fault: time from its beginning until the agent is absent, s",
-        "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines",
+        "faults": "of a metric set: what is wrong with its parameters beyond single ranges, as lines of text",
     }
     wrong = sorted(set(told) ^ set(VOCABULARY))
     if wrong:
         raise ExtensionError(f"the page of the vocabulary does not know the rules {', '.join(wrong)}")
     pieces = [
         "# What a rule may ask for\n\nA rule is a plain function of floats. Its argument names, in any order, say what "
-        "it wants to know; a flight computes only what is asked for. A difference is always neighbour minus own.\n"
+        "it needs; a flight computes only what is asked for. Differences are always neighbour minus own.\n"
     ]
     for kind, names in VOCABULARY.items():
         rows = ((f"`{name}`", plain(text)) for name, text in names.items())
@@ -329,16 +329,16 @@ def keys() -> None:
     from airflock.scenarios.units import UNITS
 
     pieces = [
-        "# Every key of a scenario file\n\nThe same lists are printed by `airflock keys`, `airflock keys radio`, "
-        "`airflock keys delay`, and with `--json` for machines. A dash means that the value comes from the rest of the "
+        "# Every key of a scenario file\n\n`airflock keys`, `airflock keys radio` and `airflock keys delay` print the "
+        "same lists, with `--json` for machines. A dash means that the value comes from the rest of the "
         "scenario, or that there is none.\n"
     ]
     for section in sections().values():
         pieces.append(f"\n## {plain(section.head)}\n\n{plain(section.about)}\n\n")
         pieces.append(key_table(section.keys) if section.keys else "It has no numbers of its own.\n")
     pieces.append(
-        '\n## Units\n\nA plain number is in the declared SI unit. A text such as `"400 ms"`, or a table with value '
-        "and unit, is converted; a note tells every conversion.\n\n"
+        '\n## Units\n\nA plain number is in the declared SI unit. Text such as `"400 ms"`, or a table with value '
+        "and unit, is converted; a note reports each conversion.\n\n"
     )
     rows = ((f"`{unit}`", ", ".join(f"`{other}`" for other in known)) for unit, known in UNITS.items())
     pieces.append(table(("declared", "also"), rows))
@@ -354,7 +354,7 @@ def commands() -> None:
 
     group = typer.main.get_command(app)
     pieces = [
-        "# Commands and functions\n\nEvery command has a function that does the same, and its options are that "
+        "# Commands and functions\n\nEvery command has a Python function that does the same; its options are the "
         "function's arguments.\n\n",
         table(("command", "in Python"), ((f"[`airflock {n}`](#{n})", f"`{c.call}`") for n, c in COUNTERPARTS.items())),
     ]
@@ -364,20 +364,22 @@ def commands() -> None:
         listed |= {f"{name} {key}": found for key, found in inner.items()}
     for name, command in sorted(listed.items()):
         options = COUNTERPARTS[name].options if name in COUNTERPARTS else {}
-        pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{plain(_help(command.help or ''))}\n\n")
+        pieces.append(f"\n({name.replace(' ', '-')})=\n## {name}\n\n{_help(command.help or '')}\n\n")
         rows = []
         for option in command.params:
             named = option.opts[0].startswith("-")
             flag = ", ".join(f"`{text}`" for text in option.opts) if named else f"`{option.metavar or option.name}`"
             about = options.get(option.name, "")
             argument = f"`{about}`" if about.isidentifier() or "airflock." in about else plain(about)
-            rows.append((flag, plain(_help(getattr(option, "help", "") or "")), argument))
+            rows.append((flag, _help(getattr(option, "help", "") or ""), argument))
         pieces.append(table(("option", "meaning", "in Python"), rows) if rows else "")
     put("commands.md", "".join(pieces))
 
 
 def _help(text: str) -> str:
-    return re.sub(r"Example: (airflock .*)", r"\n\nExample: \1", text.replace("\\[", "["))  # a terminal's markup
+    """Help of a command as Markdown: without a terminal's markup, its examples as code that can be copied."""
+    pieces = re.split(r"Example: (airflock .*?)(?=,?$)", text.replace("\\[", "["), flags=re.M)
+    return "".join(f"\n\nExample: `{piece}`" if k % 2 else plain(piece) for k, piece in enumerate(pieces))
 
 
 def presets() -> None:
@@ -388,8 +390,8 @@ def presets() -> None:
     rows = []
     for name in known():
         found = load(name)
-        size = f"{found.agents} agents, {found.flight.duration:g} s"
+        size = f"{found.agents} agents, {found.flight.duration:g}\u00a0s"
         rows.append((f"`{name}`", plain(str(found.document.get("title", ""))), size))
     text = "# Presets\n\nFly one with `airflock run NAME`, see its file with `airflock presets NAME`, "
-    text += 'begin your own from it with `extends = "NAME"`.\n\n'
+    text += 'start your own file with `extends = "NAME"`.\n\n'
     put("presets.md", text + table(("name", "what it is", "size"), rows))

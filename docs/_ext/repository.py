@@ -6,6 +6,8 @@ from pathlib import Path
 
 from writing import DOCS, OUT, ROOT, put
 
+EXAMPLES = ("gallery", "notebooks", "tours")
+
 
 def repository() -> None:
     """Papers' reports, decisions and other Markdown of the repository, with links that hold within the site."""
@@ -50,25 +52,30 @@ def copy(source: Path, name: str, after: str = "") -> None:
             return f"![{text}](pictures/{file.name})"
         page = _page_of(file)
         if page is not None:
-            return f"[{text}](/generated/{page})"
-        return f"{text} (`{path}`)" if path.strip("./") != text.strip("`") else text
+            return f"[{text}](/{page}{f'#{anchor}' if anchor and not page.startswith('generated/') else ''})"
+        where = file.relative_to(ROOT).as_posix() if file.is_relative_to(ROOT) else path
+        return f"`{where}`" if where.endswith(text.strip("`")) else f"{text} (`{where}`)"
 
     text = source.read_text(encoding="utf-8")
     put(name, re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, text) + after)
 
 
 def _page_of(file: Path) -> str | None:
-    """The generated page of a file of the repository; None if it has none."""
+    """The page of the site that a file of the repository is, or is made into; None if it has none."""
     if not file.is_relative_to(ROOT):
         return None
     parts = file.relative_to(ROOT).parts
     if parts[0] == "papers" and len(parts) == 2 and file.suffix == ".md":
-        return f"papers/{'index' if parts[1] == 'README.md' else file.stem.lower()}.md"
+        return f"generated/papers/{'index' if parts[1] == 'README.md' else file.stem.lower()}.md"
     if parts[0] == "papers" and len(parts) in (2, 3) and (len(parts) == 2 or file.suffix == ".md"):
         rest = "index" if len(parts) == 2 or parts[2] == "README.md" else file.stem.lower()
-        return f"papers/{parts[1]}/{rest}.md"
+        return f"generated/papers/{parts[1]}/{rest}.md"
     if parts[:2] == ("docs", "decisions"):
-        return f"project/decisions/{parts[2] if len(parts) == 3 else 'index.md'}"
+        return f"generated/project/decisions/{parts[2] if len(parts) == 3 else 'index.md'}"
     if parts[-1] in ("ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md") and len(parts) == 1:
-        return f"project/{parts[-1].lower()}"
-    return "evolve.md" if parts == ("docs", "evolve.md") else None
+        return f"generated/project/{parts[-1].lower()}"
+    if parts[0] == "docs" and len(parts) == 2 and file.suffix == ".md":
+        return "generated/evolve.md" if file.stem == "evolve" else parts[1]
+    if parts[0] == "docs" and len(parts) == 3 and parts[1] in EXAMPLES and file.suffix == ".py":
+        return f"generated/{parts[1]}/{file.stem}"
+    return None

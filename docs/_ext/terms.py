@@ -1,4 +1,4 @@
-"""Terms of the glossary link to it where a page first uses them."""
+"""Terms of the glossary link to it where the prose of a page first uses them."""
 
 import re
 
@@ -7,7 +7,7 @@ from sphinx.application import Sphinx
 
 SILENT = (
     nodes.literal, nodes.literal_block, nodes.reference, nodes.title, nodes.math, nodes.math_block, nodes.term,
-    nodes.caption, nodes.thead,
+    nodes.caption, nodes.table, nodes.strong,
 )  # fmt: skip
 
 
@@ -24,7 +24,9 @@ def link(app: Sphinx, doctree: nodes.document, page: str) -> None:
     if page == "glossary" or page.startswith("generated/project/changelog") or not known:
         return
     names = sorted(known, key=len, reverse=True)
-    pattern = re.compile(r"\b(" + "|".join(map(re.escape, names)) + r")(?=s?\b)")
+    pattern = re.compile(
+        r'(?<![\w."])(' + "|".join(map(re.escape, names)) + r')s?(?![\w"]|\.\w)'
+    )  # no key such as model.r
     seen: set[str] = set()
     for text in list(doctree.findall(nodes.Text)):
         if _silent(text):
@@ -35,7 +37,7 @@ def link(app: Sphinx, doctree: nodes.document, page: str) -> None:
         seen.add(match[1])
         home, anchor = known[match[1]]
         where = app.builder.get_relative_uri(page, home) + "#" + anchor
-        reference = nodes.reference("", match[1], internal=True, refuri=where, classes=["glossary-term"])
+        reference = nodes.reference("", match[0], internal=True, refuri=where, classes=["glossary-term"])
         whole = text.astext()
         parts = [nodes.Text(whole[: match.start()]), reference, nodes.Text(whole[match.end() :])]
         text.parent.replace(text, [part for part in parts if part.astext()])
@@ -43,9 +45,10 @@ def link(app: Sphinx, doctree: nodes.document, page: str) -> None:
 
 def _silent(node: nodes.Node) -> bool:
     """Whether a text stands where no link belongs."""
-    parent = node.parent
-    while parent is not None and not isinstance(parent, nodes.paragraph):
+    parent, within = node.parent, False
+    while parent is not None:
         if isinstance(parent, SILENT):
             return True
+        within = within or isinstance(parent, nodes.paragraph)
         parent = parent.parent
-    return parent is None
+    return not within

@@ -2,7 +2,7 @@
 Long exposure
 =============
 
-As a camera would see lamps on the drones: light adds up where they linger or meet.
+As a camera would see lights on the drones: light adds up where they linger or meet.
 """
 
 import airflock

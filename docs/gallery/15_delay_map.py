@@ -2,7 +2,7 @@
 Delay against range
 ===================
 
-How much delay a flock bears depends on how far it hears. Each field of the map is the mean of two flights.
+How much delay a flock tolerates depends on how far it hears. Each cell of the map is the mean of two flights.
 """
 
 import airflock

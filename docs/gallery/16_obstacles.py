@@ -2,7 +2,7 @@
 Around obstacles
 ================
 
-Walls and obstacles act as agents that fly inwards. The flock divides at an obstacle and meets again behind it.
+Walls and obstacles act as agents that fly inwards. The flock splits at an obstacle and rejoins behind it.
 """
 
 import airflock

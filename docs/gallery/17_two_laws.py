@@ -3,7 +3,7 @@ Two laws on the same robots
 ===========================
 
 The law of Virágh et al. (2014) and that of Vásárhelyi et al. (2018), with the same drones, radio, arena and seeds.
-Each partial fitness tells what a law does well.
+Each partial fitness shows what a law does well.
 """
 
 import numpy as np

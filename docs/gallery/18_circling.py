@@ -2,7 +2,7 @@
 Circling or crossing
 ====================
 
-The flock's rotation about the arena's centre: near 1 or -1 where it circles, near 0 where it crosses. Three seeds.
+The flock's rotation about the arena's centre: near 1 or -1 if it circles, near 0 if it crosses. Three seeds.
 """
 
 import airflock

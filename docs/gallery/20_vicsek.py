@@ -3,7 +3,7 @@ Order and disorder
 ==================
 
 The model of Vicsek et al. (1995) passes from order to disorder as the noise grows. The dashed line is what
-chance alone gives, one over the root of the number of agents.
+chance alone gives: one over the root of the number of agents.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@ A swarm, a mill, a school
 =========================
 
 As the zone of orientation widens, a group passes from a swarm to a mill and to parallel motion (Couzin et al. 2002).
-Polarisation tells schools, milling tells mills.
+Polarisation reveals schools, milling reveals mills.
 """
 
 from matplotlib.figure import Figure

@@ -2,7 +2,7 @@
 A mill from above
 =================
 
-The last seconds of a group that turns about its own centre, seen along the axis about which it turns.
+The last seconds of a group that turns about its own centre, seen along its axis of rotation.
 """
 
 import numpy as np

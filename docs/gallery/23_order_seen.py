@@ -2,7 +2,7 @@
 What a polarisation looks like
 ==============================
 
-Headings of the same particles at four levels of noise; the number is the polarisation of the instant.
+Headings of the same particles at four levels of noise; the number is the polarisation at that instant.
 """
 
 import numpy as np

@@ -2,9 +2,9 @@
 How few neighbours suffice
 ==========================
 
-Starlings interact with six or seven neighbours, however far these are (Ballerini et al. 2008). Here each drone meets
-but the k nearest of those whom it hears, or those whose Voronoi cells border on its own. The law was tuned for all in
-range: with fewer it aligns less. Each point is the mean of two flights.
+Starlings interact with six or seven neighbours, however far away (Ballerini et al. 2008). Here each drone meets only
+the k nearest of those that it hears, or those whose Voronoi cells border its own. The law was tuned for all in range:
+with fewer it aligns less. Each point is the mean of two flights.
 """
 
 from matplotlib.figure import Figure

@@ -2,8 +2,8 @@
 Order parameters, low and high
 ==============================
 
-Two flocks for each group of order parameters. The numbers below a flock are what it is scored with. Grey is the arena
-of 100 m, and an arrow is one second of flight.
+Two flocks for each group of order parameters. The numbers below a flock are its scores. Grey is the arena of 100 m,
+and an arrow is one second of flight.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ halves = loose * 0.35 + np.where(np.arange(N) % 2, 1.0, -1.0)[:, None] * (32.0, 
 alone = np.where((np.arange(N) % 6 == 0)[:, None], 2.0 * loose, 0.35 * loose)
 
 # %%
-# A flock is a place and a velocity (m, m/s) for each agent; it flies straight on for two seconds.
+# A flock is a position and a velocity (m, m/s) for each agent; it flies straight on for two seconds.
 
 
 def measured(places, velocities):

@@ -2,9 +2,9 @@
 Predator and prey
 =================
 
-A group with a law of its own: one predator among a hundred prey (Chen and Kolokolnikov 2014). A weak one stops in the
-middle of a ring of prey, which draw it to all sides alike; the circles are the radii that theory gives. A stronger one
-chases through the swarm. Lines are the last two seconds of its way.
+A group with its own role: one predator among a hundred prey (Chen and Kolokolnikov 2014). A weak one stops in the
+middle of a ring of prey, which draw it equally to all sides; the circles are the radii from theory. A stronger one
+chases through the swarm. Lines are the last two seconds of its path.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 Through a city
 ==============
 
-Ten agents steer by rays through a city that is made from a seed; stars mark the goals.
+Ten agents steer by rays through a city made from a seed; stars mark the goals.
 """
 
 import airflock

@@ -2,7 +2,7 @@
 The rays of one agent
 =====================
 
-Red rays met something, the green one was the first that was free, black is what was flown.
+Red rays hit something, the green ray was the first free one, and black is the direction flown.
 """
 
 import airflock

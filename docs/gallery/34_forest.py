@@ -2,7 +2,7 @@
 Among trees
 ===========
 
-A forest is made from its seed; each tree is a cylinder that the agents' rays meet.
+A forest is made from its seed; each tree is a cylinder that the agents' rays can hit.
 """
 
 import airflock

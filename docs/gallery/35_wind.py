@@ -1,8 +1,8 @@
 """
-How much wind a flock bears
-===========================
+How much wind a flock can take
+==============================
 
-Gusts push all drones; beyond some strength they are pushed over the walls.
+Gusts push all drones; beyond some strength they push them over the walls.
 """
 
 from matplotlib.figure import Figure

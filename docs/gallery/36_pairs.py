@@ -2,7 +2,7 @@
 Paired flights
 ==============
 
-The same seeds with and without loss of packets. Each line is one seed: what a change does is seen in pairs, where the
+The same seeds with and without loss of packets. Each line is one seed: pairs show what a change does, because the
 luck of the start cancels.
 """
 

@@ -2,8 +2,8 @@
 Colours by heading
 ==================
 
-Where all fly equally fast, as the particles of Vicsek et al. (1995) do, colours say where they head. Two pictures of
-one panel stand side by side: each takes the axes that it is drawn into.
+If all fly equally fast, as the particles of Vicsek et al. (1995) do, colours can show their headings. Two pictures
+stand side by side in one figure: each takes the axes that it is drawn into.
 """
 
 from matplotlib.figure import Figure

@@ -2,8 +2,8 @@
 Time since the last packet
 ==========================
 
-How old what a drone knows of another one is, by the distance between the two (Fig. 8 of the paper): up to the range
-of the radio the delay, beyond it the time since the two were last near each other.
+The age of what a drone knows of another one, by their distance (Fig. 8 of the paper): within radio range it is the
+delay, beyond it the time since the two were last in range.
 """
 
 import airflock

@@ -2,7 +2,7 @@
 A drone display
 ===============
 
-Points of a shape are assigned to drones so that the squared ways are least; they are assigned anew when drones fail.
+Points of a shape are assigned to drones so that the sum of squared paths is least, and again when drones fail.
 """
 
 import airflock

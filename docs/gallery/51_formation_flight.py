@@ -2,7 +2,7 @@
 Birds in each other's upwash
 ============================
 
-Every bird feels its induced drag and slides down its slope (Dimock and Selig 2003). From above, the flock flies up
+Every bird feels its induced drag and moves down its gradient (Dimock and Selig 2003). From above, the flock flies up
 the picture: black lines are wings, orange air rises, violet air sinks. The numbers say how much less induced drag each
 bird has than a lone one.
 """

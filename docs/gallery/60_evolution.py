@@ -20,6 +20,6 @@ with tempfile.TemporaryDirectory() as folder:
 print(f"fitness {result.fitness:.3f} with", {name: round(value, 3) for name, value in result.parameters.items()})
 
 # %%
-# Grey is what luck alone does: one candidate is flown once, and a flight's fitness has a spread.
+# Grey is the effect of luck alone: one candidate is flown once, and a flight's fitness has a spread.
 search = table[table["stage"] == "search"]
 figure = airflock.plots.convergence(search, "fitness", what="a small evolution")

@@ -14,20 +14,21 @@ figure = airflock.plot(recording, "trajectories")
 # %%
 # Watch it
 # --------
-# A replay plays in place: drag to turn, click a drone, change what the colours stand for. It is one piece of HTML that
-# needs no network, and two frames for each second of flight keep it small.
+# A replay plays in place: drag to turn, click a drone, change the meaning of the colours. It is one piece of HTML that
+# needs no network. Two frames per second of flight keep it small.
 airflock.replay(recording, rate=2.0)
 
 # %%
 # What was loaded
 # ---------------
-# A scenario is everything about a flight but the seed. In a notebook it shows all keys that differ from their defaults.
+# A scenario is everything about a flight except the seed. In a notebook it shows all keys that differ from their
+# defaults.
 scenario
 
 # %%
 # The score of several flights
 # ----------------------------
-# One row per flight, one column per order parameter. Units and meanings are among the table's attributes.
+# One row per flight, one column per order parameter. The table's attributes hold units and meanings.
 table = airflock.score(scenario, seeds=4)
 table[["phi_vel", "phi_corr", "r_min", "n_coll", "fitness"]].round(3)
 
@@ -44,6 +45,6 @@ recording
 # %%
 # What if?
 # --------
-# The same seeds with half the delay: the differences are those of pairs.
+# The same seeds with half the delay, so each pair of flights gives one difference.
 quick = airflock.score(airflock.load(scenario.name, {"duration": 120.0, "agents": 50, "delay": "500 ms"}), seeds=4)
 (quick["phi_corr"] - table["phi_corr"]).round(3)

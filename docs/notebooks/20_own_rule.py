@@ -2,9 +2,9 @@
 A rule of your own
 ==================
 
-A flocking law is a handful of plain functions of floats. Their argument names say what they want to know; a drone
-that flies them needs nothing else. Here is a published law that does not come with Airflock, in fifteen lines:
-particles that drive themselves, and attract and repel each other (D'Orsogna et al. 2006).
+A flocking law is a handful of plain functions of floats. They ask for what they need by the names of their arguments;
+a drone that flies them needs nothing else. Here is a published law that does not come with Airflock, in fifteen lines:
+self-propelled particles that attract and repel each other (D'Orsogna et al. 2006).
 """
 
 import math
@@ -32,7 +32,7 @@ class Parameters(airflock.Parameters):
 # %%
 # Neighbours
 # ----------
-# `neighbour` is asked for each neighbour that is heard; what it returns is summed up. Here `dx, dy, dz` is the offset
+# `neighbour` is called for each neighbour that is heard, and its results are summed. Here `dx, dy, dz` is the offset
 # to the neighbour and `r` its length. The force is the slope of the Morse potential.
 
 
@@ -45,13 +45,13 @@ class Sums(NamedTuple):
 
 
 def neighbour(dx, dy, dz, r, p):
-    """Towards the neighbour if the attraction is the stronger, away from it if the repulsion is."""
+    """Towards the neighbour if attraction is stronger, away from it if repulsion is."""
     k = (p.c_a / p.l_a * math.exp(-r / p.l_a) - p.c_r / p.l_r * math.exp(-r / p.l_r)) / r
     return Sums(k * dx, k * dy, k * dz)
 
 
 # %%
-# It is a plain function, so it can be tried at once: a neighbour 2 m to the north attracts, one at 0.3 m repels.
+# It is a plain function, so you can try it at once: a neighbour 2 m to the north attracts, one at 0.3 m repels.
 print(neighbour(0.0, 2.0, 0.0, 2.0, Parameters()))
 print(neighbour(0.0, 0.3, 0.0, 0.3, Parameters()))
 
@@ -74,16 +74,17 @@ def preferred_speed(p):
 # %%
 # Check it
 # --------
-# Before it flies: is it the same law in every direction, in other units, for a halved time step, in single precision?
+# Before it flies, check: is it the same law in every direction, in other units, for half the time step, in single
+# precision?
 law = airflock.model(globals(), "dorsogna_2006")
 print(airflock.check_model(law))
 
 # %%
 # An order parameter of your own
 # ------------------------------
-# It is made of rules, too: `agent` is asked for each agent and summed up, `sample` makes numbers of the sums. Milling
-# as Couzin et al. (2002) have it is the length of a mean of vectors, so two mills in one place that turn against each
-# other cancel. Here each agent counts, whichever way it turns.
+# It is made of rules, too: `agent` is called for each agent and summed, `sample` makes numbers from the sums. Milling
+# as defined by Couzin et al. (2002) is the length of a mean of vectors, so two mills in one place that turn opposite
+# ways cancel. Here each agent counts, whichever way it turns.
 
 
 class Agent(NamedTuple):
@@ -120,7 +121,7 @@ print(airflock.check_metric(Turning))
 # %%
 # Fly it
 # ------
-# A hundred particles without walls, noise or delay, by a scenario file.
+# A scenario file with a hundred particles, without walls, noise or delay.
 SCENARIO = """
 agents = 100
 duration = "3 min"
@@ -156,11 +157,11 @@ figure = airflock.plots.trajectories(recording.sel(time=slice(175.0, None)))
 airflock.score(scenario, seeds=3).round(2)
 
 # %%
-# A typing mistake is told with the nearest right word.
+# A typing mistake is reported with the nearest right word.
 
 
 class Wrong:
-    """An order parameter that asks for what there is not."""
+    """An order parameter that asks for something that does not exist."""
 
     REPORTS, Agent, Sample = Turning.REPORTS, Agent, Sample
     sample = staticmethod(Turning.sample)
@@ -175,14 +176,14 @@ except airflock.AirflockError as fault:
     print(fault)
 
 # %%
-# In a file of its own, `mine.py`, the same law flies by `model.kind = "mine.py"` in a scenario file, with `--trust`.
-# There `airflock types mine.py` also tells a misspelled parameter, without running anything.
+# From its own file, `mine.py`, the same law flies with `model.kind = "mine.py"` in a scenario file, and `--trust`.
+# `airflock types mine.py` then also finds misspelled parameters, without running anything.
 
 # %%
-# Several numbers of one meaning
-# ------------------------------
+# Several numbers with one meaning
+# --------------------------------
 # A force with several terms has a weight for each. `size` declares them in one line: a rule reads a tuple, and loops
-# over it are written out when the law is compiled. A scenario file gives all of them, `model.w = [1.0, 0.3, 0.1]`, or
+# over it are unrolled when the law is compiled. A scenario file sets all of them, `model.w = [1.0, 0.3, 0.1]`, or
 # one, `model.w_1 = 0.5`; each has a slider on the live page, and bounds in a search.
 
 

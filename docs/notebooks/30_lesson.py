@@ -3,7 +3,7 @@ A lesson of 90 minutes: collective motion
 =========================================
 
 For a class that can read a few lines of Python. Each part has a question, an experiment and an exercise; the answers
-stand at the end.
+are at the end.
 
 * 0 to 15 min: what is order?
 * 15 to 35 min: noise against order
@@ -12,8 +12,8 @@ stand at the end.
 * 65 to 80 min: a flock of machines
 * 80 to 90 min: answers
 
-Before the lesson, run the notebook once: the first flight of each law compiles for some seconds, later ones begin at
-once. Words for the board: agent, heading, neighbour, polarisation, milling, delay.
+Run the notebook once before the lesson: the first flight of each law takes some seconds to compile, later ones begin
+at once. Words for the board: agent, heading, neighbour, polarisation, milling, delay.
 """
 
 import numpy as np
@@ -35,10 +35,10 @@ for axes, scenario, title in zip(figure.subplots(1, 2), (ordered, noisy), ("litt
     axes.set(title=title, aspect="equal", xlabel="m", ylabel="m")
 
 # %%
-# **Exercise 1.** What polarisation do 100 particles have whose directions are drawn by lot? Guess first.
+# **Exercise 1.** What is the polarisation of 100 particles with random directions? Guess first.
 angles = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (1000, 100))
 by_lot = np.abs(np.exp(1j * angles).mean(axis=1)).mean()
-print(f"drawn by lot: {by_lot:.3f}")
+print(f"random directions: {by_lot:.3f}")
 
 # %%
 # 2. Noise against order
@@ -53,7 +53,7 @@ axes.set(xlabel="noise, rad", ylabel="polarisation", ylim=(0, 1))
 
 # %%
 # **Exercise 2.** At which noise is the polarisation half of its largest value? Does the answer depend on the number of
-# particles? Fly `settings={"agents": 100}` in a box of a half of the side.
+# particles? Fly `settings={"agents": 100}` in a box with half the side.
 
 # %%
 # 3. More neighbours, more order?
@@ -68,33 +68,33 @@ print(table.groupby("model.r")["polarisation"].mean().round(2))
 # %%
 # 4. Mills and schools
 # --------------------
-# With zones of repulsion, orientation and attraction (Couzin et al. 2002) a group can turn about its own centre.
+# With zones of repulsion, orientation and attraction (Couzin et al. 2002), a group can turn about its own centre.
 for name in ("swarm", "torus", "highly_parallel"):
     score = airflock.score(f"couzin_2002/{name}", seeds=2).mean()
     print(f"{name:16s} polarisation {score['polarisation']:.2f}  milling {score['milling']:.2f}")
 
 # %%
-# **Exercise 4.** Which of the two order parameters tells a mill from a swarm? Why not the other one?
+# **Exercise 4.** Which of the two order parameters tells a mill from a swarm? Why does the other one not?
 
 # %%
 # 5. A flock of machines
 # ----------------------
 # Birds see each other at once; drones hear by radio, and late. The law of Vásárhelyi et al. (2018) was made for that.
-# Two numbers of one flock: how well neighbours agree, and how near two drones came.
+# Look at how well neighbours agree, how close two drones came, and how often they collided.
 late = [0.0, 1.0, 2.0, 4.0]
 table = airflock.sweep("vasarhelyi_2018/4ms", {"radio.delay": late}, 3, settings={"agents": 40, "duration": 200.0})
 print(table.groupby("radio.delay")[["phi_corr", "r_min", "n_coll"]].mean().round(2))
 
 # %%
-# **Exercise 5.** Up to which delay would you fly? Which of the three numbers did you decide by, and how many flights
-# would you want to see first? Look at one: `airflock watch vasarhelyi_2018/4ms --agents 40 --set radio.delay=4`.
+# **Exercise 5.** Up to which delay would you fly? Which of the three numbers decided it, and how many flights would
+# you want to see first? Look at one: `airflock watch vasarhelyi_2018/4ms --agents 40 --set radio.delay=4`.
 
 # %%
 # Answers
 # -------
-# 1. About 0.09. The mean of N random unit vectors is about 0.89 over the root of N long.
-# 2. Read it off your own curve; in a small box the fall is less steep, because chance alone gives more order.
-# 3. With few neighbours an agent averages over few directions, so noise is averaged away less; and groups do not meet.
+# 1. About 0.09. The mean of N random unit vectors has a length of about 0.89 divided by the root of N.
+# 2. Read it off your own curve; in a small box it falls less steeply, because chance alone gives more order.
+# 3. With few neighbours an agent averages over few directions, so less noise cancels; and groups do not meet.
 # 4. Milling. In a swarm and in a mill headings cancel, so the polarisation is small in both.
-# 5. The smallest distance and the collisions decide, not the beauty of the flock. Where no collision was seen in n
-#    flights, their share may still be 3 / n: three flights say little, a hundred say below 3 %.
+# 5. The smallest distance and the collisions decide, not the beauty of the flock. If n flights had no collision, the
+#    share of flights with one may still be 3 / n: three flights say little, a hundred say below 3 %.

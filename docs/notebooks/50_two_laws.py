@@ -2,7 +2,7 @@
 Two laws side by side
 =====================
 
-Which law is better? On equal terms: the same robots, radio, arena, order parameters and seeds. Only the law differs,
+Which law is better, on equal terms: the same robots, radio, arena, order parameters and seeds? Only the law differs,
 so the flights of one seed are a pair, and the luck of the start cancels.
 """
 
@@ -15,7 +15,7 @@ import airflock
 # %%
 # The scenario, and the law as an argument
 # ----------------------------------------
-# Fifty drones at 4 m/s with a second of delay. `law=` replaces the law of the preset; parameters of the other law take
+# Fifty drones at 4 m/s with a second of delay. `law=` replaces the law of the preset; the other law's parameters take
 # the values of its publication.
 settings = {"agents": 50, "duration": "5 min"}
 laws = {name: airflock.load("vasarhelyi_2018/4ms", settings, law=name) for name in ("vasarhelyi_2018", "viragh_2014")}
@@ -26,7 +26,7 @@ pd.DataFrame({name: table[shown].mean() for name, table in tables.items()}).roun
 # %%
 # Look before you count
 # ---------------------
-# The last half minute of one flight each, on the same axes.
+# The last half minute of one flight of each law, on the same axes.
 figure = Figure(figsize=(9, 4.5), layout="constrained")
 panels = figure.subplots(1, 2, sharex=True, sharey=True)
 for axes, (name, scenario) in zip(panels, laws.items(), strict=True):
@@ -37,7 +37,7 @@ for axes, (name, scenario) in zip(panels, laws.items(), strict=True):
 # %%
 # Pairs
 # -----
-# Difference seed by seed, with its standard error. A difference of twice that is one to speak of.
+# The difference seed by seed, with its standard error. A difference of twice that is worth mentioning.
 new, old = tables["vasarhelyi_2018"], tables["viragh_2014"]
 parts = ["f_speed", "f_corr", "f_wall", "f_coll", "f_disc", "f_cluster", "fitness"]
 change = (new - old)[parts]
@@ -47,8 +47,8 @@ pd.DataFrame({"mean difference": change.mean(), "standard error": spread, "seeds
 # %%
 # Is the comparison fair?
 # -----------------------
-# Each law has numbers of its own, and those of one may have been tuned for such robots, those of the other not. So give
-# the other a chance: search its gains, then fly the best on seeds that the search has not seen.
+# Each law has its own numbers, and perhaps only one law was tuned for such robots. So give the other a chance: search
+# its gains, then fly the best on seeds that the search has not seen.
 gains = {"model.p_rep": [0.1, 0.3, 1.0], "model.c_frict": [10.0, 30.0, 100.0]}
 found = airflock.sweep("vasarhelyi_2018/4ms", gains, range(100, 104), settings=settings, law="viragh_2014")
 fitness = found.groupby(list(gains))["fitness"].mean()
@@ -67,12 +67,12 @@ pd.DataFrame(
 ).round(3)
 
 # %%
-# Nine points are no search; `airflock.evolve(better, "study")` is one.
+# Nine points are hardly a search; `airflock.evolve(better, "study")` is one.
 
 # %%
-# Where does each law end?
-# ------------------------
-# The same two laws over the delay of the radio. A law that is better at one delay need not be at another.
+# Where does each law break down?
+# -------------------------------
+# Fly the same two laws over the delay of the radio. A law that is better at one delay need not be at another.
 delays = {"radio.delay": [0.0, 0.5, 1.0, 2.0]}
 curves = Figure(figsize=(6, 3.5), layout="constrained")
 axes = curves.subplots()

@@ -2,7 +2,7 @@
 Evolve, make safe, certify
 ==========================
 
-An optimum is the best on average. Before it flies, ask how often it goes wrong, give some of its fitness away for
+An optimum is the best on average. Before it flies, ask how often it goes wrong, trade some of its fitness for
 distance, and ask again.
 """
 
@@ -13,7 +13,7 @@ import pandas as pd
 
 import airflock
 
-study = Path(tempfile.mkdtemp()) / "study"  # a folder of your own, in earnest: a study can be continued in it
+study = Path(tempfile.mkdtemp()) / "study"  # for real work choose a lasting folder: a study can be continued in it
 
 # %%
 # Evolve
@@ -40,22 +40,22 @@ figure = airflock.plots.convergence(table[table["stage"] == "search"], "fitness"
 # %%
 # How safe is it?
 # ---------------
-# Not "no collision in ten flights" but a statement with a confidence: in fewer than 2 % of flights do two drones come
-# nearer than 5 m. The seeds follow from the scenario, so nobody can choose lucky ones, and every look is paid for.
+# Not "no collision in ten flights" but a statement with a confidence: two drones come closer than 5 m in fewer than 2 %
+# of flights. The seeds follow from the scenario, so nobody can choose lucky ones, and every look is paid for.
 limit = "r_min<5 at 2%"
 print(*airflock.certify(study / "best.toml", limit, flights=400).statements, sep="\n")
 
 # %%
-# Give fitness away for distance
-# ------------------------------
-# The recipe by which the authors' optimum became their outdoor flights, step by step on the same seeds. A step stays if
-# it gains distance, costs little fitness, and breaks nothing that held; what is left is flown again on fresh seeds.
+# Trade fitness for distance
+# --------------------------
+# This is the authors' recipe from optimum to outdoor flights, step by step on the same seeds. A step stays if it gains
+# distance, costs little fitness, and breaks nothing that held; the result is flown again on fresh seeds.
 steps = airflock.harden(study / "best.toml", range(40))
 pd.DataFrame([step.as_dict() for step in steps])[["name", "fitness", "r_min", "cost", "verdict"]].round(3)
 
 # %%
-# So ask of what is left what was asked of the optimum. The certificate also says how far the delay may grow before the
-# statement does not hold any more.
+# So ask the same question of the result. The certificate also says how far the delay may grow while the statement is
+# still shown.
 safer = airflock.load(study / "best.toml", dict(steps[-1].parameters))
 certificate = airflock.certify(safer, limit, flights=400, tolerance=["radio.delay"])
 certificate.save("certificate.toml")
@@ -65,8 +65,8 @@ pd.DataFrame(certificate.tolerance["axis"])[["key", "unit", "nominal", "safe", "
 # %%
 # What was shown, and what was not
 # --------------------------------
-# A flock that is "not shown" need not be worse than the limit: 400 flights may be too few. Where nothing happens at
-# all, they still allow an event in 0.75 % of flights. And all this holds for the scenario as it stands: no faults, no
-# wind, no person at the transmitter.
+# "Not shown" does not mean that the flock is worse than the limit: 400 flights may be too few. Even without a single
+# event, they still allow one in 0.75 % of flights. And all this holds for the scenario as it is: no faults, no wind,
+# no person at the transmitter.
 #
 # `airflock certify certificate.toml --check` flies a part of it again, on any machine, and computes all bounds anew.

@@ -2,8 +2,8 @@
 The engineer's tour: will my drones flock?
 ==========================================
 
-Twelve quadrotors at 6 m/s, 400 ms of delay, 150 m of radio range, a field with a building in it. How safe are the
-published sets, what does more delay cost, and which flight should be looked at?
+Twelve multirotors at 6 m/s, 400 ms of delay, 150 m of radio range, a field with a building in it. How safe are the
+published sets, what does more delay cost, and which flight is worth a look?
 """
 
 from pathlib import Path
@@ -30,8 +30,8 @@ obstacles = [[[-25, -20], [25, -20], [25, 20], [-25, 20]]]
 # %%
 # The optimum, and the set that flew outdoors
 # -------------------------------------------
-# The authors did not fly the optimum of their fitness: they made it safer by hand (Table S4). Thirty flights with
-# each. A count of collisions is one thing, what it allows to say another.
+# The authors did not fly the optimum of their fitness: they made it safer by hand (Table S4). Here are thirty flights
+# with each. Counting collisions is one thing; what the count shows is another.
 for name in ("6ms", "real_6ms"):
     Path(f"{name}.toml").write_text(FIELD.replace("6ms", name))
     print(name, *airflock.validate(f"{name}.toml").notes, sep="\n  ")
@@ -41,7 +41,7 @@ for name in ("6ms", "real_6ms"):
     print(f"collisions in {hit} of 30 flights: at most {upper_bound(hit, 30):.0%} of such flights, at 95 % confidence")
 
 # %%
-# Look at the worst flight of the second.
+# Look at the worst flight of the second set.
 figure = airflock.plot("real_6ms.toml", seed=int(table["fitness"].idxmin()))
 
 # %%

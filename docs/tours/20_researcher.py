@@ -2,8 +2,8 @@
 The researcher's tour: the same order parameters for model and data
 ===================================================================
 
-A recording is an xarray Dataset with the dimensions time, space, keypoint, individual, as the package movement has
-them. Whatever has positions in m and times in s can be scored by the rules that score a simulation.
+A recording is an xarray Dataset with the dimensions time, space, keypoint, individual, as in the package movement.
+Anything with positions in m and times in s can be scored by the rules that score a simulation.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ import xarray as xr
 import airflock
 
 # %%
-# Tracks of your own, here forty animals on noisy circles: an array (time, space, keypoint, individual), m.
+# Your own tracks, here forty animals on noisy circles: an array (time, space, keypoint, individual), m.
 time = np.arange(0.0, 30.0, 0.2)
 phase = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, 40)
 radius = np.random.default_rng(2).normal(5.0, 0.3, 40)
@@ -26,7 +26,7 @@ mine = airflock.score(tracks, settings={"metrics.kind": "order"})
 mine.round(3)
 
 # %%
-# A model beside it, measured alike.
+# A model beside it, measured the same way.
 model = airflock.score("couzin_2002/torus", seeds=3)
 print(model[["polarisation", "milling"]].mean().round(3).to_dict())
 

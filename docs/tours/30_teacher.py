@@ -25,5 +25,5 @@ axes.set(xlabel="radio range, m", ylim=(0, 1), xscale="log")
 axes.legend(frameon=False)
 
 # %%
-# Every flight can be looked at.
+# You can look at every flight.
 paths = airflock.plot("vasarhelyi_2018/4ms", settings=small | {"radio.range": 80.0}, seed=1)

@@ -79,3 +79,20 @@ def test_a_link_that_leads_nowhere_is_told(tmp_path):
         "b.html: a.html#two leads to no heading",
         "b.html: c.png leads to no file",
     ]
+
+
+def test_meanings_of_names_become_a_list_and_sections_stay(monkeypatch):
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    from docstrings import listed
+
+    lines = ["Lines.", "", "width    : of a bin, m: a tenth,", "or less", "far, near : m", "nan where none.", ""]
+    section = ["Parameters", "----------", "name : str", "    A name."]
+    listed(lines)
+    kept = list(section)
+    listed(kept)
+    assert lines == [
+        "Lines.", "", "* ``width``: of a bin, m: a tenth,", "  or less",
+        "* ``far, near``: m", "", "nan where none.", "",
+    ]  # fmt: skip
+    assert kept == section

@@ -56,6 +56,14 @@ def test_settings_change_what_counts_as_a_collision(circling):
     assert airflock.score(circling, settings={"metrics.r_coll": 28.0})["n_coll"][0] == 0
 
 
+def test_settings_change_a_scenario_by_its_name_and_what_only_recordings_have_is_refused():
+    small = {"agents": 3, "duration": 2.0}
+    by_name = airflock.score("vasarhelyi_2018/4ms", settings=small)
+    assert by_name.equals(airflock.score(airflock.load("vasarhelyi_2018/4ms", small)))
+    with pytest.raises(RecordingError, match="groups, body_length: needs a recording"):
+        airflock.score("vasarhelyi_2018/4ms", groups=True, body_length=0.1)
+
+
 def test_a_missing_position_takes_its_drone_out_of_that_instant_alone(circling):
     broken = circling.copy(deep=True)
     broken["position"][dict(time=30, individual=2)] = np.nan

@@ -24,8 +24,8 @@ from airflock.recordings.attributes import check_format, flown_with_own_law, mea
 from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.recordings.own_kinds import missing_kinds, with_files
+from airflock.scenarios.change import variant
 from airflock.scenarios.families import Given
-from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.sections import SECTIONS
@@ -58,7 +58,7 @@ def score(
     seeds : int or iterable of int
         A number of flights, with seeds 0, 1, 2, ..., or the seeds themselves.
     settings : mapping, optional
-        For a recording, keys such as {"metrics.r_coll": 2.0} that replace those it was flown with.
+        Keys such as {"metrics.r_coll": 2.0} that replace those of the scenario, or those a recording was flown with.
     threads : int, optional
         Flights side by side; by default one per core.
     precision : int
@@ -78,7 +78,7 @@ def score(
     body_length : float, optional
         For tracks, length of a body in m, by which it is judged who is near; see `airflock.recordings.lengths`.
     trust : bool
-        Whether code that settings of a recording name may run, such as {"metrics.kind": "mine.py"}.
+        Whether code that a file or settings name may run, such as {"metrics.kind": "mine.py"}.
 
     Returns
     -------
@@ -119,7 +119,11 @@ def score(
         table = _about(pd.DataFrame([values]), scenario)
         table.attrs["not_told"] = not_told(what, scenario, settings)
         return table
-    scenario, found = loaded(what), sound_seeds(seeds)
+    asked = {"aero": aero, "groups": groups, "body_length": body_length is not None}
+    if any(asked.values()):
+        names = ", ".join(name for name, given in asked.items() if given)
+        raise RecordingError(f"{names}: needs a recording, such as airflock.simulate(scenario) gives")
+    scenario, found = variant(what, settings, trust=trust), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
     return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
