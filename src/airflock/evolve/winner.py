@@ -114,47 +114,46 @@ def conclude(
     folder: Path,
     note: Callable[[bool], None] | None = None,
 ) -> Result:
-    """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder."""
+    """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder.
+
+    centres : final mean of each run, points of the unit cube
+    note    : called after each flight, with whether it is a new one
+
+    Raises StudyError where every candidate of the search failed.
+    """
     first = study.objectives[0]
-    names = [objective.name for objective in study.objectives]
-    table = tables.candidates(store, names)
-    whole = tables.whole_flights(table, study.search.flights == "growing")
-    if study.limits:
-        whole = whole.assign(**{EXCESS: _excess(study, store, whole)})
-    sound = tables.best_first(whole, first.name, first.maximise)
-    if not len(sound):
-        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
-        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
+    table = tables.candidates(store, [objective.name for objective in study.objectives])
+    sound = _sound_candidates(study, store, table, folder)
     points, origins = finalists(study, store, executor, sound, centres, note)
-    n = study.whole("final_seeds")
-    fresh = [study.seed(1, j) for j in range(n)]
-    rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
-    if study.whole("again"):
-        rows, i = flown_again(study, store, executor, points, rows, note)
-    else:
-        i = _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
+    rows, i = _fly_finalists(study, store, executor, points, note)
     winner = study.space.parameters(points[i])
-    others = [[study.seed(2, j) for j in range(n)]]
-    evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
+    unbiased = [study.seed(2, j) for j in range(study.whole("final_seeds"))]
+    evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=[unbiased])
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = interval(values)
-    if study.limits and (sound[EXCESS] == 0.0).any():
-        sound = sound[sound[EXCESS] == 0.0]
-    good = sound[sound[first.name] >= mean] if first.maximise else sound[sound[first.name] <= mean]
-    shown = pd.DataFrame(
-        [
-            {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
-            for origin, point, row in zip(origins, points, rows, strict=True)
-        ]
-    )
+    safe = _safe(study, sound)
+    good = _as_good(study, safe, mean)
     result = Result(
-        folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
-        float(sound[first.name].iloc[0]), origins[i],
-        {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
-        len(good), len(table), int(table[first.name].isna().sum()), shown, _dead(study, flown), each,
-        tuple(kept(study, [flown[0, r] for r in range(n * len(study.scenarios))])),
-    )  # fmt: skip
+        folder=folder,
+        scenario=with_parameters(study.scenario, winner),
+        parameters=winner,
+        fitness=mean,
+        sd=sd,
+        low=low,
+        high=high,
+        seeds=len(values),
+        largest=float(safe[first.name].iloc[0]),
+        origin=origins[i],
+        ranges={key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys if len(good)},
+        above=len(good),
+        candidates=len(table),
+        failed=int(table[first.name].isna().sum()),
+        finalists=_finalist_table(study, points, origins, rows),
+        dead=_dead(study, flown),
+        scenarios=each,
+        limits=tuple(kept(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
+    )
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead:
         for place, name in enumerate(best_files(study)):
@@ -162,6 +161,61 @@ def conclude(
             write(folder / name, document, "The winner of a study, ready to fly.")
     tables.export(store, folder, study.labels)
     return result
+
+
+def _sound_candidates(study: Study, store: Store, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Candidates of whole flights that did not fail, the best first; with limits also how far each is from them."""
+    first = study.objectives[0]
+    whole = tables.whole_flights(table, study.search.flights == "growing")
+    if study.limits:
+        whole = whole.assign(**{EXCESS: _excess(study, store, whole)})
+    sound = tables.best_first(whole, first.name, first.maximise)
+    if not len(sound):
+        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
+        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
+    return sound
+
+
+def _safe(study: Study, sound: pd.DataFrame) -> pd.DataFrame:
+    """Candidates that keep all limits; all of them where there are no limits, or nobody keeps them."""
+    if study.limits and (sound[EXCESS] == 0.0).any():
+        return sound[sound[EXCESS] == 0.0]
+    return sound
+
+
+def _as_good(study: Study, candidates: pd.DataFrame, fitness: float) -> pd.DataFrame:
+    """Candidates of the search that reach a fitness."""
+    first = study.objectives[0]
+    reached = candidates[first.name] >= fitness if first.maximise else candidates[first.name] <= fitness
+    return candidates[reached]
+
+
+def _fly_finalists(
+    study: Study,
+    store: Store,
+    executor: Executor,
+    points: NDArray[np.float64],
+    note: Callable[[bool], None] | None,
+) -> tuple[Sequence[Sequence[float | None]], int]:
+    """Fitness of each finalist on the same fresh seeds, by objective, and the index of the best."""
+    fresh = [study.seed(1, j) for j in range(study.whole("final_seeds"))]
+    rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
+    if study.whole("again"):
+        return flown_again(study, store, executor, points, rows, note)
+    return rows, _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
+
+
+def _finalist_table(
+    study: Study, points: NDArray[np.float64], origins: Sequence[str], rows: Sequence[Sequence[float | None]]
+) -> pd.DataFrame:
+    """Finalists as a table: origin, parameters, fitness on fresh seeds."""
+    names = [objective.name for objective in study.objectives]
+    return pd.DataFrame(
+        [
+            {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
+            for origin, point, row in zip(origins, points, rows, strict=True)
+        ]
+    )
 
 
 def flown_again(
