@@ -4,7 +4,7 @@ The numbers of a braking curve lie on a ridge of the likelihood that bends. The 
 steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: a number is moved step by
 step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
 in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
-numbers that are told worst are walked each by itself, and so are those that act alike.
+least certain numbers are walked each by itself, and so are those that act alike.
 
 A number such as a largest force acts nowhere beyond some value: a plateau, to which no walk leads on. So each end of
 each range is looked at by itself, with all others following there.
@@ -21,8 +21,8 @@ from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-WORST, WALKED = 4, 8  # numbers that are told worst, and numbers that are walked, at most
-TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however well they seem to be told
+WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
+TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
 NESTED = 3  # numbers that act most like the moved one, which follow before all do
 WINDOW, LOOKS = 0.05, 14  # of a range: on which one of them looks for its place alone, at least; and how often it looks
 ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike

@@ -10,14 +10,14 @@ import xarray as xr
 
 from airflock.errors import AirflockError, RecordingError
 from airflock.infer import select
-from airflock.infer.bootstrap import again
+from airflock.infer.bootstrap import correct
 from airflock.infer.candidates import Candidate, candidate, scenarios_of
 from airflock.infer.fit import Fit
-from airflock.infer.found import Inferred, Law, Number, rivals, tell, verdict_of
-from airflock.infer.leftover import left_over
+from airflock.infer.lack_of_fit import lack_of_fit
 from airflock.infer.likelihood import Model
 from airflock.infer.maps import maps
 from airflock.infer.predictive import posterior
+from airflock.infer.result import Inferred, Law, Number, rivals, set_numbers, verdict_of
 from airflock.infer.tracks import Scale, Tracks, scale_of, tracks_of
 from airflock.recordings.files import load_recording
 from airflock.recordings.imports.load import load_tracks
@@ -99,10 +99,10 @@ def infer(
     if found.best is not None:
         best, model = found.best, by_name[found.best.name]
         teller = _teller(say, f"{best.name}, flown again")
-        sure = again(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
-        tell(found, model, sure)
+        corrected = correct(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
+        set_numbers(found, model, corrected)
         if check:
-            found.check = posterior(model, sure.place, sure.noise, check, _teller(say, "check"))
+            found.check = posterior(model, corrected.place, corrected.noise, check, _teller(say, "check"))
     return found
 
 
@@ -169,7 +169,10 @@ class _Comparison:
             for k, n in enumerate(model.numbers[: model.named])
         }
         bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
-        left, gained = left_over(model, fit.place, self.spans), max(self.straight.score.loss() - fit.score.loss(), 0.0)
+        left, gained = (
+            lack_of_fit(model, fit.place, self.spans),
+            max(self.straight.score.loss() - fit.score.loss(), 0.0),
+        )
         return Law(
             name, float(ahead.sum()), float(np.sqrt(len(ahead)) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
             0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
