@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.limits.bounds import per_flight, per_hour
 from airflock.metrics.registry import numbers_of, reports
 from airflock.scenarios.scenario import Scenario
@@ -122,10 +122,8 @@ def read_all(texts: list[str], scenario: Scenario) -> tuple[Limit, ...]:
     faults: list[str] = []
     found = []
     for text in texts:
-        try:
+        with gathering(faults):
             found.append(read(text, scenario))
-        except ScenarioError as fault:
-            faults += fault.faults
     if not texts:
         faults.append(f"no limit is given; {EXAMPLES}")
     radii = [limit.value for limit in found if limit.score == "r_min"]

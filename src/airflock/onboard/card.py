@@ -18,7 +18,7 @@ from airflock.core.contract import Model
 from airflock.core.hearing import Hearing
 from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError
+from airflock.errors import CardError, gathering
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
@@ -260,10 +260,8 @@ def _geometry_faults(card: Card) -> list[str]:
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
     for member in card.members if card.own else card.members[:1]:
-        try:
+        with gathering(faults):
             card.pilot(member)
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
     return faults
 
 
