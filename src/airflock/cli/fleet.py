@@ -89,6 +89,7 @@ def fleet(
     """
     from airflock.fleet import compare, individuals, realtime
     from airflock.fleet.faults import read_faults
+    from airflock.fleet.starting import READY_TIME
     from airflock.fleet.teller import WATCHED
     from airflock.scenarios.files import load
 
@@ -112,7 +113,7 @@ def fleet(
     if card_file is not None:
         _write_card(card_file, card, loaded, seeds)
     series = Series()
-    ticks = seeds * (int(loaded.flight.duration) + (12 if ground else 0))
+    ticks = seeds * int(loaded.flight.duration + (READY_TIME if ground else 0.0))
     with options.progress(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
         for seed in range(first_seed, first_seed + seeds):
             card = compare.software_card(loaded, **about, seed=seed) if loaded.varied else card

@@ -1,5 +1,6 @@
 """Faults of a fleet: what goes wrong, for whom, and when; read from TOML, checked at once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
@@ -46,7 +47,16 @@ class Fault:
 
     def holds(self, who: int, now: float) -> bool:
         """Whether it holds for a drone at a time, s."""
-        return (not self.who or who in self.who) and self.begin - 1e-9 <= now < self.end - 1e-9
+        return self.befalls(who) and self.begin - 1e-9 <= now < self.end - 1e-9
+
+    def befalls(self, who: int) -> bool:
+        """Whether it holds for a drone at some time."""
+        return not self.who or who in self.who
+
+
+def clock_error(faults: Sequence[Fault], who: int) -> int:
+    """By how much the clock of a node is ahead from the start of the flight on, µs."""
+    return sum(round(fault.amount * 1e6) for fault in faults if fault.kind == "clock" and fault.befalls(who))
 
 
 def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
