@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import portrait, tables
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.folder import plain, write
 from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
 from airflock.evolve.race import race
 from airflock.evolve.safe import excess_of, kept, safe_first
-from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
@@ -124,11 +124,12 @@ def conclude(
     first = study.objectives[0]
     table = tables.candidates(store, [objective.name for objective in study.objectives])
     sound = _sound_candidates(study, store, table, folder)
-    points, origins = finalists(study, store, executor, sound, centres, note)
-    rows, i = _fly_finalists(study, store, executor, points, note)
+    evaluator = Evaluator(study, store, executor, note)
+    points, origins = finalists(evaluator, sound, centres)
+    rows, i = _fly_finalists(evaluator, points)
     winner = study.space.parameters(points[i])
     unbiased = [study.seed(2, j) for j in range(study.whole("final_seeds"))]
-    evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=[unbiased])
+    evaluator.evaluate(SCORE, points[i : i + 1], seeds=[unbiased])
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = interval(values)
@@ -190,19 +191,14 @@ def _as_good(study: Study, candidates: pd.DataFrame, fitness: float) -> pd.DataF
     return candidates[reached]
 
 
-def _fly_finalists(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    points: NDArray[np.float64],
-    note: Callable[[bool], None] | None,
-) -> tuple[Sequence[Sequence[float | None]], int]:
+def _fly_finalists(evaluator: Evaluator, points: NDArray[np.float64]) -> tuple[Sequence[Sequence[float | None]], int]:
     """Fitness of each finalist on the same fresh seeds, by objective, and the index of the best."""
+    study = evaluator.study
     fresh = [study.seed(1, j) for j in range(study.whole("final_seeds"))]
-    rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
+    rows = evaluator.evaluate(FINAL, points, seeds=[fresh] * len(points))
     if study.whole("again"):
-        return flown_again(study, store, executor, points, rows, note)
-    return rows, _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
+        return flown_again(evaluator, points, rows)
+    return rows, _winner(study, rows, excess_of(study, evaluator.store, FINAL) if study.limits else None)
 
 
 def _finalist_table(
@@ -219,22 +215,18 @@ def _finalist_table(
 
 
 def flown_again(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    points: NDArray[np.float64],
-    rows: Sequence[Sequence[float | None]],
-    note: Callable[[bool], None] | None = None,
+    evaluator: Evaluator, points: NDArray[np.float64], rows: Sequence[Sequence[float | None]]
 ) -> tuple[list[list[float | None]], int]:
     """Let the best finalists fly twice as many further seeds.
 
     Returns the fitness of all finalists, of these over all their flights, and the index of the best of these.
     """
+    study = evaluator.study
     sign, n = (1.0 if study.objectives[0].maximise else -1.0), study.whole("final_seeds")
     sound = [k for k, row in enumerate(rows) if row[0] is not None]
     best = sorted(sound, key=lambda k: -sign * float(rows[k][0] or 0.0))[: study.whole("again")]
     further = [study.seed(1, n + j) for j in range(2 * n)]
-    found = evaluate(study, store, executor, AGAIN, points[best], note, seeds=[further] * len(best))
+    found = evaluator.evaluate(AGAIN, points[best], seeds=[further] * len(best))
     both = [list(row) for row in rows]
     for k, (value,) in zip(best, found, strict=True):
         both[k] = [None if value is None else (float(rows[k][0] or 0.0) + 2.0 * value) / 3.0]
@@ -287,14 +279,10 @@ def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
 
 
 def finalists(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    sound: pd.DataFrame,
-    centres: Sequence[NDArray[np.float64]],
-    note: Callable[[bool], None] | None = None,
+    evaluator: Evaluator, sound: pd.DataFrame, centres: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Points (candidate, axis) that fly again: the mean of each run, then the top of the search or its front."""
+    study, store = evaluator.study, evaluator.store
     names, top = [objective.name for objective in study.objectives], study.whole("top")
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
     known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
@@ -308,7 +296,7 @@ def finalists(
         best = best[np.argsort(losses[best, 0], kind="stable")]
         chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
     elif study.whole("pool") > top > 0:
-        chosen = race(study, store, executor, _points(store, known), losses[:, 0], note)
+        chosen = race(evaluator, _points(store, known), losses[:, 0])
     else:
         chosen = np.arange(min(top, len(known)))
     if not len(chosen) and not centres:
