@@ -19,6 +19,7 @@ from scipy.stats import t as student
 
 from airflock.body import held
 from airflock.identify.body_checks import FEW, dead_time, second_tau, together
+from airflock.identify.derivatives import second_derivative
 from airflock.identify.logs import Logs
 
 NAMES = ("tau", "a_max", "noise", "white")
@@ -223,10 +224,7 @@ def _spread(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.
     curve = np.zeros((n, n))
     for i in range(n):
         for j in range(i, n):
-            curve[i, j] = curve[j, i] = (
-                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
-                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
-            ) / (4.0 * d * d)  # fmt: skip
+            curve[i, j] = curve[j, i] = second_derivative(loss, z, i, j, d)
     slopes = np.zeros((n, blocks))
     for i in range(n):
         up, down = np.zeros(blocks), np.zeros(blocks)
