@@ -48,7 +48,7 @@ Watch = Callable[[Progress], None]
 
 @dataclass
 class Tally:
-    """Counts of a search so far, told to whoever watches."""
+    """Counts of a search so far, reported to `watch`."""
 
     total: int
     watch: Watch | None

@@ -145,7 +145,7 @@ def is_study(name: str | os.PathLike[str]) -> bool:
         return False
     try:
         return tells_of_study(read_toml(path))
-    except (TextError, OSError):  # whoever reads it next tells what is wrong
+    except (TextError, OSError):  # the next reader says what is wrong
         return False
 
 

@@ -1,6 +1,6 @@
 """A fleet on the real clock: nodes, vehicles and ether that speak over UDP on this computer, each a life of its own.
 
-A node lives by the code that flies on board (`onboard.run.live`). A vehicle talks to its node, and to whoever joins:
+A node lives by the code that flies on board (`onboard.run.live`). A vehicle talks to its node and to clients that join:
 like PX4's simulator it calls at a port of its own, and a client that answers there gets everything. The ether hears
 every packet; where each vehicle is stands in memory that all share. The flight begins when every node has heard its
 vehicle, and all have hovered and heard each other for a while.

@@ -1,7 +1,7 @@
 """Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
 
 Processes wait behind a ready barrier: each says that it is there, and only when all have does the clock start. There
-is no time-out: a process that ends before is told in a line, and ends the fleet.
+is no time-out: a process that ends before is named in one line, and ends the fleet.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ AGAIN = 2.0  # s between two orders to start
 STARTS = 60.0  # s in which all must have armed
 HOME = 600.0  # s in which all must have landed
 LONG = 1e6  # s; longer than anybody waits
-WATCH = 0.1  # s between two looks of whoever watches
+WATCH = 0.1  # s between two looks at how the fleet is doing
 ENDED = "a process of the fleet ended with status {}"
 Begun = Generator[Rest, None, Life]
 Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
@@ -246,7 +246,7 @@ def _alive(processes: Sequence[Any]) -> None:
 
 def _child(life: Callable[[], Begun], pipe: Any) -> None:
     """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it, and tells why
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the fleet, and says why
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
     pipe.recv()

@@ -66,8 +66,8 @@ def ridges(
 ) -> tuple[Fit, Ridges]:
     """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood.
 
-    Other ends that the search has met, and places on the way to a better fit, are told with them where they are as
-    likely: each by itself, for a valley may lie between.
+    Other ends that the search has met, and places on the way to a better fit, are added where they are as likely: each
+    by itself, for a valley may lie between.
     """
     ways: list[Way] = []
     met = list(fit.others)
@@ -106,7 +106,7 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
 
 
 class View:
-    """What the curvature about a fit says of the ways along its numbers; they are told by their places among the free.
+    """What the curvature about a fit says of the ways along its numbers, by their places among the free.
 
     reach : how far each goes by the curvature until the likelihood has fallen by `drop`
     alike : how much any two act alike

@@ -186,7 +186,7 @@ def _teller(say: Callable[[str], None], name: str) -> Callable[[], None]:
 
 
 def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
-    """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without being told more."""
+    """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without options."""
     several: Iterable[Any] = [what] if isinstance(what, (xr.Dataset, str, Path)) else what
     found = []
     for number, each in enumerate(several, 1):
@@ -202,7 +202,7 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
 
 
 def _read(path: Path) -> xr.Dataset:
-    """A file of tracks as it is; what import would have to be told is said as its command."""
+    """A file of tracks that import reads without options; where it needs some, the fault gives the command."""
     try:
         return load_tracks(path)
     except RecordingError as fault:

@@ -184,7 +184,7 @@ def live(
     node: Node | Logged, ports: Sequence[Port], period: float, tell: Callable[[str], None],
     until: Callable[[], bool], save: Callable[[], None] = lambda: None,
 ) -> Generator[Rest, None, Ticks]:  # fmt: skip
-    """Tick a node every `period` s on the real clock until it is told to end, and pass bytes.
+    """Tick a node every `period` s on the real clock until `until` says so, and pass bytes.
 
     What the autopilot and serial lines send is read as it comes: an own state holds when it arrives, and a line keeps
     little. Datagrams of radios tell themselves when they hold; they wait for the tick that looks at them, which spares
