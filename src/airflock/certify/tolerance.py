@@ -8,7 +8,6 @@ exceeds it. Rare limits would need too many flights at each value: they are scre
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any
 
@@ -22,6 +21,7 @@ from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight
 from airflock.limits.bounds import Look, look, needed, schedule, share
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened
 MOST = 4.0  # flights at one value, as a multiple of those that show the level without an event
@@ -55,8 +55,8 @@ def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
     for key in keys:
         if key not in WORSE or key not in known:
             may = [name for name in WORSE if name in known]
-            near = [] if key in WORSE else get_close_matches(key, may, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(may)}"
+            listed = f"known: {', '.join(may)}"
+            hint = listed if key in WORSE else meant(key, may, listed)
             what = "a number of this scenario" if key in WORSE else "a number of the environment"
             faults.append(f"tolerance: {key} is not {what}; {hint}")
         elif not known[key][1]:
