@@ -265,10 +265,10 @@ def _radio(heard: pd.DataFrame | None, numbers: Numbers) -> packets.RadioFit | N
     late = packets.fit_delay(table)
     origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
     numbers.add("radio.delay", late.value, late.interval, origin, late.reason)
+    links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
     if scenario.transceiver.name == "table":
         _table(table, numbers)
-        return packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
-    links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
+        return links
     lossy = scenario.transceiver.name == "links"
     for name in LINKS:
         why = links.refused.get(name, "") or (
