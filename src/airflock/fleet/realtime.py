@@ -159,13 +159,13 @@ def fly(
         lives += [partial(craft_life, plan, i) for i in range(len(card.members))]
         watching = partial(_watch, plan, operator, done)
         began = time.monotonic()
-        ended, all_ = asyncio.run(_tasks(plan, lives, watching)) if mode == "tasks" else _forked(plan, lives, watching)
+        ended, all_ = asyncio.run(_tasks(lives, watching)) if mode == "tasks" else _forked(lives, watching)
         return Flown(plan, ended, _load(ended, len(card.members), time.monotonic() - began, all_, mode == "tasks"))
     finally:
         ports.close()
 
 
-async def _tasks(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
+async def _tasks(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """All lives in one event loop; what is left of each, and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
@@ -194,7 +194,7 @@ async def together(life: Begun) -> Life:
             loop.remove_reader(port.fileno())
 
 
-def _forked(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
+def _forked(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """Each life in a process of its own; what is left of each, and the processor time of all, s."""
     context, began = multiprocessing.get_context("fork"), time.process_time()
     dialect.common()  # once here, so that no process imports it for itself

@@ -133,7 +133,7 @@ def _end(
         else:
             near, low, there = tried, above, place
             likely.append(place)
-        if near == edge or abs(beyond - near) < CLOSE * abs(beyond - values[k]) and not math.isinf(high):
+        if near == edge or (abs(beyond - near) < CLOSE * abs(beyond - values[k]) and not math.isinf(high)):
             break
     return (near if math.isinf(high) else near + (beyond - near) * low / (low - high)), likely
 

@@ -32,7 +32,7 @@ class Memory(NamedTuple):
     """What outlives a restart: own last stamp, last stamp of each member, when the last order was given (µs)."""
 
     sent: int = 0
-    heard: dict[int, int] = {}  # noqa: RUF012
+    heard: dict[int, int] = {}  # never changed in place
     order: int = 0
 
 

@@ -116,7 +116,7 @@ def tune(
     if result.dead:
         raise StudyError(f"{mine.name}: {result.dead}")
     _say(note, STAGES[1])
-    tuned, steps, why = hardening(folder, result, plan, searched, threads, trust)
+    tuned, steps, why = hardening(folder, plan, searched, threads, trust)
     _say(note, STAGES[2])
     shown = certificate(folder, tuned, limits, confidence, plan, threads, note)
     found = Tuned(
