@@ -101,7 +101,7 @@ def checkout(other: str):
     if Path(other).is_dir():
         yield Path(other).resolve(), git("-C", str(Path(other).resolve()), "rev-parse", "--short", "HEAD") or other
         return
-    commit = git("rev-parse", "--short", "--verify", f"{other}^{{commit}}")
+    commit = git("rev-parse", "--short=7", "--verify", f"{other}^{{commit}}")
     if not commit:
         raise SystemExit(f"guard: {other!r} is neither a folder nor a commit of this repository")
     with tempfile.TemporaryDirectory() as folder:

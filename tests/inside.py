@@ -24,6 +24,7 @@ MODULES = {
     "simulate": "simulate",
     "specialise_values": "specialise.values",
     "stages": "stages",
+    "stages_cells": "stages.cells",
     "stages_clusters": "stages.clusters",
     "stages_decide": "stages.decide",
     "stages_flight": "stages.flight",

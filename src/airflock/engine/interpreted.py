@@ -25,7 +25,6 @@ from airflock.core.vectors import as_properties, vectors_of
 from airflock.core.vocabulary import BOUND
 from airflock.engine.passes import driver as drivers
 from airflock.engine.passes.build import Builder
-from airflock.engine.passes.grid import BLOCK
 from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
 from airflock.engine.stages import words
@@ -89,11 +88,6 @@ def _uncompiled(*function: Callable[..., Any], **_: Any) -> Any:
     return function[0] if function else lambda rule: rule
 
 
-def _copy_block(to: Any, at: int, source: Any, first: int, shift: float) -> None:
-    """A few neighbours in a row, moved by a shift."""
-    to[at : at + BLOCK] = source[first : first + BLOCK] + shift
-
-
 PLAIN: Mapping[str, Any] = {
     "njit": _uncompiled,
     "JIT": {},
@@ -109,7 +103,7 @@ PLAIN: Mapping[str, Any] = {
     "choose": words.choose,
     "wide_vectors": lambda: None,
     "apart": lambda: None,
-    "copy_block": lambda to, row, at, source, first, shift: _copy_block(to[row], at, source[row], first, shift),
+    "copy_block": words.copy_block,
     **{name: getattr(random, name) for name in random.PRIMITIVES},
 }
 

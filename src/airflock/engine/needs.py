@@ -5,8 +5,8 @@ the radio keeps them, the grid, and the frames of a recording; and looks at pair
 """
 
 from airflock.engine.layout import lanes
-from airflock.engine.passes import grid
 from airflock.engine.plan import Plan
+from airflock.engine.stages.cells import CELLS, CHUNKS, SPARE
 from airflock.errors import FlightError
 from airflock.machine import free_memory
 from airflock.scenarios import cost
@@ -49,7 +49,7 @@ def bytes_of(scenario: Scenario, plan: Plan, agents: int) -> int:
     kept += sum(len(getattr(metric.Memory, "_fields", ())) for metric in plan.metrics)
     past = times["ring"] * states if plan.late else 0
     numbers = (ROWS + kept + past) * width + (agents * len(plan.of_pair) * width if plan.packets else 0)
-    cells = 8 * grid.CHUNKS * (grid.CELLS * agents + grid.SPARE) if plan.grid else 0
+    cells = 8 * CHUNKS * (CELLS * agents + SPARE) if plan.grid else 0
     return real * numbers + cells + _frames(scenario, plan, agents)
 
 

@@ -13,7 +13,7 @@ noise, delay and loss; there it equals all pairs but for rounding and the order 
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,23 +21,16 @@ from numpy.typing import NDArray
 from airflock.engine.passes.build import Builder, branch, loop
 from airflock.engine.plan import Plan
 from airflock.engine.replace import must_replace
+from airflock.engine.specialise.stage import specialise
+from airflock.engine.specialise.text import lines_of
+from airflock.engine.specialise.values import Call, argument
+from airflock.engine.stages import cells
+from airflock.engine.stages.cells import CELLS, CHUNKS, GROUP, SPARE, WHO
+from airflock.engine.stages.words import BLOCK
 
-CELLS = 4  # at most so many cells per agent: a flock that has dispersed widely does not fill the memory
-CHUNKS = 8  # parts of the flock that are counted side by side; their order is that of the agents
-BLOCK = 8  # candidates taken at once
-STRIP = 16  # lines side by side before those above them: three layers of so many stay in the second-level cache
-SPARE = 8  # cells of the smallest periodic box
 FOUND = ("square", "met", "heap", "hidden", "away0", "away1", "away2")  # rows of candidates, where some are met
 OTHERS = "(integer(q) != me) & (integer(q) < many)"
 KEPT = "starts, tally, cell_of, ident, packed, flat, totals_"
-
-
-class Carried(NamedTuple):
-    """What of candidates is laid side by side: kind of number, where that of one at `origin + s` is, that of nobody."""
-
-    kind: str
-    at: str
-    nobody: str
 
 
 def memory(
@@ -89,13 +82,13 @@ def neighbours(
     before = must_replace(before, "ii = integer(i)", "ii = ident[e]" if who else "")
     if met is None:
         inner = must_replace(inner, "integer(j) != ii", OTHERS)
-    carried = {}
+    carried = {}  # what else of candidates is laid side by side, and which kind of number that is
     if who:
-        inner = must_replace(inner, "integer(j) < ii", "who[j] < ii")
-        carried["who"] = Carried(f"np.int{plan.bits}", "ident[origin + s]", "integer(-1)")
+        inner = must_replace(inner, "integer(j) < ii", f"{WHO}[j] < ii")
+        carried[WHO] = f"np.int{plan.bits}"
     if any("group[j]" in line for line in inner):
-        inner = must_replace(inner, "group[j]", "group_of[j]")
-        carried["group_of"] = Carried("work.dtype", "group[whose[origin + s]]", "ZERO")
+        inner = must_replace(inner, "group[j]", f"{GROUP}[j]")
+        carried[GROUP] = "work.dtype"
     meet = [*[line for line in before if line], "me = integer(middle[ox] - slab[ox] + e - starts[here])"]
     if met is not None:
         meet += _found(*met)
@@ -115,7 +108,7 @@ def neighbours(
     ]
     found = re.findall(r"\w+", "\n".join(line for part in met or () for line in part))
     rows = [f"{name} = np.zeros(room + {2 * BLOCK}, work.dtype)" for name in FOUND if name in found]
-    body = _line([*_slabs(build, carried), *rows, *loop("ox in range(count[0])", cell)], law)
+    body = _line(build, [*_slabs(build, carried), *rows, *loop("ox in range(count[0])", cell)])
     near = f"widest{mark}(n, row, work)" if plan.varies("p") else "near"
     lines = [*lines, *sort(build, near, f"{CELLS} * n"), f"totals = totals_[: n * {wide}].reshape(n, {wide})"]
     if who:
@@ -139,11 +132,12 @@ def _of_law(law: int | None, lines: list[str]) -> list[str]:
 def sort(build: Builder, near: str, most: str) -> list[str]:
     """Lines that sort agents into about `most` cells no smaller than `near` (m); they call the function `sort`."""
     if not any("def sort(" in text for text in build.functions):
-        build.function(
-            "cells_of(n, near, most_cells, row, work)", build.records("w"), _box(build), "return low, size, count"
-        )
-        lines = must_replace([*opened(build), *_sorted(build)], "CHUNKS", str(CHUNKS))
-        build.function("sort(n, near, most_cells, row, work, cells)", lines, "return size, count", parallel=True)
+        called = "cells_of(n, near, most_cells, row, work)"
+        made = specialise(build, cells.box)
+        build.function(called, made.lines, f"return {made.answer}")
+        made = specialise(build, cells.sort, boxed=Call(called))
+        lines = [*opened(build), *made.lines]
+        build.function("sort(n, near, most_cells, row, work, cells)", lines, f"return {made.answer}", parallel=True)
     return [*opened(build), f"sides, count = sort(n, {near}, {most}, row, work, cells)"]
 
 
@@ -156,106 +150,27 @@ def _found(each: list[str], last: list[str]) -> list[str]:
     return [*loop("q in range(padded)", ["j = first + np.uint64(q)", *each]), *last]
 
 
-def _box(build: Builder) -> list[str]:
-    """Lower corner, cell size (m) and number of cells per axis: of the periodic box, or around the flock.
-
-    Cells are no smaller than `near`, and about `most_cells` at most; never more than there is memory for.
-    """
-    axes, periodic = build.plan.axes, build.plan.periodic
-    lines = ["low = np.zeros(3, work.dtype); size = np.ones(3, work.dtype); count = np.ones(3, np.int64)"]
-    lines += ["width = np.ones(3, work.dtype); volume = ONE"]
-    for c, a in enumerate(axes):
-        lines += build.bind([a])
-        if periodic:
-            lines += [f"low[{c}] = -w.half_{a}; width[{c}] = w.half_{a} + w.half_{a}"]
-        else:
-            lines += ["least_ = FAR; most_ = -FAR"]
-            lines += loop("i in range(n)", [f"least_ = least(least_, {a}[i]); most_ = most(most_, {a}[i])"])
-            lines += [f"low[{c}] = least_; width[{c}] = most(most_ - least_, near)"]
-        lines += [f"volume *= most(width[{c}] / near, ONE)"]
-    coarse = f"(volume / real(most_cells)) ** real({1.0 / len(axes)})"
-    lines += [f"side = near * most(ONE, {coarse})"]
-    fewest = 2 if periodic else 1  # an agent is met at two images of which at most one is in reach
-    fit = [f"count[{c}] = max({fewest}, int(width[{c}] / side))" for c in range(len(axes))]
-    # a flock that has dispersed along a line or in a plane still has too many
-    fit += branch(f"count[0] * count[1] * count[2] <= {CELLS} * n + {SPARE}", ["break"]) + ["side *= real(1.25)"]
-    lines += loop("attempt in range(1000)", fit)
-    return lines + [f"size[{c}] = width[{c}] / real(count[{c}])" for c in range(len(axes))]
-
-
-def _sorted(build: Builder) -> list[str]:
-    """Agents sorted by cell: starts (first of each cell), place (of each agent), packed (agent, position and velocity).
-
-    Each chunk of agents counts for itself; the counts of a cell, chunk by chunk, become the places of its agents.
-    """
-    axes = build.plan.axes
-    names = build.plan.motion
-    lines = [*build.bind(names), "low, size, count = cells_of(n, near, most_cells, row, work)"]
-    lines += ["total = count[0] * count[1] * count[2]"]
-    inside = [f"per_{a} = ONE / size[{c}]; low_{a} = low[{c}]; top_{a} = count[{c}] - 1" for c, a in enumerate(axes)]
-    part = "i in range(n * chunk // CHUNKS, n * (chunk + 1) // CHUNKS)"
-    at = {a: f"min(max(int(({a}[i] - low_{a}) * per_{a}), 0), top_{a})" for a in axes}
-    index = f"({at['z']} * count[1] + {at['y']})" if "z" in axes else at["y"]
-    count = [f"cell = {index} * count[0] + {at['x']}", "cell_of[i] = cell; tally[head + cell] += 1"]
-    none = ["head = chunk * total", *loop("cell in range(total)", ["tally[head + cell] = 0"])]
-    lines += loop("chunk in prange(CHUNKS)", [*none, *inside, *loop(part, count)])
-    add = ["held = tally[share * total + cell]; tally[share * total + cell] = before; before += held"]
-    lines += ["before = 0"]
-    lines += loop("cell in range(total)", ["starts[cell] = before", *loop("share in range(CHUNKS)", add)])
-    lines += ["starts[total] = before"]
-    put = ["d = tally[head + cell_of[i]]; tally[head + cell_of[i]] = d + 1; whose[d] = i"]
-    put += [f"packed[d, {c}] = {name}[i]" for c, name in enumerate(names)]
-    lines += loop("chunk in prange(CHUNKS)", ["head = chunk * total", *loop(part, put)])
-    each = [f"flat[{c}, e] = packed[e, {c}]" for c in range(len(names))]
-    return lines + loop("chunk in prange(CHUNKS)", loop(must_replace(part, "i in", "e in"), each))
-
-
-def _slabs(build: Builder, carried: Mapping[str, Carried]) -> list[str]:
+def _slabs(build: Builder, carried: Mapping[str, str]) -> list[str]:
     """The agents around one line, slab by slab: slab (where each begins), middle (where the own cell begins).
 
-    carried : what else of candidates is laid side by side, by name
+    carried : what else of candidates is laid side by side, and which kind of number that is
     """
-    axes, periodic = build.plan.axes, build.plan.periodic
-    names = [*(f"h{a}" for a in axes), *(f"hv{a}" for a in axes)]
-    shifts = {f"h{a}": f"shift_{a}" for a in axes} if periodic else {}
-    across = axes[1:]
-    lines = ["room = 0"]
-    rows = ["base = " + ("(cz * count[1] + cy)" if "z" in axes else "cy") + " * count[0]"]
-    span = ["room += starts[base + count[0]] - starts[base]"]
-    ends = "room += starts[base + 1] - starts[base] + starts[base + count[0]] - starts[base + count[0] - 1]"
-    span += [ends] * periodic
-    lines += _around(build, across, rows + span, False)
-    lines += [f"box = np.empty(({len(names)}, room + {2 * BLOCK}), work.dtype)"]
-    lines += [f"{name} = np.empty(room + {2 * BLOCK}, {each.kind})" for name, each in carried.items()]
-    lines += [f"{name} = box[{c}]" for c, name in enumerate(names)]
-    lines += ["slab = np.zeros(count[0] + 3, np.int64); middle = np.zeros(count[0] + 1, np.int64); found = 0"]
-    copy = [
-        f"copy_block(box, {c}, found + s, flat, origin + s, {shifts.get(name, 'ZERO')})" for c, name in enumerate(names)
+    names = [*(f"h{a}" for a in build.plan.axes), *(f"hv{a}" for a in build.plan.axes)]
+    rows = tuple((what, argument(what)) for what in carried)
+    made = [f"box = np.empty(({len(names)}, room + {2 * BLOCK}), work.dtype)"]
+    made += [f"{what} = np.empty(room + {2 * BLOCK}, {kind})" for what, kind in carried.items()]
+    made += [f"{name} = box[{c}]" for c, name in enumerate(names)]
+    return [
+        *_lines(build, cells.room_around),
+        *made,
+        *_lines(build, cells.copied, carried=rows),
+        *_lines(build, cells.filled_up, carried=rows),
     ]
-    kept = [f"{name}[found + s] = {each.at}" for name, each in carried.items()]
-    ids = loop("s in range(inside)", kept) if kept else []
-    own = "(qy == oy) & (qz == oz)" if "z" in axes else "qy == oy"
-    each = [*rows, f"if {own}:", "    middle[min(max(qx, 0), count[0])] = found"]
-    each += ["origin = starts[base + cx]; inside = starts[base + cx + 1] - origin"]
-    each += [*loop(f"s in range(0, inside, {BLOCK})", copy), *ids, "found += inside"]
-    first, last = ("-1", "count[0] + 1") if periodic else ("0", "count[0]")
-    wrap = ["cx = qx"]
-    if periodic:
-        lines += ["width_x = w.half_x + w.half_x"]
-        wrap = ["cx = (qx + count[0]) % count[0]", "shift_x = real((qx - cx) // count[0]) * width_x"]
-    slab = ["slab[qx + 1] = found", *wrap, *_around(build, across, each, True)]
-    lines += loop(f"qx in range({first}, {last})", slab)
-    lines += [f"slab[{'count[0] + 2' if periodic else 'count[0] + 1'}] = found"]
-    lines += [] if periodic else ["slab[count[0] + 2] = found"]
-    rest = [f"h{a}[s] = AWAY; hv{a}[s] = ZERO" for a in axes]
-    rest += [f"{name}[s] = {each.nobody}" for name, each in carried.items()]
-    return lines + loop(f"s in range(found, found + {BLOCK})", rest)
 
 
-def _line(body: list[str], law: int | None) -> list[str]:
+def _line(build: Builder, body: list[str]) -> list[str]:
     """The work of a line of cells, at oy and oz; where laws differ, only where somebody in it flies by this one."""
-    lines = [f"wide = {STRIP} * count[2]; strip = line // wide; high = min({STRIP}, count[1] - strip * {STRIP})"]
-    lines += [f"oz = (line - strip * wide) // high; oy = strip * {STRIP} + (line - strip * wide) % high"]
+    lines, law = _lines(build, cells.place_of_line), build.plan.law
     if law is None:
         return lines + body
     lines += ["row_of = (oz * count[1] + oy) * count[0]", "some = False"]
@@ -263,14 +178,7 @@ def _line(body: list[str], law: int | None) -> list[str]:
     return lines + branch("some", body)
 
 
-def _around(build: Builder, across: tuple[str, ...], body: list[str], shifted: bool) -> list[str]:
-    """Loops over the rows of cells beside a line, at cy (and cz), and how far their images are shifted."""
-    for a in across:
-        c = "xyz".index(a)
-        if build.plan.periodic:
-            at = [f"c{a} = (q{a} + count[{c}]) % count[{c}]"]
-            at += [f"shift_{a} = real((q{a} - c{a}) // count[{c}]) * (w.half_{a} + w.half_{a})"] * shifted
-            body = loop(f"q{a} in range(o{a} - 1, o{a} + 2)", [*at, *body])
-        else:
-            body = loop(f"q{a} in range(max(o{a} - 1, 0), min(o{a} + 2, count[{c}]))", [f"c{a} = q{a}", *body])
-    return body
+def _lines(build: Builder, stage: Callable[..., Any], **known: object) -> list[str]:
+    """Lines of a stage that stands in another one, which binds all that it reads."""
+    made = specialise(build, stage, **known)
+    return lines_of([*made.first, *made.rest])

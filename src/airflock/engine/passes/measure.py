@@ -8,14 +8,13 @@ from airflock.engine.passes import flock, grid
 from airflock.engine.passes.build import Builder, in_place
 from airflock.engine.passes.move import excursion
 from airflock.engine.plan import Plan
-from airflock.engine.replace import must_replace
 from airflock.engine.specialise.stage import specialise
 from airflock.engine.specialise.values import Call
 from airflock.engine.stages import measure as measuring
 from airflock.engine.stages.clusters import clusters_of
 from airflock.engine.stages.links import clusters_by_cells
 from airflock.engine.stages.measure import Measured
-from airflock.engine.stages.near import PARTS, SURE, pairs_by_cells
+from airflock.engine.stages.near import SURE, pairs_by_cells
 from airflock.engine.stages.words import fields, wants
 from airflock.rules.reading import fields_read
 
@@ -73,7 +72,6 @@ def pairs(build: Builder, clock: str, metrics: tuple[Measured, ...]) -> Call:
     made = specialise(build, pairs_by_cells, metrics=metrics, nearest=clock == "collision")
     called = f"near_{clock}({BY_CELLS})"
     lines = [*grid.sort(build, "real(0.001)", "n"), *made.lines]
-    lines = must_replace(lines, f"part in range({PARTS})", f"part in prange({PARTS})", 1)
     build.function(called, lines, f"return {made.answer}", parallel=True)
     return Call(called)
 

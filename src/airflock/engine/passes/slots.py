@@ -8,8 +8,9 @@ a small one. Of the numbers of an agent none depends on its slot; sums over the 
 
 from airflock.engine.passes.build import Builder, loop
 from airflock.engine.passes.flock import owners
-from airflock.engine.passes.grid import CHUNKS, opened
+from airflock.engine.passes.grid import opened
 from airflock.engine.plan import Plan
+from airflock.engine.stages.cells import CHUNKS
 
 
 def slotted(plan: Plan) -> bool:

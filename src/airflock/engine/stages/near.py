@@ -31,6 +31,7 @@ from airflock.engine.stages.words import (
     real,
     reduced,
     repeat,
+    side_by_side,
     totals,
     vector,
 )  # fmt: skip
@@ -173,7 +174,7 @@ def pairs_by_cells(
         side = least(side, sides[a])
         rings = max(rings, count[a])
     nearest2 = np.empty(PARTS, np.float64)
-    for part in repeat(PARTS):
+    for part in side_by_side(PARTS):
         part2 = FAR
         at, low, high = vector(), vector(), vector()
         home = Home(at, low, high)

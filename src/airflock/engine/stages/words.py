@@ -11,6 +11,7 @@ from typing import Any
 
 X, Y, Z = 0, 1, 2
 SIDES = ("half_x", "half_y", "half_z")
+BLOCK = 8  # numbers that are copied at once, candidates that are looked at at once
 
 
 class Named(float):
@@ -78,6 +79,16 @@ def choose(test: Any, a: Any, b: Any) -> Any:
 def repeat(count: int) -> range:
     """Turns of a loop that a driver keeps as a loop, though their number is known."""
     return range(count)
+
+
+def side_by_side(count: int) -> range:
+    """Turns of a loop that threads share; each writes for itself."""
+    return range(count)
+
+
+def copy_block(to: Any, row: int, at: int, source: Any, first: int, shift: Any) -> None:
+    """Copy BLOCK numbers of a row of a table to another one, plus a shift, as one vector."""
+    to[row][at : at + BLOCK] = source[row][first : first + BLOCK] + shift
 
 
 def between(lanes: Any, first: Any, end: Any) -> Any:
