@@ -1,7 +1,7 @@
 """Files that are complete or not there at all: a temporary name in the same folder, then a rename.
 
-A process that is killed leaves its temporary file. It held a lock on it, which the system has given back: so whoever
-writes beside it next knows that nobody needs it, and removes it.
+A process that is killed leaves its temporary file. It held a lock on it, which the system has given back: so the
+next process that writes beside it knows that nobody needs it, and removes it.
 """
 
 import fcntl

@@ -1,4 +1,4 @@
-"""Numba's passes as they begin: Ctrl-C is heard, and whoever waits is told. Imported once something may compile."""
+"""Numba's passes as they begin, to hear Ctrl-C and to say what is waited for. Imported once something may compile."""
 
 import time
 from collections.abc import Callable

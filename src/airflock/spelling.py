@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 
-def meant(word: object, known: Iterable[str], otherwise: str = "", *, lead: str = "", cutoff: float = 0.5) -> str:
+def meant(
+    word: object, known: Iterable[str], otherwise: str = "", *, lead: str = "", prefix: str = "", cutoff: float = 0.5
+) -> str:
     """A question for the nearest of the known words; where none is near, what is said otherwise.
 
-    lead   : stands before the question
+    lead   : stands before the question; prefix : before the word in it, such as "space."
     cutoff : how alike two words must be, from 0 to 1, as in `difflib`
 
     >>> meant("vasarhely", ["viragh", "vasarhelyi"])
@@ -18,7 +20,7 @@ def meant(word: object, known: Iterable[str], otherwise: str = "", *, lead: str 
     'known: viragh, vasarhelyi'
     """
     near = get_close_matches(str(word), list(known), n=1, cutoff=cutoff)
-    return f"{lead}did you mean {near[0]}?" if near else otherwise
+    return f"{lead}did you mean {prefix}{near[0]}?" if near else otherwise
 
 
 def raised(fault: BaseException) -> str:

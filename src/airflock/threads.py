@@ -82,7 +82,7 @@ def _work(
             return
         try:
             ended.put(_Ended(number, jobs[number]()))
-        except BaseException as fault:  # told to whoever asks for the result
+        except BaseException as fault:  # raised again where the result is asked for
             ended.put(_Ended(number, fault=fault))
 
 
@@ -93,7 +93,7 @@ def in_background(work: Callable[[], Any]) -> Future[Any]:
     def run() -> None:
         try:
             future.set_result(work())
-        except Exception as fault:  # told to whoever asks for the result
+        except Exception as fault:  # raised again where the result is asked for
             future.set_exception(fault)
 
     Thread(target=run, daemon=True).start()

@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 import airflock
-from airflock.infer.found import Inferred, between
+from airflock.infer.result import Inferred, between
 from airflock.infer.run import LAWS
 from airflock.scenarios.making import make
 

@@ -9,7 +9,7 @@ import xarray as xr
 import airflock
 from airflock.errors import AirflockError, RecordingError
 from airflock.infer import bootstrap, candidates, flights, noise, ridges, search, select
-from airflock.infer.found import Inferred, Law, verdict_of
+from airflock.infer.result import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
 from processes import called

@@ -18,7 +18,7 @@ def fitted(law, names, truth, number, default):
     """A model, and its fit by all numbers but one that stays at its default."""
     model = Line(law, names, truth, dict.fromkeys(names, 0.5) | {names[number]: default})
     rest = [k for k in range(len(names)) if k != number]
-    without = model.told_by([model.numbers[k] for k in rest])
+    without = model.with_numbers([model.numbers[k] for k in rest])
     return model, climb(without, np.array([truth[k] for k in rest]), [0, 1], steps=200, slopes=(FINE,))
 
 
@@ -61,7 +61,7 @@ def test_a_number_is_taken_back_where_a_walk_leads_higher_than_any_climb():
 
     truth = (0.64, 0.9)
     model = Line(law, ("b", "a"), truth, {"b": 0.5, "a": 0.45})
-    without = model.told_by(model.numbers[:1])
+    without = model.with_numbers(model.numbers[:1])
     fit = climb(without, np.array([0.1225]), [0], steps=200, slopes=(FINE,))
     best, beside = (climb(model, np.array(u), [0, 1], steps=40) for u in (truth, (fit.place[0], 0.45)))
     assert beside.loss > best.loss + 8.0

@@ -24,10 +24,10 @@ from airflock.infer.fit import (
     spread,
 )
 from airflock.infer.flights import Noise
+from airflock.infer.identifiability import canonical, identifiable, simplify
 from airflock.infer.likelihood import SOFT, deviation, soft
 from airflock.infer.ridges import at_end, ridges
 from airflock.infer.search import drawn, profile, race, usual
-from airflock.infer.told import exchanged, simplify, telling
 from line_laws import STEPS, Line, quietly
 
 
@@ -38,7 +38,7 @@ def test_a_radius_within_which_nobody_is_is_told_and_a_mass_beside_a_force_is_no
 
     model = Line(law, ("force", "mass", "beyond", "dead"), (0.9, 0.2, 0.9, 0.5))
     looks = np.array([[0.8, 0.3, 0.2, 0.5], [0.3, 0.1, 0.4, 0.2], [0.7, 0.5, 0.1, 0.9]])
-    assert telling(model, model.start(), looks, [0]) == [0, 2]
+    assert identifiable(model, model.start(), looks, [0]) == [0, 2]
 
 
 def test_the_highest_hill_is_found_where_a_climb_from_the_defaults_ends_at_once():
@@ -76,7 +76,7 @@ def test_a_number_that_was_given_up_and_explains_something_at_the_fit_is_fitted_
 
     whole = Line(law, truth, truth.values())
     monkeypatch.setattr(select, "sample", lambda model: [0])
-    model = whole.told_by(whole.numbers[:1])
+    model = whole.with_numbers(whole.numbers[:1])
     found = climb(model, model.start(), [0])
     fuller, better = select.regained(whole.law, model, found, quietly)
     assert [number.key for number in fuller.law.numbers] == ["model.a", "model.bend"]
@@ -91,10 +91,10 @@ def test_a_weight_that_was_given_up_does_not_come_back_as_the_unit_of_all_weight
         return 10.0 ** (unit + together) * x - 10.0 ** (unit + apart) * x**3
 
     whole = Line(law, truth, truth.values(), defaults, log=truth)
-    model = whole.told_by(whole.numbers[1:])  # without the weight of keeping apart
+    model = whole.with_numbers(whole.numbers[1:])  # without the weight of keeping apart
     found = climb(model, np.array([0.5, 0.5]), [0, 1])
     assert found.place == pytest.approx([0.4, 0.7], abs=0.02)  # the unit makes up for it
-    in_order, place = exchanged(whole.law, model, found, quietly)
+    in_order, place = canonical(whole.law, model, found, quietly)
     assert [number.key for number in in_order.law.numbers] == ["model.apart", "model.together"]
     assert place == pytest.approx([0.9, 0.8], abs=0.02)
 
@@ -106,20 +106,20 @@ def test_a_radius_is_told_by_its_own_name_and_not_by_that_of_a_later_one_that_ta
         return weight * (x < max(radius, floor))
 
     whole = Line(law, truth, truth.values(), defaults)
-    model = whole.told_by(whole.numbers[1:])
+    model = whole.with_numbers(whole.numbers[1:])
     found = climb(model, np.array([0.7, 0.62]), [0, 1])
-    in_order, place = exchanged(whole.law, model, found, quietly)
+    in_order, place = canonical(whole.law, model, found, quietly)
     assert [number.key for number in in_order.law.numbers] == ["model.radius", "model.weight"]
     assert place == pytest.approx([0.62, 0.7], abs=0.02)
-    again, same = exchanged(whole.law, in_order, climb(in_order, place, [0, 1]), quietly)
+    again, same = canonical(whole.law, in_order, climb(in_order, place, [0, 1]), quietly)
     assert again is in_order and same == pytest.approx(place, abs=0.02)
 
 
 def test_a_later_number_stays_where_the_earlier_one_does_not_take_its_part():
     truth, defaults = {"slope": 0.2, "bend": 0.8}, {"slope": 0.2, "bend": 0.5}
     whole = Line(lambda x, slope, bend: slope * x + bend * x**2, truth, truth.values(), defaults)
-    model = whole.told_by(whole.numbers[1:])
-    in_order, place = exchanged(whole.law, model, climb(model, np.array([0.5]), [0]), quietly)
+    model = whole.with_numbers(whole.numbers[1:])
+    in_order, place = canonical(whole.law, model, climb(model, np.array([0.5]), [0]), quietly)
     assert in_order is model and place == pytest.approx([0.8], abs=0.02)
 
 

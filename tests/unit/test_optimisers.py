@@ -5,6 +5,7 @@ import pytest
 
 import toys
 from airflock.errors import StudyError
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.fitness import Objective, losses
 from airflock.evolve.genetic import BinaryGenetic, decode, genetic
 from airflock.evolve.nondominated import front
@@ -138,7 +139,7 @@ def test_race_finds_the_best_where_one_flight_says_little(tmp_path, seed):
     given = [study.space.parameters(point) | {"model.p_rep": 0.2} for point in points]
     true = np.array([toys.bowl(parameters, 0, noise=0.0)["fitness"] for parameters in given])
     with Store(tmp_path) as store:
-        winners = race(study, store, noisy, points, -(true + rng.normal(0.0, 0.1, len(true))))
+        winners = race(Evaluator(study, store, noisy), points, -(true + rng.normal(0.0, 0.1, len(true))))
     noisy.close()
     ranks = np.argsort(np.argsort(-true))[winners]
     assert len(winners) == 5 and np.median(ranks) < 200

@@ -17,9 +17,9 @@ from airflock.engine import score_flight, score_flights
 from airflock.errors import ScenarioError
 from airflock.evolve import harden
 from airflock.evolve.batched import Batched
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.folder import open_folder
 from airflock.evolve.run import Interrupted, executor_for, run
-from airflock.evolve.search import evaluate
 from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
@@ -119,8 +119,9 @@ def test_real_flights_are_those_of_each_scenario_here_together_and_on_workers(tm
     for name, executor in (("here", executor_for(study, threads=2)), ("together", Batched(study, "cpu"))):
         (tmp_path / name).mkdir()
         with Store(tmp_path / name) as store:
-            rows += evaluate(study, store, executor, Batch("search", 0, 0), points, seeds=[[7]])
-            half = evaluate(study, store, executor, Batch("search", 0, 1), points, seeds=[[7]], share=0.5)
+            evaluator = Evaluator(study, store, executor)
+            rows += evaluator.evaluate(Batch("search", 0, 0), points, seeds=[[7]])
+            half = evaluator.evaluate(Batch("search", 0, 1), points, seeds=[[7]], share=0.5)
         executor.close()
     assert rows == [[sum(wanted) / 2.0]] * 2
     shorter = [with_parameters(each, {**given, "duration": d}) for each, d in ((small, 1.0), (longer, 1.5))]

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ from airflock.studio.player import Player
 from airflock.studio.score_tables import differences
 from airflock.studio.shading import Shading, together, ways
 from airflock.studio.side import Origin, Side, value_of
+from airflock.studio.trails import PIECE, Trails
 from airflock.studio.tuning import EXAMPLE, pair
 
 PRESET = "vasarhelyi_2018/4ms"
@@ -69,6 +71,28 @@ def player():
     made.faults = []
     made.fault = made.faults.append
     return made
+
+
+def test_trails_are_taken_away_and_begin_where_agents_are_when_they_are_shown_again():
+    pieces = []
+    view = SimpleNamespace(
+        trail=lambda begin, end, tone, done: pieces.append((begin[0, 0], end[0, 0], done)), no_trails=pieces.clear
+    )
+    trails = Trails(view)
+
+    def fly(*places):
+        for x in places:
+            trails.draw(np.full((1, 3), float(x)), np.zeros((1, 3)))
+
+    fly(*range(PIECE + 2))
+    assert pieces[:2] == [(0.0, 1.0, False), (0.0, 2.0, False)]
+    assert pieces[-2:] == [(0.0, PIECE, True), (PIECE, PIECE + 1.0, False)]
+    trails.show(False)
+    fly(50, 51)
+    assert pieces == []
+    trails.show(True)
+    fly(100, 101)
+    assert pieces == [(100.0, 101.0, False)]
 
 
 @given(st.floats(1e-3, 1.0), st.floats(0.01, 50.0), st.lists(st.floats(0.0, 0.25), max_size=40))

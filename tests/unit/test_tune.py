@@ -23,9 +23,9 @@ from airflock.scenarios.files import load
 from airflock.scenarios.making import make
 from airflock.tune import run as tuning
 from airflock.tune.assumed import defaults
+from airflock.tune.feasible import infeasible
 from airflock.tune.folder import MOST_SEEDS
 from airflock.tune.plan import CERTIFY, HARDEN, POPULATION, SEARCH, TRIED, plan_of
-from airflock.tune.reach import out_of_reach
 from airflock.tune.run import tune, usual_limits
 from airflock.tune.start import start_of
 
@@ -78,10 +78,10 @@ def test_a_limit_that_the_budget_cannot_show_is_told_beforehand_with_a_budget_th
     """Nothing happened in n flights: its bound at the first look, which half of alpha pays, is that of (1 - p)^n."""
     asked = campaign_of(start_of(make(MINE, "mine"))[0], [f"r_min<3 at {of_100_000}e-5/flight"], 0.95)
     plan = plan_of(budget, rate)
-    lines = out_of_reach(asked, plan)
+    lines = infeasible(asked, plan)
     assert bool(lines) == ((1.0 - of_100_000 * 1e-5) ** int(plan.seconds * rate) > 0.025)
     for line in lines:
-        assert out_of_reach(asked, plan_of(time_of(re.search(r"--budget (\S+),", line)[1]), rate)) == []
+        assert infeasible(asked, plan_of(time_of(re.search(r"--budget (\S+),", line)[1]), rate)) == []
 
 
 @pytest.fixture(scope="module")

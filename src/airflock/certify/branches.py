@@ -62,7 +62,7 @@ def split(
     try:
         seeds, least = _topped_up(campaign, store, executor, own, values, until)
     except TimeOver:
-        return _told(campaign, target, "time was over before there were flights enough to start from")
+        return _refused(target, "time was over before there were flights enough to start from")
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
         flyer = Flyer(campaign, store, number, threads, until)
@@ -76,7 +76,7 @@ def split(
         try:
             runs.append(begun([seeds[i] for i in mine], [least[i] for i in mine], target, flyer, period, rng, say))
         except TimeOver:
-            return _told(campaign, target, f"time was over in repetition {number + 1} of {REPETITIONS}")
+            return _refused(target, f"time was over in repetition {number + 1} of {REPETITIONS}")
     return _found(campaign, estimate(runs, target, least), where or campaign.scenario.name)
 
 
@@ -186,13 +186,14 @@ def sample_period(scenario: Scenario) -> float:
     return float(clock(scenario)["sample_every"] * scenario.flight.dt)
 
 
-def _told(campaign: Campaign, target: float, refused: str) -> dict[str, Any]:
-    return {"target": target, "refused": refused, "statements": [f"splitting: r_min<{target:g}: no number: {refused}"]}
+def _refused(target: float, reason: str) -> dict[str, Any]:
+    """What is said of splitting that gives no number."""
+    return {"target": target, "refused": reason, "statements": [f"splitting: r_min<{target:g}: no number: {reason}"]}
 
 
 def _found(campaign: Campaign, found: Estimate, where: str) -> dict[str, Any]:
     made: dict[str, Any] = (
-        _told(campaign, found.target, found.refused)
+        _refused(found.target, found.refused)
         if found.refused
         else {
             "target": found.target, "probability": found.probability, "low": found.low, "high": found.high,

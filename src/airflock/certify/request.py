@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from airflock.certify.campaign import Campaign
-from airflock.errors import ScenarioError, StudyError
+from airflock.errors import ScenarioError, StudyError, gathering
 from airflock.executors.cluster import fly_on_their_cpu
 from airflock.limits.limit import read_all
 from airflock.scenarios.scenario import Scenario
@@ -23,10 +23,8 @@ def campaign_of(
     """The campaign that is asked for. Raises ScenarioError, all faults together."""
     faults: list[str] = []
     limits: tuple[Any, ...] = ()
-    try:
+    with gathering(faults):
         limits = read_all([limit] if isinstance(limit, str) else list(limit), scenario)
-    except ScenarioError as fault:
-        faults += fault.faults
     if not 0.5 <= confidence < 1.0:
         faults.append(f"confidence = {confidence:g} lies outside [0.5, 1); 0.95 is usual")
     if flights is not None and not 1 <= flights < 1 << 30:

@@ -8,7 +8,6 @@ exceeds it. Rare limits would need too many flights at each value: they are scre
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any
 
@@ -22,6 +21,7 @@ from airflock.evolve.store import Batch, Store
 from airflock.executors import Executor, Flight
 from airflock.limits.bounds import Look, look, needed, schedule, share
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 
 LEVEL = 0.02  # probability per flight at which rare limits are screened
 MOST = 4.0  # flights at one value, as a multiple of those that show the level without an event
@@ -35,6 +35,7 @@ WORSE = {
     "agents": 1,
 }  # fmt: skip
 WHOLE = ("agents",)
+TIME_OVER = "time was over"
 
 
 def usual_keys(scenario: Scenario) -> tuple[str, ...]:
@@ -55,8 +56,8 @@ def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
     for key in keys:
         if key not in WORSE or key not in known:
             may = [name for name in WORSE if name in known]
-            near = [] if key in WORSE else get_close_matches(key, may, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(may)}"
+            listed = f"known: {', '.join(may)}"
+            hint = listed if key in WORSE else meant(key, may, listed)
             what = "a number of this scenario" if key in WORSE else "a number of the environment"
             faults.append(f"tolerance: {key} is not {what}; {hint}")
         elif not known[key][1]:
@@ -117,7 +118,7 @@ class Screen:
         for size, above, below in self.looks:
             missing = [number for number in range(done, size) if number not in flown]
             if missing and time.monotonic() > self.until:
-                return "time was over", last
+                return TIME_OVER, last
             seeds = [seed(self.campaign.hash, self.part, number) for number in missing]
             flights = [
                 Flight(0, number, {**self.campaign.parameters(own), **parameters}, own)
@@ -140,42 +141,51 @@ class Screen:
         return "open", last
 
 
+class Trials:
+    """Values of one number that are tried one after another.
+
+    flights : flown at all of them; verdict : on the last one, as `Screen.judged` says it
+    """
+
+    def __init__(self, screen: Screen, number: int, key: str):
+        self._screen, self._number, self._key, self._tried = screen, number, key, 0
+        self.flights, self.verdict = 0, ""
+
+    def safe(self, value: float) -> bool | None:
+        """Whether a value is safe; None where time was over before that was known."""
+        batch, parameters = Batch("tolerance", self._number, self._tried), {self._key: value}
+        self._screen.store.ask(batch, [[value]], [parameters])
+        self.verdict, last = self._screen.judged(batch, parameters)
+        self._tried, self.flights = self._tried + 1, self.flights + (last.flights if last else 0)
+        return None if self.verdict == TIME_OVER else self.verdict == "safe"
+
+
 def _axis(screen: Screen, number: int, key: str, how: Quantity, nominal: float | None) -> dict[str, Any]:
     """Move one number until it is no longer safe, then halve the way between."""
-    value, worse, flights = float(nominal or 0.0), WORSE[key], 0
-    safe, bad, reason, step = value, math.nan, "", 0
-
-    def tried(candidate: float) -> bool | None:
-        nonlocal flights, reason, step
-        batch = Batch("tolerance", number, step)
-        screen.store.ask(batch, [[candidate]], [{key: candidate}])
-        verdict, found = screen.judged(batch, {key: candidate})
-        step, flights = step + 1, flights + (found.flights if found else 0)
-        reason = verdict
-        return None if verdict == "time was over" else verdict == "safe"
-
+    value, worse, end = float(nominal or 0.0), WORSE[key], ""
+    trials, safe, bad = Trials(screen, number, key), value, math.nan
     while abs(math.log(safe / value)) < math.log(REACH) - 1e-9:
         candidate = _whole(key, min(max(safe * 2.0**worse, how.low), how.high))
         if candidate == safe:
-            reason = f"the end of its range, {how.span}"
+            end = f"the end of its range, {how.span}"
             break
-        good = tried(candidate)
+        good = trials.safe(candidate)
         if not good:
             bad = candidate if good is not None else math.nan
             break
         safe = candidate
-    for _ in range(HALVINGS if bad == bad else 0):
+    for _ in range(0 if math.isnan(bad) else HALVINGS):
         middle = _whole(key, math.sqrt(safe * bad))
         if middle in (safe, bad):
             break
-        good = tried(middle)
+        good = trials.safe(middle)
         if good is None:
             break
         safe, bad = (middle, bad) if good else (safe, middle)
-    made = {"key": key, "unit": how.unit, "nominal": value, "safe": safe, "factor": safe / value, "flights": flights}
-    if bad == bad:
-        made["not_shown"] = bad
-    return made | ({"note": reason} if reason not in ("safe", "unsafe", "open") else {})
+    note = end or ("" if trials.verdict in ("safe", "unsafe", "open") else trials.verdict)
+    made = {"key": key, "unit": how.unit, "nominal": value, "safe": safe, "factor": safe / value}
+    made |= {"flights": trials.flights} | ({} if math.isnan(bad) else {"not_shown": bad})
+    return made | ({"note": note} if note else {})
 
 
 def _whole(key: str, value: float) -> float:

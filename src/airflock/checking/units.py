@@ -1,7 +1,7 @@
 """Other units: every declared number of a scenario with metres and seconds of another length.
 
-A flight must not know in which units it is told. Factors that are powers of two scale without rounding, so that only
-guards such as TINY and hidden constants can tell the two flights apart.
+A flight must not depend on the units that it is given in. Factors that are powers of two scale without rounding, so
+that only guards such as TINY and hidden constants can tell the two flights apart.
 """
 
 import copy

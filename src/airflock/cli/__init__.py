@@ -1,4 +1,4 @@
-"""Layer 5: the command line. Verbs only; everything heavy is imported when a verb needs it."""
+"""The command line: verbs only; everything heavy is imported when a verb needs it."""
 
 from airflock.cli.main import main
 

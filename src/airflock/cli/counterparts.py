@@ -160,7 +160,7 @@ COUNTERPARTS: dict[str, Counterpart] = {
         'airflock.infer(recording, ["couzin_2002", "vicsek_1995"])', "infer",
         {
             "tracks": "tracks", "models": "models", "changes": "settings", "flights": "check", "seed": "seed",
-            "trust": "trust", **TABLE, "out": "airflock.infer.found.Inferred.document",
+            "trust": "trust", **TABLE, "out": "airflock.infer.result.Inferred.document",
             "plot": "airflock.plots.inferred.inferred",
         },
     ),

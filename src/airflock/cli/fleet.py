@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -88,65 +89,99 @@ def fleet(
     """
     from airflock.fleet import compare, individuals, realtime
     from airflock.fleet.faults import read_faults
+    from airflock.fleet.starting import READY_TIME
     from airflock.fleet.teller import WATCHED
-    from airflock.recordings.scores import measure
     from airflock.scenarios.files import load
 
     wrong: list[str] = []
     with gathering(wrong):
         options.writable((save, RECORDINGS), (card_file, (".json",)))
     with gathering(wrong):
-        given = options.settings(changes, agents, duration)
-        found = load(scenario, given | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
-        period = found.sensors.period or found.flight.dt
-        found = compare.sampled(found, period)
-        broken = read_faults(faults, tuple(range(1, found.agents + 1))) if faults else ()
-    for option, word, known in (
-        ("--vehicle", vehicle, VEHICLES), ("--body", body, FLOWN), ("--mode", mode, realtime.MODES),
-    ):  # fmt: skip
-        if word is not None and word not in known:
-            wrong.append(f"{option} {word} is none of {', '.join(known)}{meant(word, known, lead='; ')}")
-    if card_file is not None and mode == realtime.MODES[0]:
-        wrong.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
-    if against not in (None, "simulator"):
-        wrong.append(f"--against {against}: only simulator can be compared with")
-    options.refuse(wrong)
-    tables.say_notes(found.notes)
-    operator = _operator(ground)
-    options.refuse(individuals.refused(found))
+        settings = options.settings(changes, agents, duration)
+        loaded = load(scenario, settings | ({"body.kind": body} if body in FLOWN else {}), trust=trust)
+        loaded = compare.sampled(loaded, loaded.sensors.period or loaded.flight.dt)
+        broken = read_faults(faults, tuple(range(1, loaded.agents + 1))) if faults else ()
+    options.refuse(wrong + _option_faults(vehicle, body, mode, card_file, against))
+    tables.say_notes(loaded.notes)
+    private, public = _operator(ground)
+    options.refuse(individuals.refused(loaded))
     stops = True if silence is None and not against else silence
     live = mode != realtime.MODES[0]
-    given = {"vehicle": vehicle, "operator": operator[1], "silent": stops, "live": live}
-    card = compare.software_card(found, **given, seed=first_seed)
-    options.refuse(realtime.refused(found, broken) if live else [])
+    about: dict[str, Any] = {"vehicle": vehicle, "operator": public, "silent": stops, "live": live}
+    card = compare.software_card(loaded, **about, seed=first_seed)
+    options.refuse(realtime.refused(loaded, broken) if live else [])
     if card_file is not None:
-        _write_card(card_file, card, found, seeds)
-    rows: list[dict[str, Any]] = []
-    beside: list[dict[str, Any]] = []
-    runs, departed = [], None
-    ticks = seeds * (int(found.flight.duration) + (12 if ground else 0))
-    with options.progress(f"{found.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
+        _write_card(card_file, card, loaded, seeds)
+    series = Series()
+    ticks = seeds * int(loaded.flight.duration + (READY_TIME if ground else 0.0))
+    with options.progress(f"{loaded.name}: fleet", ticks, quiet=as_json) as done, _imports_kept():
         for seed in range(first_seed, first_seed + seeds):
-            card = compare.software_card(found, **given, seed=seed) if found.varied else card
-            orders: dict[str, Any] = {"faults": broken, "operator": operator[0], "done": done}
+            card = compare.software_card(loaded, **about, seed=seed) if loaded.varied else card
+            common: dict[str, Any] = {"faults": broken, "operator": private, "done": done}
             if live:
-                watcher = WATCHED if card_file else None
-                start, at = None if ground else compare.first_states(found, seed), (realtime.JOIN[0], join)
-                flown: Any = realtime.fly(found, card, seed, mode, start=start, join=at, watcher=watcher, **orders)
+                start = None if ground else compare.first_states(loaded, seed)
+                join_at, watcher = (realtime.JOIN[0], join), WATCHED if card_file else None
+                flown: Any = realtime.fly(
+                    loaded, card, seed, mode, start=start, join=join_at, watcher=watcher, **common
+                )
             else:
-                flown = compare.fly(found, card, seed, ground=ground, **orders)
-            if against:
-                simulated, measured = compare.both(found, flown)
-                beside.append(simulated)
-                departed = departed or (compare.departure(flown) if not ground and not live else None)
-            else:
-                measured = measure(compare.recording(flown))[0]
-            rows.append(measured)
-            phases = [phase.name for phase in flown.phases()]
-            run = {"seed": seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
-            runs.append(run | ({"load": flown.load._asdict()} if live else {}))
+                flown = compare.fly(loaded, card, seed, ground=ground, **common)
+            series.add(flown, flown.load if live else None, beside=against is not None, follows=not ground and not live)
             _save(save, seed, seeds, flown)
-    _tell(found, card, seeds, rows, beside, runs, departed, as_json)
+    _tell(loaded, card, series, as_json)
+
+
+def _option_faults(vehicle: str, body: str | None, mode: str, card_file: Path | None, against: str | None) -> list[str]:
+    """What is wrong with options that do not concern the scenario."""
+    from airflock.fleet.realtime import MODES
+
+    faults = [
+        f"{option} {word} is none of {', '.join(known)}{meant(word, known, lead='; ')}"
+        for option, word, known in (("--vehicle", vehicle, VEHICLES), ("--body", body, FLOWN), ("--mode", mode, MODES))
+        if word is not None and word not in known
+    ]
+    if card_file is not None and mode == MODES[0]:
+        faults.append(f"--card {card_file}: lock-step flies faster than anybody watches; add --mode tasks or processes")
+    if against not in (None, "simulator"):
+        faults.append(f"--against {against}: only simulator can be compared with")
+    return faults
+
+
+@dataclass
+class Series:
+    """What a fleet flew, seed after seed.
+
+    measured  : order parameters of each flight
+    simulated : those of the simulator beside it, where it was asked for
+    runs      : what is told of each flight: seed, digest, phases, notes, order parameters; on the real clock its load
+    departure : how fast the first flight leaves the simulated one, where a fleet follows it
+    """
+
+    measured: list[dict[str, Any]] = field(default_factory=list)
+    simulated: list[dict[str, Any]] = field(default_factory=list)
+    runs: list[dict[str, Any]] = field(default_factory=list)
+    departure: Any = None
+
+    def add(self, flown: Any, load: Any, *, beside: bool, follows: bool) -> None:
+        """Measure a flight, and fly the simulator beside it where asked.
+
+        load    : what it cost on the real clock; None in lock-step
+        follows : whether both start alike, on one clock
+        """
+        from airflock.fleet import compare
+        from airflock.recordings.scores import measure
+
+        if beside:
+            simulated, measured = compare.both(flown.scenario, flown)
+            self.simulated.append(simulated)
+            if follows and self.departure is None:
+                self.departure = compare.departure(flown)
+        else:
+            measured = measure(compare.recording(flown))[0]
+        self.measured.append(measured)
+        phases = [phase.name for phase in flown.phases()]
+        run = {"seed": flown.seed, "sha256": flown.digest(), "phases": phases, "notes": flown.log, **measured}
+        self.runs.append(run if load is None else run | {"load": load._asdict()})
 
 
 @contextmanager
@@ -188,37 +223,37 @@ def _save(save: Path | None, seed: int, seeds: int, flown: Any) -> None:
     tables.say(f"saved {save_recording(recording(flown), path)}")
 
 
-def _tell(found: Any, card: Any, seeds: int, rows: Any, beside: Any, runs: Any, departed: Any, as_json: bool) -> None:
+def _tell(scenario: Any, card: Any, series: Series, as_json: bool) -> None:
     """Print what was flown."""
     from airflock.fleet.compare import table
     from airflock.metrics.registry import reports
 
-    lines = table(beside, rows) if len(beside) > 1 else []
+    lines = table(series.simulated, series.measured) if len(series.simulated) > 1 else []
+    seeds = len(series.runs)
     if as_json:
-        about = {"name": found.name, "agents": found.agents, "vehicle": card.autopilot.name, "seeds": seeds}
-        told: dict[str, Any] = {"fleet": about, "runs": runs, "comparison": [line._asdict() for line in lines]}
-        tables.emit_json(told | ({"departure": departed._asdict()} if departed else {}))
+        about = {"name": scenario.name, "agents": scenario.agents, "vehicle": card.autopilot.name, "seeds": seeds}
+        content = {"fleet": about, "runs": series.runs, "comparison": [line._asdict() for line in lines]}
+        tables.emit_json(content | ({"departure": series.departure._asdict()} if series.departure else {}))
         return
-    flown = f"{found.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
-    title = f"{found.name}: fleet of {found.agents} {card.autopilot.name}, {flown}"
-    tables.score_table(title, rows, {}, reports(found.measures))
-    for run in runs:
+    flown = f"{scenario.flight.duration:g} s, {seeds} seed{'s' if seeds > 1 else ''}"
+    title = f"{scenario.name}: fleet of {scenario.agents} {card.autopilot.name}, {flown}"
+    tables.score_table(title, series.measured, {}, reports(scenario.measures))
+    for run in series.runs:
         _tell_load(run.get("load"))
-    for run in runs[:1]:
-        for time, member, note in run["notes"][:40]:
-            tables.say(f"{time:8.2f} s  drone {member:3d}  {note}")
-    if departed:
+    for time, member, note in series.runs[0]["notes"][:40]:
+        tables.say(f"{time:8.2f} s  drone {member:3d}  {note}")
+    if series.departure:
         tables.say("largest distance to the simulated flight, m; and of the simulation itself after a nudge of 1 cm")
-        if found.errs and found.sensor.error is not None:
+        if scenario.errs and scenario.sensor.error is not None:
             tables.say("(a drone sends the position that it flies by; a simulated one has two errors: they part)")
-        for t, ours, theirs in zip(*departed, strict=True):
+        for t, ours, theirs in zip(*series.departure, strict=True):
             tables.say(f"  after {t:g} s: {ours:.4f}   {theirs:.4f}")
     for line in lines:
         tables.say(
             f"  {line.name:16s} simulator {line.simulator:10.4f}  fleet {line.fleet:10.4f}  z {line.z:+.2f}  "
             f"p (Holm) {line.p:.2f}"
         )
-    if beside and not lines:
+    if series.simulated and not lines:
         tables.say("note: one seed tells no table of differences; --seeds 2 or more do")
 
 

@@ -3,7 +3,7 @@
 import math
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperGroup
@@ -84,79 +84,125 @@ def prepare(
     """
     import secrets
 
-    from airflock.core.parameters import declarations
     from airflock.fleet.prepare import card_document
-    from airflock.mavlink.keys import write_key
     from airflock.mavlink.orders import new_keys
-    from airflock.onboard.card import card_of, hash_of, write_card
-    from airflock.onboard.safety import Safety
+    from airflock.onboard.card import card_of, hash_of
     from airflock.scenarios.files import load
 
     faults: list[str] = []
     where, systems = _site("--site", site, faults), _members(members, faults)
     with gathering(faults):
         options.writable((out, (".json",)))
-    for path in (out, out.with_suffix(".key"), out.with_suffix(".operator")):
-        if path.exists():
-            faults.append(f"{path}: exists; a mission is never overwritten")
-    found, safety, known = None, {}, []  # type: ignore[var-annotated]
+    files = Files(out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    faults += [f"{path}: exists; a mission is never overwritten" for path in files if path.exists()]
+    loaded = None
     with gathering(faults):
-        found = load(scenario, options.settings(changes), trust=trust)
-    with gathering(faults):
-        safety = options.settings(limits)
-        known = [name for name, _, _ in declarations(Safety)]
-        for name in (name for name in safety if name not in known):
-            faults.append(f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}")
+        loaded = load(scenario, options.settings(changes), trust=trust)
+    safety = _limits(limits, faults)
     private, public = new_keys()
     document: dict[str, Any] = {}
-    if found is not None:
+    if loaded is not None:
         with gathering(faults):
             document = card_document(
-                found, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
+                loaded, site=where, members=systems, mission=1 + secrets.randbelow(2**32 - 1),
                 expires=int(time.time() + 3600.0 * hours), operator=public, autopilot=autopilot, height=height,
-                margin=margin, safety={name: value for name, value in safety.items() if name in known},
+                margin=margin, safety=safety,
             )  # fmt: skip
             card_of({**document, "hash": hash_of(document)}, str(out))
     loads = airtimes(len(systems), document["safety"], fast_bits, slow_bits) if document else []
-    faults += [
-        f"{name} radio: {len(systems)} drones would take {share:.0%} of its time; at most {SHARE:.0%}: "
-        f"lower the rate (--limit {key}=...) or raise --{name}-bits"
-        for name, key, share in loads
-        if share > SHARE
-    ]
-    if faults or found is None:
+    faults += [each.fault(len(systems)) for each in loads if each.share > SHARE]
+    if faults or loaded is None:
         raise CardError(faults)
-    tables.say_notes(found.notes)
-    files = (out, out.with_suffix(".key"), out.with_suffix(".operator"))
+    tables.say_notes(loaded.notes)
+    card = _write_mission(files, document, private)
+    if as_json:
+        radio = {each.radio: each.share for each in loads}
+        tables.emit_json({"card": str(out), "hash": card.hash, "members": list(card.members), "airtime": radio})
+    else:
+        _say_prepared(files, card, loads)
+
+
+class Files(NamedTuple):
+    """What a preparation writes: the card, the mission's key and the operator's key."""
+
+    card: Path
+    key: Path
+    operator: Path
+
+
+class Airtime(NamedTuple):
+    """How much of a radio's time a flock takes.
+
+    radio : fast or slow; limit : which of the card's limits sets its rate; share : of the time, 0 to 1
+    """
+
+    radio: str
+    limit: str
+    share: float
+
+    def fault(self, count: int) -> str:
+        """Why so many drones cannot use it, and what helps."""
+        return (
+            f"{self.radio} radio: {count} drones would take {self.share:.0%} of its time; at most {SHARE:.0%}: "
+            f"lower the rate (--limit {self.limit}=...) or raise --{self.radio}-bits"
+        )
+
+
+def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[Airtime]:
+    """What `count` drones take of the fast and the slow radio, from their rates in bit/s and the card's limits."""
+    loads = []
+    for radio, limit, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
+        packet = PREAMBLE + 8.0 * (DATAGRAM + OVERHEAD) / bits
+        loads.append(Airtime(radio, limit, count * packet / float(safety[limit])))
+    return loads
+
+
+def _limits(given: list[str] | None, faults: list[str]) -> dict[str, Any]:
+    """Limits of the card that --limit changes; what is wrong is noted, and left out."""
+    from airflock.core.parameters import declarations
+    from airflock.onboard.safety import Safety
+
+    known = [name for name, _, _ in declarations(Safety)]
+    safety: dict[str, Any] = {}
+    with gathering(faults):
+        safety = options.settings(given)
+    faults += [
+        f"--limit {name}: is not a limit; {meant(name, known, ', '.join(known))}"
+        for name in safety
+        if name not in known
+    ]
+    return {name: value for name, value in safety.items() if name in known}
+
+
+def _write_mission(files: Files, document: dict[str, Any], private: bytes) -> Any:
+    """Write card and keys, all of them or none; private: the operator's key. The card that was written."""
+    import secrets
+
+    from airflock.mavlink.keys import write_key
+    from airflock.onboard.card import write_card
+
     try:
-        made = write_card(files[0], document)
-        write_key(files[1], secrets.token_bytes(32))
-        write_key(files[2], private)
+        card = write_card(files.card, document)
+        write_key(files.key, secrets.token_bytes(32))
+        write_key(files.operator, private)
     except BaseException:  # a full disk, Ctrl-C: a card without its keys is of no use
         for path in files:
             path.unlink(missing_ok=True)
         raise
-    if as_json:
-        radio = {name: share for name, _, share in loads}
-        tables.emit_json({"card": str(out), "hash": made.hash, "members": list(made.members), "airtime": radio})
-        return
-    tables.say(f"wrote {out} (hash {made.hash[:8]}), {out.with_suffix('.key')}, {out.with_suffix('.operator')}")
-    tables.say(f"fence {made.low:g} to {made.high:g} m above the site; layers up to {made.layer(systems[-1]):g} m")
-    for name, _, share in loads:
-        tables.say(f"{name} radio: {share:.0%} of its time, by an estimate from its bit rate")
-    for guard in made.autopilot.guards:
+    return card
+
+
+def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
+    """Say what was written, how high the drones may fly, and how autopilots have to be set."""
+    tables.say(f"wrote {files.card} (hash {card.hash[:8]}), {files.key}, {files.operator}")
+    top = card.layer(card.members[-1])
+    tables.say(f"fence {card.low:g} to {card.high:g} m above the site; layers up to {top:g} m")
+    for load in loads:
+        tables.say(f"{load.radio} radio: {load.share:.0%} of its time, by an estimate from its bit rate")
+    for guard in card.autopilot.guards:
         safe = "to the own system id" if guard.own else f"within [{guard.low:g}, {guard.high:g}]"
-        why = guard.reason(made.safety.speed_max, made.safety.response)
+        why = guard.reason(card.safety.speed_max, card.safety.response)
         tables.say(f"set {guard.name} {safe}: {why}")
-
-
-def airtimes(count: int, safety: dict[str, Any], fast: float, slow: float) -> list[tuple[str, str, float]]:
-    """Name, limit that sets its rate, and share of the time taken, of the fast and the slow radio."""
-    found = []
-    for name, key, bits in (("fast", "status_period", fast), ("slow", "slow_period", slow)):
-        packet = PREAMBLE + 8.0 * (DATAGRAM + OVERHEAD) / bits
-        found.append((name, key, count * packet / float(safety[key])))
-    return found
 
 
 @app.command("order")

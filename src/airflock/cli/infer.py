@@ -133,7 +133,7 @@ def _numbers(found: Any) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from airflock.infer.found import between
+    from airflock.infer.result import between
 
     table = Table(title=f"numbers of {found.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "value", "unit", "95 % for it alone", "95 % for all together"):

@@ -58,10 +58,8 @@ def settings(
         if not equals or not key.strip():
             faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
-        try:
+        with gathering(faults):
             found[key.strip()] = value(text, f"{option} {key.strip()}")
-        except ScenarioError as fault:
-            faults += fault.faults
     short: dict[str, tuple[str, float]] = {}
     if agents is not None:
         short["agents"] = (str(agents), agents)

@@ -1,13 +1,16 @@
 """Verbs run and score: fly a scenario, or measure a recording."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from airflock.cli import options, tables
 from airflock.errors import gathering
 from airflock.suffixes import PICTURES, RECORDINGS, TABLES
+
+Scores = Mapping[str, Any]  # order parameters, or keys with their values, by name
 
 
 def run(
@@ -57,8 +60,8 @@ def run(
         _record(found, numbers, precision, device, save, plot)
 
 
-def _tell(found, numbers, rows, changed, as_json) -> None:  # type: ignore[no-untyped-def]
-    """Print what flights came to, beside the paper's figures."""
+def _tell(found: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: Scores, as_json: bool) -> None:
+    """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
     from airflock.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound
 
@@ -80,7 +83,9 @@ def _tell(found, numbers, rows, changed, as_json) -> None:  # type: ignore[no-un
         tables.say(remark)
 
 
-def _record(found, numbers, precision, device, save, plot) -> None:  # type: ignore[no-untyped-def]
+def _record(
+    found: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
+) -> None:
     """Fly again with the trajectories kept (the same bits), and write what was asked for."""
     from airflock.recordings.files import save as save_recording
     from airflock.recordings.flights import simulate
@@ -134,12 +139,18 @@ def score(
         changed = in_bodies(body_length) | changed
     with options.compiling_told(), Opening(files[0]) as first:  # another process opens it while this one imports
         if groups:
-            _groups([first, *files[1:]], files, changed, trust, as_json)
-        else:
-            _score([first, *files[1:]], files, changed, trust, series, aero, as_json)
+            _tell_groups([first, *files[1:]], files, changed, trust, as_json)
+            return
+        measured = [
+            _measured(source, path, changed, trust, aero)
+            for source, path in zip([first, *files[1:]], files, strict=True)
+        ]
+        if series is not None:
+            _save_series(measured, series)
+        _tell_measured(measured, as_json)
 
 
-def _groups(what, files, changed, trust, as_json) -> None:  # type: ignore[no-untyped-def]
+def _tell_groups(what: Sequence[Any], files: Sequence[Path], changed: Scores, trust: bool, as_json: bool) -> None:
     """Measure the groups of recordings, and print what was found."""
     from airflock.metrics.registry import reports
     from airflock.recordings.files import load_recording
@@ -160,49 +171,73 @@ def _groups(what, files, changed, trust, as_json) -> None:  # type: ignore[no-un
         tables.emit_json({"runs": runs})
 
 
-def _score(what, files, changed, trust, series, aero, as_json) -> None:  # type: ignore[no-untyped-def]
-    """Measure recordings, of which the first is being opened, and write or print what was asked for."""
+class Measured(NamedTuple):
+    """One recording, measured.
+
+    values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
+    faults   : what befell its agents; not_told : order parameters for want of a length, with the keys that they need
+    """
+
+    path: Path
+    values: Scores
+    course: Any
+    about: Mapping[str, tuple[str, str]]
+    faults: Any
+    not_told: Any
+
+
+def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool) -> Measured:
+    """Measure a recording; source : its path, or the Opening that reads it; changed : keys of how it is measured."""
     from airflock.metrics.registry import reports
-    from airflock.recordings.attributes import faults, told_faults
+    from airflock.recordings.attributes import faults
     from airflock.recordings.files import load_recording
-    from airflock.recordings.lengths import told as told_unsaid
     from airflock.recordings.scores import aero_settings, measure, not_told, scenario_of
 
-    rows, courses, befell, untold = [], [], [], []
-    about: dict[str, tuple[str, str]] = {}
-    for source, path in zip(what, files, strict=True):
-        recording = load_recording(source)
-        settings = aero_settings(recording, changed) if aero else changed
-        values, course = measure(recording, settings, trust=trust)
-        scenario = scenario_of(recording, settings, trust=trust)
-        about |= reports(scenario.measures)
-        rows.append(values)
-        courses.append(course.assign(file=str(path)))
-        befell.append(faults(recording))
-        untold.append(not_told(recording, scenario, settings))
-    if series is not None:
-        import io
+    recording = load_recording(source)
+    settings = aero_settings(recording, changed) if aero else changed
+    values, course = measure(recording, settings, trust=trust)
+    scenario = scenario_of(recording, settings, trust=trust)
+    untold = not_told(recording, scenario, settings)
+    return Measured(path, values, course, reports(scenario.measures), faults(recording), untold)
 
-        import pandas as pd
 
-        from airflock import atomic
+def _save_series(measured: Sequence[Measured], path: Path) -> None:
+    """Write order parameters over time of all recordings as one table."""
+    import io
 
-        text = io.StringIO()
-        pd.concat(courses).to_csv(text)
-        atomic.write(series, text.getvalue())
-        tables.say(f"saved {series}")
+    import pandas as pd
+
+    from airflock import atomic
+
+    text = io.StringIO()
+    pd.concat([each.course.assign(file=str(each.path)) for each in measured]).to_csv(text)
+    atomic.write(path, text.getvalue())
+    tables.say(f"saved {path}")
+
+
+def _tell_measured(measured: Sequence[Measured], as_json: bool) -> None:
+    """Print order parameters of recordings, what befell their agents, and what could not be measured."""
+    from airflock.recordings.attributes import told_faults
+    from airflock.recordings.lengths import told as told_unsaid
+
+    rows = [each.values for each in measured]
     if as_json:
-        told: list[dict[str, Any]] = [
-            {name: found for name, found in (("faults", hurt), ("not_told", needed)) if found}
-            for hurt, needed in zip(befell, untold, strict=True)
+        runs = [
+            {
+                "file": str(each.path),
+                **each.values,
+                **({"faults": each.faults} if each.faults else {}),
+                **({"not_told": each.not_told} if each.not_told else {}),
+            }
+            for each in measured
         ]
-        runs = [{"file": str(path), **row, **more} for path, row, more in zip(files, rows, told, strict=True)]
         tables.emit_json({"runs": runs, **tables.statistics(rows)})
         return
-    tables.score_table(", ".join(map(str, files)), rows, {}, about)
-    for path, found in zip(files, befell, strict=True):
-        if found:
-            tables.say(f"{path}: {told_faults(found)}")
-    for path, needed in zip(files, untold, strict=True):
-        if needed:
-            tables.say(f"{path}: {told_unsaid(needed)}")
+    about = {name: entry for each in measured for name, entry in each.about.items()}
+    tables.score_table(", ".join(str(each.path) for each in measured), rows, {}, about)
+    for each in measured:
+        if each.faults:
+            tables.say(f"{each.path}: {told_faults(each.faults)}")
+    for each in measured:
+        if each.not_told:
+            tables.say(f"{each.path}: {told_unsaid(each.not_told)}")

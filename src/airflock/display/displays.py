@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.display.shapes import points_of
 from airflock.display.show import FAILURES, Show, fly_show, scenario_of
-from airflock.errors import AirflockError, ScenarioError
+from airflock.errors import ScenarioError, gathering
 
 
 def display(
@@ -89,16 +89,12 @@ def plan(
         faults.append(
             f"{dash}drones = {drones} are more than {dash}points = {count}; give each drone a point, or fly fewer"
         )
-    try:
+    with gathering(faults):
         scenario_of(drones, dict(settings or {}))
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
     found = []
     for number, shape in enumerate(shapes):
-        try:
+        with gathering(faults):
             found.append(points_of(shape, count, spacing, seed=number))
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
     if faults:
         raise ScenarioError(faults)
     return found

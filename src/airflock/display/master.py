@@ -105,7 +105,7 @@ class Master:
         return self.formed
 
     def _assign(self, *, first: bool = False, failed: bool = False) -> bool:
-        """Give points anew where that saves way; whether it did. What stands in the way is told in any case."""
+        """Assign points again where that saves way; whether it did. What stands in the way is sent in any case."""
         there, blocked = self.flight.present, np.zeros(len(self.points), bool)
         for hull in self.hulls:
             blocked |= np.linalg.norm(self.points - hull, axis=1) < CLEAR
@@ -137,7 +137,7 @@ class Master:
             self.progress.begin()
 
     def _mind(self) -> None:
-        """Send out again who makes no progress, and on to its point who is past what stood in its way."""
+        """Send drones out again that make no progress; those past an obstacle go on to their points."""
         there = self.flight.present
         places = np.where(there, self.flight.state[:3], np.nan).T
         past = [who for who, first in self.around.items() if not np.linalg.norm(places[who] - first) > NEAR]
@@ -186,7 +186,7 @@ class Master:
         return bool(self._distances().max() <= NEAR)
 
     def _fail(self, who: int, how: str) -> None:
-        """Take one drone out of the flock: it falls, or stands in the way; the others get points anew."""
+        """Take one drone out of the flock: it falls, or stands in the way; the others are given points again."""
         state = self.flight.state[:, who].copy()
         self.flight.remove(who, f"fails: {how}")
         if how == "hover":
@@ -213,7 +213,7 @@ class Master:
                 self.placed = flight.time - self.begun
 
     def _drop(self, places: Frames) -> None:
-        """Let fall who falls, and count whom it strikes; places (3, drone) of those that fly."""
+        """Move the drones that fall, and count those that they strike; places (3, drone) of those that fly."""
         reach, left = self.scenario.metrics.r_coll, []
         for body in self.falling:
             touching = np.zeros(places.shape[1], bool)

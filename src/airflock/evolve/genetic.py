@@ -120,7 +120,7 @@ def _algorithm(bits: int, population: int, seed: int, mutation: float, crossover
         raise StudyError("the genetic algorithm needs pymoo: pip install 'airflock[evolve]'") from fault
 
     class Generational(GA):  # type: ignore[misc]
-        """Children replace their parents, whoever is better."""
+        """Children replace their parents, even better ones."""
 
         def _advance(self, infills: Any = None, **_: Any) -> None:
             self.pop = infills

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from airflock.evolve.fitness import OVER_SEEDS, Objective, Own
 from airflock.limits.limit import Limit, read_all
 from airflock.scenarios.own_code import own_module
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 from airflock.untrusted import is_file
 
 KEYS = ("maximise", "minimise", "limits", "over_seeds", "quantile", "own", "source", "note")
@@ -28,8 +28,7 @@ def read_objectives(
     faults = []
     for key in table:
         if key not in KEYS:
-            near = get_close_matches(key, KEYS, n=1, cutoff=0.5)
-            hint = f"did you mean objective.{near[0]}?" if near else f"known: {', '.join(KEYS)}"
+            hint = meant(key, KEYS, f"known: {', '.join(KEYS)}", prefix="objective.")
             faults.append(f"objective.{key}: unknown key; {hint}")
     over, quantile = table.get("over_seeds", "mean"), table.get("quantile", 0.1)
     if not isinstance(over, str) or over not in OVER_SEEDS:

@@ -5,18 +5,14 @@ judged by the mean over its neighbours in the space, then the best of them fly i
 seeds (successive halving, Jamieson & Talwalkar 2016).
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.fitness import losses as losses_of
 from airflock.evolve.safe import excess_of, safe_first
-from airflock.evolve.search import evaluate
-from airflock.evolve.store import Batch, Store
-from airflock.evolve.study import Study
-from airflock.executors import Executor
+from airflock.evolve.store import Batch
 
 NEIGHBOURS = 10
 ROUNDS = ((1.0, 4), (0.25, 16))  # share of the pool that flies, and with how many seeds
@@ -32,19 +28,13 @@ def smoothed(points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArra
     return np.asarray(losses[np.asarray(near).reshape(len(points), -1)].mean(axis=1))
 
 
-def race(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    points: NDArray[np.float64],
-    losses: NDArray[np.float64],
-    note: Callable[[bool], None] | None = None,
-) -> NDArray[np.int64]:
+def race(evaluator: Evaluator, points: NDArray[np.float64], losses: NDArray[np.float64]) -> NDArray[np.int64]:
     """Indices of the candidates that win, the best first, at most `search.top`.
 
     points : (candidate, axis) of all candidates that did not fail
     losses : (candidate,), less is better; who broke limits comes after all others
     """
+    study = evaluator.study
     pool, top = study.whole("pool"), study.whole("top")
     alive = np.argsort(smoothed(points, losses), kind="stable")[:pool]
     number = 0
@@ -53,8 +43,8 @@ def race(
         numbers = [[study.seed(4, number + j) for j in range(seeds)]] * len(alive)
         number += seeds
         batch = Batch("race", 0, k)
-        found = losses_of(evaluate(study, store, executor, batch, points[alive], note, seeds=numbers), study.objectives)
+        found = losses_of(evaluator.evaluate(batch, points[alive], seeds=numbers), study.objectives)
         if study.limits:
-            found = safe_first(found, excess_of(study, store, batch))
+            found = safe_first(found, excess_of(study, evaluator.store, batch))
         alive = alive[np.argsort(found[:, 0], kind="stable")]
     return alive[:top]

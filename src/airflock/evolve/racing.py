@@ -1,4 +1,4 @@
-"""Racing inside a generation: whoever cannot reach the better half any more does not fly on.
+"""Racing inside a generation: a candidate that can no longer reach the better half is not flown further.
 
 Candidates fly the same seeds, one after another. A candidate is dropped when even its optimistic mean, in which all
 flights that are left are as good as the best one of the generation so far, lies below the mean of the candidate in the

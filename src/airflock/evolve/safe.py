@@ -1,8 +1,8 @@
-"""Limits of a search: who keeps them comes before all who do not, whatever their fitness (Deb 2000).
+"""Limits of a search: candidates that keep them come before all that do not, whatever their fitness (Deb 2000).
 
-Of two candidates that keep all limits the fitter is better; of two that do not, the one that breaks them less. How much
-is told in standard deviations that are missing to the reliability index of the limit, so that limits of any score add
-up.
+Of two candidates that keep all limits the fitter is better; of two that do not, the one that breaks them less. By how
+much is counted in standard deviations that are missing to the reliability index of the limit, so that limits of any
+score add up.
 """
 
 import math
@@ -56,7 +56,7 @@ def excess_of(study: Study, store: Store, batch: Batch, share: float = 1.0) -> N
 
 
 def safe_first(losses: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Losses (candidate, objective) in which whoever breaks limits is worse than all who keep them."""
+    """Losses (candidate, objective) in which each that breaks limits is worse than all that keep them."""
     worst = losses.max(axis=0)
     broken = worst + excess[:, None] + TIE * (losses - worst) / np.maximum(np.ptp(losses, axis=0), TIE)
     return np.where(excess[:, None] > 0.0, broken, losses)

@@ -4,27 +4,23 @@ A study that was ended, however roughly, is continued by running it again: the o
 from its first generation on and comes to the very state in which it was left. No state is pickled.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import StudyError
-from airflock.evolve.fitness import Objective, losses
+from airflock.evolve.evaluator import Evaluator
+from airflock.evolve.fitness import losses
 from airflock.evolve.growing import Length
 from airflock.evolve.landscape import refuse_flat
 from airflock.evolve.optimisers import optimiser
-from airflock.evolve.racing import still_needed
 from airflock.evolve.safe import excess_of, safe_first
-from airflock.evolve.several import of_scenarios
 from airflock.evolve.space import declared
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
-from airflock.evolve.tables import DURATION
-from airflock.executors import Executor, Flight
-from airflock.scenarios.scenario import Scenario
+from airflock.executors import Executor
 
 SAME = 1e-9  # a rebuilt optimiser may differ from the stored points by rounding on another machine, not by more
 
@@ -48,12 +44,11 @@ class Progress:
 
 
 Watch = Callable[[Progress], None]
-Flown = dict[tuple[int, int], Mapping[str, Any] | None]  # (candidate, repeat) → order parameters, None: failed
 
 
 @dataclass
 class Tally:
-    """Counts of a search so far, told to whoever watches."""
+    """Counts of a search so far, reported to `watch`."""
 
     total: int
     watch: Watch | None
@@ -93,17 +88,19 @@ def search(study: Study, store: Store, executor: Executor, watch: Watch | None =
     Returns the final mean (axis,) of each run whose algorithm has one, and averages of its means if asked for.
     """
     tally = Tally(total_flights(study), watch)
+    evaluator = Evaluator(study, store, executor, tally.note)
     centres: list[NDArray[np.float64]] = []
     for run in range(study.whole("restarts") + 1):
-        means = _run(study, store, executor, run, tally)
+        means = _run(evaluator, run, tally)
         if means:
             found = averaged(means, study.whole("averages")) + windowed(means, study.whole("windows"))
             centres += [means[-1], *found]
     return centres
 
 
-def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally) -> list[NDArray[np.float64]]:
+def _run(evaluator: Evaluator, run: int, tally: Tally) -> list[NDArray[np.float64]]:
     """One run of the optimiser; returns its mean (axis,) after each generation of whole flights, if it has one."""
+    study, store = evaluator.study, evaluator.store
     first = study.objectives[0]
     state = optimiser(
         study.search.algorithm, len(study.space.axes), len(study.objectives), study.population(run),
@@ -119,7 +116,7 @@ def _run(study: Study, store: Store, executor: Executor, run: int, tally: Tally)
         points = _asked(store, batch, state.ask())
         begun = tally.done
         racing = study.search.racing == "optimistic"
-        rows = evaluate(study, store, executor, batch, points, tally.note, share=length.share, racing=racing)
+        rows = evaluator.evaluate(batch, points, share=length.share, racing=racing)
         tally.total -= len(points) * study.seeds(generation) * len(study.scenarios) - (tally.done - begun)
         values, told = [row[0] for row in rows], losses(rows, study.objectives)
         sound = values
@@ -178,112 +175,3 @@ def _asked(store: Store, batch: Batch, points: NDArray[np.float64]) -> NDArray[n
             "for other candidates than are stored; continue with the versions that the table session names"
         )
     return known
-
-
-def evaluate(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    batch: Batch,
-    points: NDArray[np.float64],
-    note: Callable[[bool], None] | None = None,
-    *,
-    seeds: Sequence[Sequence[int]] | None = None,
-    parameters: Sequence[Mapping[str, float]] | None = None,
-    share: float = 1.0,
-    racing: bool = False,
-) -> list[list[float | None]]:
-    """Fitness (candidate, objective) of a batch; flies what the store lacks and stores it. None: failed.
-
-    note  : called after each flight, with whether it is a new one
-    seeds : (candidate, repeat); by default those of the search
-    parameters : of each candidate; by default those of its point
-    share : of the scenarios' duration that is flown
-    racing : whether seeds are flown in turn, and no further by candidates that cannot reach the better half
-    """
-    given = [study.space.parameters(point) for point in points] if parameters is None else parameters
-    numbers = _seeds(study, batch, len(points)) if seeds is None else seeds
-    places = [_shortened(scenario, share) for scenario in study.scenarios]
-    store.ask(batch, points.tolist(), [{**each, **places[0]} for each in given])
-    flown: Flown = store.flown(batch)
-    if note:
-        for _ in flown:
-            note(False)
-    n, last = len(places), max(len(row) for row in numbers)
-    alive = list(range(len(given)))
-    for seen in range(1, last + 1) if racing else [last]:
-        missing = [
-            Flight(i, j * n + k, {**given[i], **shorter}, seed, k)
-            for i in alive
-            for j, seed in enumerate(numbers[i][:seen])
-            for k, shorter in enumerate(places)
-            if (i, j * n + k) not in flown
-        ]
-        _fly(study, store, executor, batch, missing, flown, note)
-        if seen < last:
-            alive = _still_needed(study, flown, alive, seen, last)
-    rows = [
-        [fitness_of(study, o, [flown[i, r] for r in range(len(row) * n) if (i, r) in flown]) for o in study.objectives]
-        for i, row in enumerate(numbers)
-    ]
-    store.tell(batch, rows)
-    return rows
-
-
-def _fly(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    batch: Batch,
-    missing: Sequence[Flight],
-    flown: Flown,
-    note: Callable[[bool], None] | None,
-) -> None:
-    """Fly what is missing; each flight is stored and known as soon as it lands."""
-    for landed in executor.fly(missing):
-        store.land(batch, landed)
-        if landed.values is not None and all(values is None for values in flown.values()):
-            for objective in study.objectives:  # a fault in one shows at the first flight, not after a generation
-                objective.of_flight(landed.values)
-        flown[landed.flight.candidate, landed.flight.repeat] = landed.values
-        if note:
-            note(True)
-
-
-def _still_needed(study: Study, flown: Flown, alive: Sequence[int], seen: int, last: int) -> list[int]:
-    """Candidates that fly on after `seen` of `last` seeds; later flights that are stored already do not count."""
-    first, n = study.objectives[0], len(study.scenarios)
-    candidates = 1 + max(i for i, _ in flown)
-    values = [
-        [
-            fitness_of(study, first, [flown[i, j * n + k] for k in range(n)])
-            for j in range(seen)
-            if all((i, j * n + k) in flown for k in range(n))
-        ]
-        for i in range(candidates)
-    ]
-    return still_needed(values, alive, last - seen, first.maximise)
-
-
-def fitness_of(study: Study, objective: Objective, flights: Sequence[Mapping[str, Any] | None]) -> float | None:
-    """Fitness of a candidate from its flights, in their order: over the seeds of each scenario, then over scenarios."""
-    n = len(study.scenarios)
-    each = [objective.of_candidate(flights[place::n]) for place in range(n)]
-    return of_scenarios(each, study.over_scenarios, objective.maximise)
-
-
-def _shortened(scenario: Scenario, share: float) -> dict[str, float]:
-    """Parameters of a flight that make it shorter than the scenario's; none for a whole one."""
-    return {} if share == 1.0 else {DURATION: share * scenario.flight.duration}
-
-
-def _seeds(study: Study, batch: Batch, candidates: int) -> list[list[int]]:
-    """Seeds (candidate, repeat) of a generation of the search."""
-    k, most = study.seeds(batch.generation), max(study.whole("seeds"), study.whole("late_seeds"))
-    before = sum(study.population(run) for run in range(batch.run)) * study.whole("generations")
-    first = before + batch.generation * study.population(batch.run)
-    how = study.search.random_numbers
-    return [
-        [study.seed(0, most * {"fresh": first + i, "generation": first, "study": 0}[how] + j) for j in range(k)]
-        for i in range(candidates)
-    ]

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from airflock.errors import StudyError
-from airflock.evolve.search import evaluate
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
 from airflock.executors import Executor
@@ -50,7 +50,7 @@ def sensitivity(
     batch = Batch(method, samples, 0)
     k = study.whole("seeds")
     seeds = [[study.seed(3, j) for j in range(k)]] * len(points)  # common: chance must not pass for an effect
-    rows = evaluate(study, store, executor, batch, np.asarray(points), note, seeds=seeds)
+    rows = Evaluator(study, store, executor, note).evaluate(batch, np.asarray(points), seeds=seeds)
     values = np.array([np.nan if row[0] is None else row[0] for row in rows])
     if not np.isfinite(values).any():
         raise StudyError("every candidate failed: no sensitivity")

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any
 
 from airflock.core.parameters import Quantity, with_unit
@@ -22,8 +21,7 @@ def read_space(table: Any, scenario: Scenario) -> tuple[Space | None, list[str]]
     tied: dict[str, Tie] = {}
     for key, entry in entries.items():
         if key not in known:
-            near = get_close_matches(key, known, n=1, cutoff=0.5)
-            hint = f"; did you mean space.{near[0]}?" if near else ""
+            hint = meant(key, known, lead="; ", prefix="space.")
             if key.startswith("aero.") and not scenario.descends:
                 hint = f", which has no section [aero]; --set {key}=VALUE adds drag descent to it"
             faults.append(f"space.{key} is not a number of {scenario.name}{hint}")

@@ -4,7 +4,6 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from airflock.limits.limit import Limit
 from airflock.scenarios import formats, schema
 from airflock.scenarios.files import presets, tells_of_study
 from airflock.scenarios.scenario import Scenario
+from airflock.spelling import meant
 from airflock.untrusted import TextError, from_outside, is_file, read_toml
 
 KEYS = ("title", "scenario", "scenarios", "over_scenarios", "set", "space", "objective", "search")
@@ -145,7 +145,7 @@ def is_study(name: str | os.PathLike[str]) -> bool:
         return False
     try:
         return tells_of_study(read_toml(path))
-    except (TextError, OSError):  # whoever reads it next tells what is wrong
+    except (TextError, OSError):  # the next reader says what is wrong
         return False
 
 
@@ -202,9 +202,9 @@ def make_study(
     document, faults = formats.current(document, where), []
     for key in document:
         if key not in KEYS:
-            of_search = [f"search.{key}"] if key in {field.name for field in fields(Search)} else []
-            near = of_search or get_close_matches(key, KEYS, n=1, cutoff=0.5)
-            faults.append(f"{key}: unknown key; {f'did you mean {near[0]}?' if near else 'known: ' + ', '.join(KEYS)}")
+            of_search = key in {field.name for field in fields(Search)}
+            hint = f"did you mean search.{key}?" if of_search else meant(key, KEYS, f"known: {', '.join(KEYS)}")
+            faults.append(f"{key}: unknown key; {hint}")
     if scenario is None:
         scenarios, labels, more = read_scenarios(document, settings or {}, folder, trust)
         if more or not scenarios:

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from airflock import atomic
 from airflock.errors import StudyError
 from airflock.evolve import portrait, tables
+from airflock.evolve.evaluator import Evaluator
 from airflock.evolve.folder import plain, write
 from airflock.evolve.intervals import interval
 from airflock.evolve.landscape import dead
 from airflock.evolve.nondominated import front
 from airflock.evolve.race import race
 from airflock.evolve.safe import excess_of, kept, safe_first
-from airflock.evolve.search import evaluate
 from airflock.evolve.space import with_parameters
 from airflock.evolve.store import Batch, Store
 from airflock.evolve.study import Study
@@ -114,47 +114,47 @@ def conclude(
     folder: Path,
     note: Callable[[bool], None] | None = None,
 ) -> Result:
-    """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder."""
+    """Re-evaluate, choose, and write result.toml, best.toml and the tables into the study's folder.
+
+    centres : final mean of each run, points of the unit cube
+    note    : called after each flight, with whether it is a new one
+
+    Raises StudyError where every candidate of the search failed.
+    """
     first = study.objectives[0]
-    names = [objective.name for objective in study.objectives]
-    table = tables.candidates(store, names)
-    whole = tables.whole_flights(table, study.search.flights == "growing")
-    if study.limits:
-        whole = whole.assign(**{EXCESS: _excess(study, store, whole)})
-    sound = tables.best_first(whole, first.name, first.maximise)
-    if not len(sound):
-        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
-        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
-    points, origins = finalists(study, store, executor, sound, centres, note)
-    n = study.whole("final_seeds")
-    fresh = [study.seed(1, j) for j in range(n)]
-    rows = evaluate(study, store, executor, FINAL, points, note, seeds=[fresh] * len(points))
-    if study.whole("again"):
-        rows, i = flown_again(study, store, executor, points, rows, note)
-    else:
-        i = _winner(study, rows, excess_of(study, store, FINAL) if study.limits else None)
+    table = tables.candidates(store, [objective.name for objective in study.objectives])
+    sound = _sound_candidates(study, store, table, folder)
+    evaluator = Evaluator(study, store, executor, note)
+    points, origins = finalists(evaluator, sound, centres)
+    rows, i = _fly_finalists(evaluator, points)
     winner = study.space.parameters(points[i])
-    others = [[study.seed(2, j) for j in range(n)]]
-    evaluate(study, store, executor, SCORE, points[i : i + 1], note, seeds=others)
+    unbiased = [study.seed(2, j) for j in range(study.whole("final_seeds"))]
+    evaluator.evaluate(SCORE, points[i : i + 1], seeds=[unbiased])
     flown = store.flown(SCORE)
     values, each = _scored(study, flown)
     mean, sd, low, high = interval(values)
-    if study.limits and (sound[EXCESS] == 0.0).any():
-        sound = sound[sound[EXCESS] == 0.0]
-    good = sound[sound[first.name] >= mean] if first.maximise else sound[sound[first.name] <= mean]
-    shown = pd.DataFrame(
-        [
-            {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
-            for origin, point, row in zip(origins, points, rows, strict=True)
-        ]
-    )
+    safe = _safe(study, sound)
+    good = _as_good(study, safe, mean)
     result = Result(
-        folder, with_parameters(study.scenario, winner), winner, mean, sd, low, high, len(values),
-        float(sound[first.name].iloc[0]), origins[i],
-        {key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys} if len(good) else {},
-        len(good), len(table), int(table[first.name].isna().sum()), shown, _dead(study, flown), each,
-        tuple(kept(study, [flown[0, r] for r in range(n * len(study.scenarios))])),
-    )  # fmt: skip
+        folder=folder,
+        scenario=with_parameters(study.scenario, winner),
+        parameters=winner,
+        fitness=mean,
+        sd=sd,
+        low=low,
+        high=high,
+        seeds=len(values),
+        largest=float(safe[first.name].iloc[0]),
+        origin=origins[i],
+        ranges={key: (float(good[key].min()), float(good[key].max())) for key in study.space.keys if len(good)},
+        above=len(good),
+        candidates=len(table),
+        failed=int(table[first.name].isna().sum()),
+        finalists=_finalist_table(study, points, origins, rows),
+        dead=_dead(study, flown),
+        scenarios=each,
+        limits=tuple(kept(study, [flown[0, r] for r in range(len(unbiased) * len(study.scenarios))])),
+    )
     write(folder / RESULT, result.document(), "What the study found; parameters and ranges in SI units.")
     if not result.dead:
         for place, name in enumerate(best_files(study)):
@@ -164,23 +164,69 @@ def conclude(
     return result
 
 
+def _sound_candidates(study: Study, store: Store, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Candidates of whole flights that did not fail, the best first; with limits also how far each is from them."""
+    first = study.objectives[0]
+    whole = tables.whole_flights(table, study.search.flights == "growing")
+    if study.limits:
+        whole = whole.assign(**{EXCESS: _excess(study, store, whole)})
+    sound = tables.best_first(whole, first.name, first.maximise)
+    if not len(sound):
+        reason = store.rows("SELECT reason FROM flight WHERE reason <> '' LIMIT 1")
+        raise StudyError(f"{folder}: every candidate failed; the first one: {reason[0][0] if reason else 'unknown'}")
+    return sound
+
+
+def _safe(study: Study, sound: pd.DataFrame) -> pd.DataFrame:
+    """Candidates that keep all limits; all of them where there are no limits, or nobody keeps them."""
+    if study.limits and (sound[EXCESS] == 0.0).any():
+        return sound[sound[EXCESS] == 0.0]
+    return sound
+
+
+def _as_good(study: Study, candidates: pd.DataFrame, fitness: float) -> pd.DataFrame:
+    """Candidates of the search that reach a fitness."""
+    first = study.objectives[0]
+    reached = candidates[first.name] >= fitness if first.maximise else candidates[first.name] <= fitness
+    return candidates[reached]
+
+
+def _fly_finalists(evaluator: Evaluator, points: NDArray[np.float64]) -> tuple[Sequence[Sequence[float | None]], int]:
+    """Fitness of each finalist on the same fresh seeds, by objective, and the index of the best."""
+    study = evaluator.study
+    fresh = [study.seed(1, j) for j in range(study.whole("final_seeds"))]
+    rows = evaluator.evaluate(FINAL, points, seeds=[fresh] * len(points))
+    if study.whole("again"):
+        return flown_again(evaluator, points, rows)
+    return rows, _winner(study, rows, excess_of(study, evaluator.store, FINAL) if study.limits else None)
+
+
+def _finalist_table(
+    study: Study, points: NDArray[np.float64], origins: Sequence[str], rows: Sequence[Sequence[float | None]]
+) -> pd.DataFrame:
+    """Finalists as a table: origin, parameters, fitness on fresh seeds."""
+    names = [objective.name for objective in study.objectives]
+    return pd.DataFrame(
+        [
+            {"origin": origin, **study.space.parameters(point), **dict(zip(names, row, strict=True))}
+            for origin, point, row in zip(origins, points, rows, strict=True)
+        ]
+    )
+
+
 def flown_again(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    points: NDArray[np.float64],
-    rows: Sequence[Sequence[float | None]],
-    note: Callable[[bool], None] | None = None,
+    evaluator: Evaluator, points: NDArray[np.float64], rows: Sequence[Sequence[float | None]]
 ) -> tuple[list[list[float | None]], int]:
     """Let the best finalists fly twice as many further seeds.
 
     Returns the fitness of all finalists, of these over all their flights, and the index of the best of these.
     """
+    study = evaluator.study
     sign, n = (1.0 if study.objectives[0].maximise else -1.0), study.whole("final_seeds")
     sound = [k for k, row in enumerate(rows) if row[0] is not None]
     best = sorted(sound, key=lambda k: -sign * float(rows[k][0] or 0.0))[: study.whole("again")]
     further = [study.seed(1, n + j) for j in range(2 * n)]
-    found = evaluate(study, store, executor, AGAIN, points[best], note, seeds=[further] * len(best))
+    found = evaluator.evaluate(AGAIN, points[best], seeds=[further] * len(best))
     both = [list(row) for row in rows]
     for k, (value,) in zip(best, found, strict=True):
         both[k] = [None if value is None else (float(rows[k][0] or 0.0) + 2.0 * value) / 3.0]
@@ -233,14 +279,10 @@ def _told(name: str, mean: float, low: float, high: float) -> dict[str, Any]:
 
 
 def finalists(
-    study: Study,
-    store: Store,
-    executor: Executor,
-    sound: pd.DataFrame,
-    centres: Sequence[NDArray[np.float64]],
-    note: Callable[[bool], None] | None = None,
+    evaluator: Evaluator, sound: pd.DataFrame, centres: Sequence[NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Points (candidate, axis) that fly again: the mean of each run, then the top of the search or its front."""
+    study, store = evaluator.study, evaluator.store
     names, top = [objective.name for objective in study.objectives], study.whole("top")
     signs = np.array([-1.0 if objective.maximise else 1.0 for objective in study.objectives])
     known = sound[sound[names].notna().all(axis=1)].drop_duplicates(list(study.space.keys))
@@ -254,7 +296,7 @@ def finalists(
         best = best[np.argsort(losses[best, 0], kind="stable")]
         chosen = best[np.unique(np.linspace(0, len(best) - 1, min(top, len(best))).round().astype(int))]
     elif study.whole("pool") > top > 0:
-        chosen = race(study, store, executor, _points(store, known), losses[:, 0], note)
+        chosen = race(evaluator, _points(store, known), losses[:, 0])
     else:
         chosen = np.arange(min(top, len(known)))
     if not len(chosen) and not centres:

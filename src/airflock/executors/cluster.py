@@ -27,7 +27,7 @@ ANSWER = 10.0  # s to wait for a scheduler
 AHEAD = 2  # flights per thread that are handed out at a time
 RETRIES = 2  # further tries of a flight that took too long
 DESERTED = 300.0  # s without a single worker after which nobody is expected to come back
-FRESH = 15.0  # s that whoever flies waits for a fresh worker process
+FRESH = 15.0  # s to wait for a fresh worker process
 LOSSES = 20  # worker processes that one flight may lose before it is held to be the cause
 Fly = Callable[[Mapping[str, float], int], tuple[Any, str, float, str]]  # as `Task.__call__`
 compiling = Lock()  # held while a worker compiles: its threads wait for the first
@@ -149,7 +149,7 @@ class Cluster:
     def _late(
         self, out: dict[Any, tuple[Flight, float]], waiting: list[Flight], tries: dict[tuple[int, int], int]
     ) -> Iterator[Landed]:
-        """Take back flights that take too long: their worker process starts anew, they fly again or fail."""
+        """Take back flights that take too long: their worker process is started again, and they fly again or fail."""
         if not self.timeout:
             return
         late = [future for future, (_, began) in out.items() if time.monotonic() - began > self.timeout]
@@ -208,7 +208,7 @@ class Task:
 @lru_cache(maxsize=8)
 def rebuild(text: str, where: str) -> Scenario:
     """Scenario from its document; made once in a worker process."""
-    # its law has run where the study began: whoever began it has consented
+    # its law has run where the study began: the user who began it has consented
     return make(json.loads(text), where, folder=Path(where).parent, trust=True)
 
 

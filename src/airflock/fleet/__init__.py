@@ -1,1 +1,1 @@
-"""Layer 5: fleets in software: vehicles that speak MAVLink, the ether between them, and a clock for all."""
+"""Fleets in software: vehicles that speak MAVLink, the ether between them, and a clock for all."""

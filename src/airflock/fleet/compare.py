@@ -117,7 +117,7 @@ def departure(
 ) -> Departure:  # fmt: skip
     """How fast a fleet leaves the simulated flight of its seed, and the simulation itself after nudges.
 
-    A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges is told.
+    A nudge moves each agent at the start by 1 cm in a direction of its own; the largest of eight nudges counts.
     """
     scenario, dims, n = fleet.scenario, fleet.scenario.dimensions, fleet.scenario.agents
     states = first_states(scenario, fleet.seed)

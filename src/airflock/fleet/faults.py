@@ -1,11 +1,12 @@
 """Faults of a fleet: what goes wrong, for whom, and when; read from TOML, checked at once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from airflock.errors import ScenarioError
+from airflock.spelling import meant
 from airflock.untrusted import from_outside, read_toml
 
 WHOLE_FLIGHT = "from the start of the flight on"
@@ -46,7 +47,16 @@ class Fault:
 
     def holds(self, who: int, now: float) -> bool:
         """Whether it holds for a drone at a time, s."""
-        return (not self.who or who in self.who) and self.begin - 1e-9 <= now < self.end - 1e-9
+        return self.befalls(who) and self.begin - 1e-9 <= now < self.end - 1e-9
+
+    def befalls(self, who: int) -> bool:
+        """Whether it holds for a drone at some time."""
+        return not self.who or who in self.who
+
+
+def clock_error(faults: Sequence[Fault], who: int) -> int:
+    """By how much the clock of a node is ahead from the start of the flight on, µs."""
+    return sum(round(fault.amount * 1e6) for fault in faults if fault.kind == "clock" and fault.befalls(who))
 
 
 def read_faults(path: Path, members: tuple[int, ...]) -> tuple[Fault, ...]:
@@ -71,8 +81,7 @@ def _fault(table: Any, members: tuple[int, ...]) -> tuple[list[Fault], list[str]
     wrong = [f"{key} is not known; known: {', '.join(known)}" for key in table if key not in known]
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        near = get_close_matches(str(kind), KINDS, n=1)
-        wrong.append(f"kind = {kind!r} is none of {', '.join(KINDS)}{f'; did you mean {near[0]}?' if near else ''}")
+        wrong.append(f"kind = {kind!r} is none of {', '.join(KINDS)}{meant(kind, KINDS, lead='; ', cutoff=0.6)}")
     who = table.get("who", [])
     if not isinstance(who, list) or not all(w in members for w in who):
         wrong.append(f"who = {who!r}: give a list of members of {members[0]}-{members[-1]}")

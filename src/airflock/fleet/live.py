@@ -1,6 +1,6 @@
 """A fleet on the real clock: nodes, vehicles and ether that speak over UDP on this computer, each a life of its own.
 
-A node lives by the code that flies on board (`onboard.run.live`). A vehicle talks to its node, and to whoever joins:
+A node lives by the code that flies on board (`onboard.run.live`). A vehicle talks to its node and to clients that join:
 like PX4's simulator it calls at a port of its own, and a client that answers there gets everything. The ether hears
 every packet; where each vehicle is stands in memory that all share. The flight begins when every node has heard its
 vehicle, and all have hovered and heard each other for a while.
@@ -15,9 +15,9 @@ from airflock.core.agent import State
 from airflock.core.sensing import Sensing
 from airflock.fleet.dice import OuterNoise
 from airflock.fleet.ether import Ether
-from airflock.fleet.faults import Fault
+from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import records_of
-from airflock.fleet.starting import KEY, in_the_air, vehicle_of
+from airflock.fleet.starting import KEY, SINCE, in_the_air, vehicle_of
 from airflock.fleet.telemetry import MESSAGES
 from airflock.fleet.teller import Teller
 from airflock.onboard.card import Card
@@ -33,7 +33,6 @@ WARM = 1.0  # s beyond the radio's delay for which all hover before the flight b
 LOOK = 0.02  # s; least time between two looks of a vehicle at its ports
 HOP = 0.01  # s between two looks of the ether
 BEAT = 0.5  # s between two calls of a vehicle at a port where nobody has answered yet
-SINCE = 60_000_000  # µs; packets sent so long before a node began are accepted, for its clock may be wrong
 NEVER = -1e9
 
 
@@ -142,10 +141,9 @@ def node_life(plan: Plan, i: int) -> Generator[Rest, None, Life]:
     """Life of a node, from now until the end of the flight or its own."""
     card, began = plan.card, time.process_time()
     member = card.members[i]
-    ahead = sum(round(f.amount * 1e6) for f in plan.faults if f.kind == "clock" and f.holds(member, f.begin))
-    dies = min([f.begin for f in plan.faults if f.kind == "node" and f.holds(member, f.begin)], default=1e9)
+    dies = min([fault.begin for fault in plan.faults if fault.kind == "node" and fault.befalls(member)], default=1e9)
     now = time.monotonic()
-    utc = plan.utc(now) + ahead
+    utc = plan.utc(now) + clock_error(plan.faults, member)
     node = Node(card, member, KEY, now=now, utc=utc, since=utc - SINCE)
     rows: list[Any] = []
     notes: list[tuple[float, int, str]] = []

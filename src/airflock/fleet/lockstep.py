@@ -15,9 +15,9 @@ from airflock.core.agent import State
 from airflock.core.sensing import Sensing
 from airflock.fleet.dice import OuterNoise, SensorDice
 from airflock.fleet.ether import Ether
-from airflock.fleet.faults import Fault
+from airflock.fleet.faults import Fault, clock_error
 from airflock.fleet.individuals import Faults, records_of, sensors_of
-from airflock.fleet.starting import KEY, Station, in_the_air, lift_of, vehicle_of
+from airflock.fleet.starting import KEY, SINCE, Station, in_the_air, lift_of, vehicle_of
 from airflock.fleet.vehicle import SUFFERED
 from airflock.mavlink.coordinates import Geodetic
 from airflock.mavlink.orders import Do
@@ -59,13 +59,14 @@ class Fleet:
             vehicle.rates |= dict.fromkeys(("local", "global"), 1.0 / (self._tick * self._dt))
             vehicle.rates |= dict.fromkeys(UNREAD, 0.0)
         self.nodes = [
-            Node(card, who, KEY, now=0.0, utc=STARTED + self._clock_fault(who), since=STARTED - 60_000_000)
+            Node(card, who, KEY, now=0.0, utc=STARTED + clock_error(self.faults, who), since=STARTED - SINCE)
             for who in card.members
         ]  # fmt: skip
-        self._breaks = [
-            (v, own) for v in self.vehicles
-            if (own := [f for f in self.faults if f.kind in SUFFERED and (not f.who or v.system in f.who)])
-        ]  # fmt: skip
+        self._suffering = [
+            (vehicle, own)
+            for vehicle in self.vehicles
+            if (own := [fault for fault in self.faults if fault.kind in SUFFERED and fault.befalls(vehicle.system)])
+        ]
         reach = befalls.reach if befalls else None
         radio, period = (scenario.transceiver, scenario.radio), card.safety.status_period
         self.ether = Ether(*radio, card.members, seed, period, faults, reach, self._clear, card.site)
@@ -77,9 +78,6 @@ class Fleet:
         self._station = Station(card, operator)
         if start is not None:
             self._begin(start)
-
-    def _clock_fault(self, who: int) -> int:
-        return sum(round(f.amount * 1e6) for f in self.faults if f.kind == "clock" and f.holds(who, f.begin))
 
     def _begin(self, start: Sequence[State]) -> None:
         """Put all in the air, flocking, and let everybody have heard the start states as the simulator does."""
@@ -132,7 +130,8 @@ class Fleet:
             self._exchange(now)
         if self.steps % self._every == 0:
             self._keep()
-        self._break(now)
+        for vehicle, faults in self._suffering:
+            vehicle.suffer(faults, now, self._dt)
         for vehicle in self.vehicles:
             vehicle.step(now, self._dt)
         self.steps += 1
@@ -140,8 +139,8 @@ class Fleet:
     def _exchange(self, now: float) -> None:
         """Telemetry, packets and decisions of one tick."""
         if self.steps % self._every == 0:
-            self._err(self.steps // self._every)
-        dead = [self._is("node", node.member, now) for node in self.nodes]
+            self._measure(self.steps // self._every)
+        dead = [self._is_dead(node.member, now) for node in self.nodes]
         for node, vehicle, gone in zip(self.nodes, self.vehicles, dead, strict=True):
             told = vehicle.telemetry(now)
             if not gone:
@@ -165,15 +164,11 @@ class Fleet:
         a, b = (self.card.law_state(State(*place, 0.0, 0.0, 0.0)) for place in (here, there))
         return not self.card.place.blocked(*a[:3], *b[:3])
 
-    def _is(self, kind: str, who: int, now: float) -> bool:
-        return any(f.kind == kind and f.holds(who, now) for f in self.faults)
+    def _is_dead(self, who: int, now: float) -> bool:
+        """Whether a fault keeps a node from hearing and saying anything."""
+        return any(fault.kind == "node" and fault.holds(who, now) for fault in self.faults)
 
-    def _break(self, now: float) -> None:
-        """Let faults of vehicles act."""
-        for vehicle, faults in self._breaks:
-            vehicle.suffer(faults, now, self._dt)
-
-    def _err(self, number: int) -> None:
+    def _measure(self, number: int) -> None:
         """Advance the error of each drone's navigation by one period, with the simulator's numbers."""
         if not self._errs:
             return

@@ -92,7 +92,7 @@ class Observer:
     def _order(self, values: dict[str, object], now: float) -> None:
         try:
             order = order_of(values, self.card.operator) if self.card.operator else None
-        except LinkError:  # without the library no order can be checked, and none is told
+        except LinkError:  # without the library no order can be checked, and none is shown
             return
         if order is not None and order.mission == self.card.mission and order.given > self._given:
             self._given = order.given

@@ -42,26 +42,10 @@ def card_document(
     silent       : whether the rule of silence stops a drone, whatever the scenario says; by default it does, and as
                    simulated where the scenario says so
 
-    Raises CardError where the scenario has no walls, or a law of its own that is not in the package.
+    Raises CardError where the scenario has no walls, or where neighbours are seen instead of heard, or where its law
+    or its topology is not in the package.
     """
-    if scenario.world.arena == "none":
-        raise CardError([f"{scenario.name}: world.arena = 'none': a card needs walls, and a fence around them"])
-    if scenario.own_topology is not None:
-        raise CardError(
-            [f"{scenario.name}: the topology {scenario.own_topology.name} is not in the package; a card names ours"]
-        )
-    if scenario.transceiver.see is not None:
-        raise CardError(
-            [
-                f"{scenario.name}: radio.kind = {scenario.transceiver.name!r}: nodes hear each other by radio; "
-                "set radio.kind = 'constant' or another one by which they send"
-            ]
-        )
-    strange = [
-        law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.models.")
-    ]
-    if strange:
-        raise CardError([f"{scenario.name}: the law {strange[0]} is not in the package; a card names laws only"])
+    _refuse_unflyable(scenario)
     limits = replace(limits_of(scenario), **(safety or {}))
     low, high = arena.heights_of(scenario.world) if scenario.dimensions == 3 else (0.0, 0.0)
     height = max(HEIGHT, limits.base - low) if height is None else height
@@ -102,6 +86,25 @@ def card_document(
         "period": period,
         "seed": 0,
     }
+
+
+def _refuse_unflyable(scenario: Scenario) -> None:
+    """Raise a CardError where a scenario has what no card can hold."""
+    fault = ""
+    others = [law.model.name for law in scenario.laws if not law.model.decide.__module__.startswith("airflock.models.")]
+    if scenario.world.arena == "none":
+        fault = "world.arena = 'none': a card needs walls, and a fence around them"
+    elif scenario.own_topology is not None:
+        fault = f"the topology {scenario.own_topology.name} is not in the package; a card names ours"
+    elif scenario.transceiver.see is not None:
+        fault = (
+            f"radio.kind = {scenario.transceiver.name!r}: nodes hear each other by radio; "
+            "set radio.kind = 'constant' or another one by which they send"
+        )
+    elif others:
+        fault = f"the law {others[0]} is not in the package; a card names laws only"
+    if fault:
+        raise CardError([f"{scenario.name}: {fault}"])
 
 
 def _own(scenario: Scenario, records: Sequence[tuple[Any, Any]]) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
 """Fleets on the real clock: as tasks of one process, or as processes that fork from a warm parent.
 
 Processes wait behind a ready barrier: each says that it is there, and only when all have does the clock start. There
-is no time-out: a process that ends before is told in a line, and ends the fleet.
+is no time-out: a process that ends before is named in one line, and ends the fleet.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ AGAIN = 2.0  # s between two orders to start
 STARTS = 60.0  # s in which all must have armed
 HOME = 600.0  # s in which all must have landed
 LONG = 1e6  # s; longer than anybody waits
-WATCH = 0.1  # s between two looks of whoever watches
+WATCH = 0.1  # s between two looks at how the fleet is doing
 ENDED = "a process of the fleet ended with status {}"
 Begun = Generator[Rest, None, Life]
 Watching = Callable[[Callable[[], None]], Coroutine[Any, Any, None]]
@@ -159,13 +159,13 @@ def fly(
         lives += [partial(craft_life, plan, i) for i in range(len(card.members))]
         watching = partial(_watch, plan, operator, done)
         began = time.monotonic()
-        ended, all_ = asyncio.run(_tasks(plan, lives, watching)) if mode == "tasks" else _forked(plan, lives, watching)
+        ended, all_ = asyncio.run(_tasks(lives, watching)) if mode == "tasks" else _forked(lives, watching)
         return Flown(plan, ended, _load(ended, len(card.members), time.monotonic() - began, all_, mode == "tasks"))
     finally:
         ports.close()
 
 
-async def _tasks(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
+async def _tasks(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """All lives in one event loop; what is left of each, and the processor time of all, s."""
     began = time.process_time()
     async with asyncio.TaskGroup() as group:
@@ -194,7 +194,7 @@ async def together(life: Begun) -> Life:
             loop.remove_reader(port.fileno())
 
 
-def _forked(plan: Plan, lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
+def _forked(lives: Sequence[Callable[[], Begun]], watching: Watching) -> tuple[list[Life], float]:
     """Each life in a process of its own; what is left of each, and the processor time of all, s."""
     context, began = multiprocessing.get_context("fork"), time.process_time()
     dialect.common()  # once here, so that no process imports it for itself
@@ -246,7 +246,7 @@ def _alive(processes: Sequence[Any]) -> None:
 
 def _child(life: Callable[[], Begun], pipe: Any) -> None:
     """A process: says that it is ready, waits for all others, lives, and hands over what is left."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started the fleet ends it, and tells why
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the fleet, and says why
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send("ready")
     pipe.recv()

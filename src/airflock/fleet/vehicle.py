@@ -100,11 +100,11 @@ class Vehicle:
         return State(x + ex, y + ey, z + ez, vx + eu, vy + ev, vz + ew)
 
     def frame_origin(self) -> bytes:
-        """GPS_GLOBAL_ORIGIN, as it is told when it is asked for."""
+        """GPS_GLOBAL_ORIGIN, as it is sent on request."""
         return self.frame(telemetry.MESSAGES["origin"](self))
 
     def pack_state(self) -> bytes:
-        """LOCAL_POSITION_NED and what a node needs besides, now."""
+        """LOCAL_POSITION_NED and what else a node needs, now."""
         return b"".join(self.frame(telemetry.MESSAGES[name](self)) for name in ("heartbeat", "gps", "landed", "local"))
 
     @property

@@ -1,4 +1,4 @@
-"""Layer 6: from flight logs to the numbers of a scenario, with intervals and with reasons where there are none.
+"""From flight logs to the numbers of a scenario, with intervals and with reasons where there are none.
 
 The package and its public function share a verb: the module can be called (docs/decisions/0010).
 """

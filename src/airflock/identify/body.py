@@ -19,6 +19,7 @@ from scipy.stats import t as student
 
 from airflock.body import held
 from airflock.identify.body_checks import FEW, dead_time, second_tau, together
+from airflock.identify.derivatives import second_derivative
 from airflock.identify.logs import Logs
 
 NAMES = ("tau", "a_max", "noise", "white")
@@ -223,10 +224,7 @@ def _spread(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.
     curve = np.zeros((n, n))
     for i in range(n):
         for j in range(i, n):
-            curve[i, j] = curve[j, i] = (
-                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
-                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
-            ) / (4.0 * d * d)  # fmt: skip
+            curve[i, j] = curve[j, i] = second_derivative(loss, z, i, j, d)
     slopes = np.zeros((n, blocks))
     for i in range(n):
         up, down = np.zeros(blocks), np.zeros(blocks)
@@ -243,16 +241,17 @@ def _spread(loss: Any, z: NDArray[np.float64], blocks: int) -> tuple[NDArray[np.
 def _judge(found: BodyFit, logs: Logs) -> None:
     """Refuse what the log cannot tell, with the reason."""
     tau, step = found.value["tau"], logs.step
-    relative = abs(np.log(max(found.second_tau, 1e-9) / tau)) if found.second_tau == found.second_tau else np.inf
+    alone = np.isnan(found.second_tau)  # the second estimator says nothing
+    relative = np.inf if alone else abs(np.log(max(found.second_tau, 1e-9) / tau))
     width = np.log(found.interval["tau"][1] / found.interval["tau"][0]) / 3.92
     if tau < 2.0 * step:
         found.refused["tau"] = (
             f"below about two steps of the log ({2.0 * step:.3g} s): log faster, or fly velocity steps"
         )
     elif relative > max(DISAGREE, 3.0 * width):
-        told = f"{found.second_tau:.2g} s" if found.second_tau == found.second_tau else "nothing"
+        other = "nothing" if alone else f"{found.second_tau:.2g} s"
         found.refused["tau"] = (
-            f"two estimators disagree ({tau:.2g} s and {told}): set-points that the vehicle runs ahead of, "
+            f"two estimators disagree ({tau:.2g} s and {other}): set-points that the vehicle runs ahead of, "
             "or smoothed velocities; fly velocity steps, log the raw estimate"
         )
     elif width > 0.5:

@@ -4,7 +4,7 @@ import numpy as np
 
 from airflock.identify.logs import Logs
 
-FEW = 200  # rows below which nothing is told
+FEW = 200  # fewest rows for an estimate
 
 
 def second_tau(logs: Logs, tau: float, a_max: float) -> float:

@@ -1,6 +1,6 @@
 """The posterior check: flights of the identified scenario against the log, by the same measures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,7 +80,11 @@ def frames_of_logs(logs: Logs) -> tuple[Array, Array, Array]:
 def posterior(
     scenario: Scenario, logs: Logs, flights: int, done: Callable[[], None] | None = None, *, comparable: bool = True
 ) -> Check:
-    """Fly a scenario with as many agents and as long as the log, with the log's absences, and compare."""
+    """Fly a scenario with as many agents and as long as the log, with the log's absences, and compare.
+
+    flights : how many; done : called after each
+    comparable : whether the drones' clocks agree; else only speeds are compared
+    """
     times, place, speed = frames_of_logs(logs)
     keep = times <= LONGEST
     times, place, speed = times[keep], place[keep], speed[keep]
@@ -91,35 +95,45 @@ def posterior(
         "agents": logs.drones, "duration": float(times[-1]) + SETTLED + 2.0 * PERIOD, "metrics.period": PERIOD
     }  # fmt: skip
     ready = make(document, scenario.name, settings)
-    late = round(SETTLED / PERIOD)
     rows: list[dict[str, float]] = []
     courses = []
     for number in range(flights):
-        flown = simulate(ready, FIRST_SEED + number)
-        parts = [
-            flown[name]
-            .transpose("time", "space", "keypoint", "individual")
-            .values[late : late + len(times), :, 0]
-            .astype(float)
-            for name in ("position", "velocity")
-        ]
-        for part in parts:
-            part[np.broadcast_to(absent[: len(part), None], part.shape)] = np.nan
-        values, order = measured(parts[0], parts[1])
+        values, order = measured(*_flown(ready, FIRST_SEED + number, absent))
         rows.append(values)
         courses.append(order[: len(times)])
         if done is not None:
             done()
-    told = own if comparable else {"speed": own["speed"]}
+    compared = own if comparable else {"speed": own["speed"]}
     found = {}
-    for name, value in told.items():
+    for name, value in compared.items():
         drawn = np.array([row[name] for row in rows if name in row])
         if len(drawn):
             found[name] = (value, float(np.quantile(drawn, 0.025)), float(np.quantile(drawn, 0.975)))
-    band = np.full((2, len(times)), np.nan)
-    if courses:
-        drawn = np.array(courses)
-        some = np.isfinite(drawn).any(axis=0)
-        band = np.full((2, drawn.shape[1]), np.nan)
-        band[:, some] = np.nanquantile(drawn[:, some], [0.025, 0.975], axis=0)
-    return Check(found, times, course, band)
+    return Check(found, times, course, _band(courses) if courses else np.full((2, len(times)), np.nan))
+
+
+def _flown(scenario: Scenario, seed: int, absent: Any) -> list[Array]:
+    """Positions and velocities (time, axis, individual) of a flight once it has settled; nan where the log has none.
+
+    absent : (time, individual) of the log
+    """
+    late, flown = round(SETTLED / PERIOD), simulate(scenario, seed)
+    parts = [
+        flown[name]
+        .transpose("time", "space", "keypoint", "individual")
+        .values[late : late + len(absent), :, 0]
+        .astype(float)
+        for name in ("position", "velocity")
+    ]
+    for part in parts:
+        part[np.broadcast_to(absent[: len(part), None], part.shape)] = np.nan
+    return parts
+
+
+def _band(courses: Sequence[Array]) -> Array:
+    """2.5 and 97.5 % ends (2, time) of courses over time; nan where none has a value."""
+    drawn = np.array(courses)
+    some = np.isfinite(drawn).any(axis=0)
+    band = np.full((2, drawn.shape[1]), np.nan)
+    band[:, some] = np.nanquantile(drawn[:, some], [0.025, 0.975], axis=0)
+    return band

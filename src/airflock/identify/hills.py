@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from airflock.identify.derivatives import second_derivative
+
 LINKS = ("near", "far", "received_near", "received_far")
 ALIKE = 3.0  # of log-likelihood: half of a chi-square at 95 % and what the descent leaves open
 FARS = 20  # lengths of far that are tried, and from where the others are fitted:
@@ -131,7 +133,7 @@ def _end(
         else:
             near, low, there = tried, above, place
             likely.append(place)
-        if near == edge or abs(beyond - near) < CLOSE * abs(beyond - values[k]) and not math.isinf(high):
+        if near == edge or (abs(beyond - near) < CLOSE * abs(beyond - values[k]) and not math.isinf(high)):
             break
     return (near if math.isinf(high) else near + (beyond - near) * low / (low - high)), likely
 
@@ -181,12 +183,7 @@ def _logit(share: float, edge: float = 1e-5) -> float:
 def _spread(loss: Any, z: Any) -> Any:
     """Half of 95 % intervals by the curvature and the derivative of the numbers by what is fitted."""
     step, size = 0.02, len(z)
-    unit, curve = np.eye(size) * step, np.zeros((size, size))
-    for i in range(size):
-        for j in range(size):
-            curve[i, j] = (
-                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
-                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
-            ) / (4.0 * step * step)  # fmt: skip
+    curve = np.array([[second_derivative(loss, z, i, j, step) for j in range(size)] for i in range(size)])
+    unit = np.eye(size) * step
     by = np.array([(np.array(unpacked(z + u)) - np.array(unpacked(z - u))) / (2 * step) for u in unit]).T
     return 1.96 * np.sqrt(np.clip(np.diag(by @ np.linalg.pinv(curve) @ by.T), 0.0, None))

@@ -19,6 +19,7 @@ COLUMNS = ("receiver", "sender", "t", "stamp")
 # half of an interval, relative, beyond which a number is not told
 WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
+MANY = 20  # packets due in a metre of distance, above which pairs count as having flown there
 
 
 @dataclass
@@ -166,24 +167,27 @@ def fit_links(heard: pd.DataFrame, period: float, k: Any) -> RadioFit:
         for name, (low, high) in intervals(loss, other).items():
             interval[name] = min(low, interval[name][0]), max(high, interval[name][1])
     found = RadioFit(value, interval, {}, [], _pictured(due.assign(model=1.0 - curve(z))))
-    reach = float(found.bins["distance"][found.bins["due"] > 20].max()) if (found.bins["due"] > 20).any() else 0.0
-    flown = found.bins["distance"][found.bins["due"] > 20]
-    closest = float(flown.min()) if len(flown) else 0.0
-    if interval["near"][0] < closest:
-        for name in ("near", "received_near"):
-            found.refused[name] = (
-                f"nobody flew closer than {closest:.0f} m, and reception may be even only below: fly pairs"
-            )
-    if value["far"] > reach:
-        for name in ("far", "received_far"):
-            found.refused[name] = f"nobody flew farther apart than {reach:.0f} m: fly pairs to {2 * reach:.0f} m"
-    for name in LINKS:
-        half = 0.5 * (interval[name][1] - interval[name][0]) / value[name]
-        if half > WIDEST[name] and name not in found.refused:
-            found.refused[name] = (
-                f"only known to ± {half:.0%} from {len(heard)} rows: fly more, and pairs farther apart"
-            )
+    found.refused = _refused(found, len(heard))
     return found
+
+
+def _refused(fit: RadioFit, rows: int) -> dict[str, str]:
+    """Numbers of a reception curve that so many rows cannot tell, and why not."""
+    flown = fit.bins["distance"][fit.bins["due"] > MANY]
+    closest, farthest = (float(flown.min()), float(flown.max())) if len(flown) else (0.0, 0.0)
+    refused: dict[str, str] = {}
+    if fit.interval["near"][0] < closest:
+        reason = f"nobody flew closer than {closest:.0f} m, and reception may be even only below: fly pairs"
+        refused |= dict.fromkeys(("near", "received_near"), reason)
+    if fit.value["far"] > farthest:
+        reason = f"nobody flew farther apart than {farthest:.0f} m: fly pairs to {2 * farthest:.0f} m"
+        refused |= dict.fromkeys(("far", "received_far"), reason)
+    for name in LINKS:
+        low, high = fit.interval[name]
+        half = 0.5 * (high - low) / fit.value[name]
+        if half > WIDEST[name] and name not in refused:
+            refused[name] = f"only known to ± {half:.0%} from {rows} rows: fly more, and pairs farther apart"
+    return refused
 
 
 def table_of(heard: pd.DataFrame, spacing: float) -> dict[str, float]:

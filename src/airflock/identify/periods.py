@@ -4,7 +4,7 @@ import numpy as np
 
 from airflock.identify.logs import Logs
 
-FEW = 30  # changes of a command below which no period is told
+FEW = 30  # fewest changes of a command for an estimate of the period
 PLATEAU = 0.01  # share of rows within half a per cent of the largest command that make a limit
 
 

@@ -68,6 +68,37 @@ class Number:
         return min(found, 1.0) if UNITS[self.key] == "1" else found
 
 
+class Numbers:
+    """Numbers as they are identified, each beside that of the scenario that is flown by the same law."""
+
+    def __init__(self, like: Scenario):
+        self.like, self.by_key = like, dict[str, Number]()
+
+    def add(self, key: str, value: float, interval: tuple[float, float], origin: str, reason: str = "") -> None:
+        """Add a number with its interval and what it comes from; reason: why the logs cannot tell it, if so."""
+        low, high = interval
+        self.by_key[key] = Number(key, float(value), float(low), float(high), self.known(key), origin, reason)
+
+    def known(self, key: str) -> float | None:
+        """The scenario's own number; None where it has none."""
+        section, _, name = key.partition(".")
+        record = self.like.parameters if section == "model" else getattr(self.like, section)
+        value = getattr(record, name, None)
+        return None if value is None else float(value)
+
+    def refuse_out_of_range(self) -> None:
+        """Give each number that the scenario would not take the reason why."""
+        document = {key: value for key, value in self.like.document.items() if key != "published"}
+        for key, number in self.by_key.items():
+            if not number.told:
+                continue
+            try:
+                make(document, self.like.name, {key: number.value})
+            except AirflockError as fault:
+                reason = str(fault).splitlines()[0].partition(": ")[2] or str(fault)
+                self.by_key[key] = replace(number, reason=reason)
+
+
 @dataclass
 class Identified:
     """What identify found: numbers by key, notes, and the fits behind them for pictures."""
@@ -179,30 +210,25 @@ def identify(
         comparable = comparable or aligned
         findings.notes += ["clocks of the drones aligned by the ages of their packets"] * aligned
     notes = list(findings.notes)
-    numbers: dict[str, Number] = {}
-
-    def tell(key: str, value: float, interval: tuple[float, float], origin: str, reason: str = "") -> None:
-        low, high = interval
-        numbers[key] = Number(key, float(value), float(low), float(high), _like(scenario, key), origin, reason)
-
+    numbers = Numbers(scenario)
     still = sensors.fit_sensors(logs, scenario.sensors.period)
     for name in ("noise", "damping", "scale"):
         origin = f"{still.seconds:.0f} s of standing"
-        tell(f"sensors.{name}", still.value[name], still.interval[name], origin, still.refused.get(name, ""))
+        numbers.add(f"sensors.{name}", still.value[name], still.interval[name], origin, still.refused.get(name, ""))
     told = {n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")}
     moving = body.fit_body(logs, scenario.flight.dt, told["noise"] * told["damping"])
     rows = f"{moving.rows} rows, {moving.saturated} limited"
     for name in ("tau", "a_max", "noise"):
-        tell(f"body.{name}", moving.value[name], moving.interval[name], rows, moving.refused.get(name, ""))
+        numbers.add(f"body.{name}", moving.value[name], moving.interval[name], rows, moving.refused.get(name, ""))
     notes += moving.notes
     period, interval, reason = periods.decision_period(logs)
-    tell("sensors.period", period, interval, "changes of commands", reason)
-    links = _radio(heard, scenario, tell)
-    most, reason = periods.largest_command(logs, _like(scenario, "model.v_flock"))
+    numbers.add("sensors.period", period, interval, "changes of commands", reason)
+    links = _radio(heard, numbers)
+    most, reason = periods.largest_command(logs, numbers.known("model.v_flock"))
     if hasattr(scenario.parameters, "v_max"):
-        tell("model.v_max", most, (0.995 * most, most), "largest command", reason)
-    _in_range(numbers, scenario)
-    return Identified(scenario, numbers, notes, logs, moving, still, links, comparable, sources)
+        numbers.add("model.v_max", most, (0.995 * most, most), "largest command", reason)
+    numbers.refuse_out_of_range()
+    return Identified(scenario, numbers.by_key, notes, logs, moving, still, links, comparable, sources)
 
 
 def _logs(
@@ -227,32 +253,34 @@ def _on_one_clock(logs: Logs, heard: pd.DataFrame) -> tuple[Logs, bool]:
     return replace(logs, time=logs.time - own[logs.who]), True
 
 
-def _radio(heard: pd.DataFrame | None, scenario: Scenario, tell: Any) -> packets.RadioFit | None:
-    nan = float("nan")
+def _radio(heard: pd.DataFrame | None, numbers: Numbers) -> packets.RadioFit | None:
+    """Add the numbers of the radio, or why there is none; its fit, for pictures."""
+    nan, scenario = float("nan"), numbers.like
     if heard is None:
         reason = "no table of packets (--heard): neither PX4 nor ArduPilot logs them, the companion computer must"
         for name in ("delay", *LINKS):
-            tell(f"radio.{name}", nan, (nan, nan), "", reason)
+            numbers.add(f"radio.{name}", nan, (nan, nan), "", reason)
         return None
     table = packets.checked(heard)
     late = packets.fit_delay(table)
     origin = f"stamps, ± {1e3 * late.scatter:.0f} ms each"
-    tell("radio.delay", late.value, late.interval, origin, late.reason)
-    if scenario.transceiver.name == "table":
-        _table(table, scenario.radio, tell)
-        return packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
+    numbers.add("radio.delay", late.value, late.interval, origin, late.reason)
     links = packets.fit_links(table, scenario.sensors.period, packets.curve_of(scenario.radio))
+    if scenario.transceiver.name == "table":
+        _table(table, numbers)
+        return links
     lossy = scenario.transceiver.name == "links"
     for name in LINKS:
         why = links.refused.get(name, "") or (
             "" if lossy else "radio.kind of --like has no such curve: --set radio.kind=links"
         )
-        tell(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets", why)
+        numbers.add(f"radio.{name}", links.value[name], links.interval[name], f"{len(table)} packets", why)
     return links
 
 
-def _table(heard: pd.DataFrame, k: Any, tell: Any) -> None:
-    """Entries of a radio of kind "table", at the spacing that the scenario has."""
+def _table(heard: pd.DataFrame, numbers: Numbers) -> None:
+    """Add the entries of a radio of kind "table", at the spacing that the scenario has."""
+    k: Any = numbers.like.radio
     shares, errors = packets.fit_table(heard, k.spacing)
     half = norm.ppf(0.975) * errors
     for n, (share, off) in enumerate(zip(shares.tolist(), half.tolist(), strict=True)):
@@ -260,27 +288,7 @@ def _table(heard: pd.DataFrame, k: Any, tell: Any) -> None:
         wide = f"only known to ± {off:.2f}: more packets at {n * k.spacing:g} m" if off > WIDE else ""
         ends = (max(share - off, 0.0), min(share + off, 1.0))
         share = max(share, LEAST)
-        tell(f"radio.received_{n}", share, ends, f"{len(heard)} packets", near if np.isnan(off) else wide)
-
-
-def _like(scenario: Scenario, key: str) -> float | None:
-    section, _, name = key.partition(".")
-    record = scenario.parameters if section == "model" else getattr(scenario, section)
-    value = getattr(record, name, None)
-    return None if value is None else float(value)
-
-
-def _in_range(numbers: dict[str, Number], scenario: Scenario) -> None:
-    """Refuse a number that the scenario would not take."""
-    for key, number in list(numbers.items()):
-        if not number.told:
-            continue
-        try:
-            document: Mapping[str, Any] = {k: v for k, v in scenario.document.items() if k != "published"}
-            make(document, scenario.name, {key: number.value})
-        except AirflockError as fault:
-            reason = str(fault).splitlines()[0].partition(": ")[2] or str(fault)
-            numbers[key] = Number(key, number.value, number.low, number.high, number.like, number.origin, reason)
+        numbers.add(f"radio.received_{n}", share, ends, f"{len(heard)} packets", near if np.isnan(off) else wide)
 
 
 def _copied(document: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from airflock.identify.derivatives import second_derivative
 from airflock.identify.logs import Logs
 
 NAMES = ("noise", "damping", "scale", "white")
@@ -111,7 +112,7 @@ def fit_sensors(logs: Logs, period: float) -> SensorFit:
     z = np.log((half, *START, math.sqrt(half)))
     for _ in range(1 + RESTARTS):
         z = minimize(loss, z, method="Nelder-Mead", options={"maxiter": 800, "xatol": 1e-3, "fatol": 1e-2}).x
-    spread = _curvature(loss, z)
+    spread = _spread(loss, z)
     value = dict(zip(NAMES, (float(v) for v in np.exp(z)), strict=True))
     interval = {
         n: (float(np.exp(c - 1.96 * s)), float(np.exp(c + 1.96 * s))) for n, c, s in zip(NAMES, z, spread, strict=True)
@@ -137,13 +138,8 @@ def _series(ground: Logs, period: float) -> list[tuple[NDArray[np.float64], NDAr
     return found
 
 
-def _curvature(loss: Any, z: NDArray[np.float64]) -> NDArray[np.float64]:
-    d, n = 0.03, len(z)
-    unit, curve = np.eye(n) * d, np.zeros((n, n))
-    for i in range(n):
-        for j in range(n):
-            curve[i, j] = (
-                loss(z + unit[i] + unit[j]) - loss(z + unit[i] - unit[j])
-                - loss(z - unit[i] + unit[j]) + loss(z - unit[i] - unit[j])
-            ) / (4.0 * d * d)  # fmt: skip
+def _spread(loss: Any, z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard errors of log parameters, by the curvature of the likelihood."""
+    n = len(z)
+    curve = np.array([[second_derivative(loss, z, i, j, 0.03) for j in range(n)] for i in range(n)])
     return np.asarray(np.sqrt(np.clip(np.diag(np.linalg.pinv(curve)), 0.0, None)))

@@ -1,4 +1,4 @@
-"""Layer 6: which flocking law explains these tracks? Laws fitted by the likelihood of the next step, and compared.
+"""Which flocking law explains these tracks? Laws fitted by the likelihood of the next step, and compared.
 
 The package and its public function share a verb: the module can be called (docs/decisions/0010).
 """

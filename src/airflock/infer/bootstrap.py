@@ -1,4 +1,4 @@
-"""Tracks flown again: what the fitted law would have left behind, to correct the fit by and to tell how sure it is.
+"""Tracks flown again: what the fitted law would have left behind, to correct the fit and to say how sure it is.
 
 Places are seen with noise, and the slope of a law against a noisy percept is too flat; a threshold is blurred. So the
 law is flown from the same beginnings with the noise that was found, is seen with the same gaps and the same noise of
@@ -39,10 +39,10 @@ WIDER = (1.0, 3.0)  # least and largest variance of refitted numbers, in units o
 
 
 @dataclass
-class Again:
-    """What flights of the fitted law say about the fit.
+class Corrected:
+    """A fit corrected by flights of its own law, and how sure it is.
 
-    place  : of all numbers, put right
+    place  : of all numbers, corrected
     alone  : ends of 95 % intervals of each number by itself, as places; low and high
     joint  : ends of intervals that hold all numbers together in 95 %
     noise  : of the flight and of the tracks
@@ -61,10 +61,10 @@ def levels(numbers: int) -> tuple[float, float]:
     return 0.5 + 0.5 * SURE, 0.5 + 0.5 * SURE ** (1.0 / max(numbers, 1))
 
 
-def again(
+def correct(
     law: Candidate, model: Model, fit: Fit, spans: Sequence[int], say: Callable[[], None] = lambda: None
-) -> Again:
-    """Put a fit right by flights of its own law, and tell how sure it is.
+) -> Corrected:
+    """Correct a fit by flights of its own law, and find its intervals.
 
     law : with all its numbers, also those that the model does without; spans : on which it was fitted
     """
@@ -104,7 +104,7 @@ def again(
     if noise.column >= 0:
         noise, ends = _noise(flights, place, 0.5 * (found[0][1] - found[0][0]) / ONE, noise, fitted, shares)
         say()
-    return Again(place, found[0], found[1], noise, (ends[0], ends[1]))
+    return Corrected(place, found[0], found[1], noise, (ends[0], ends[1]))
 
 
 def _softened(model: Model, fit: Fit, spans: Sequence[int]) -> tuple[Model, Fit]:

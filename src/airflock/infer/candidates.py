@@ -254,7 +254,7 @@ def _noises(scenario: Scenario, plan: Plan, numbers: tuple[Number, ...]) -> tupl
 
     if not differ({}):
         return ()
-    of_law = [n for n in numbers if n.key.startswith("model.") and 0.0 in (n.low, n.default) or n.unit == "rad"]
+    of_law = [n for n in numbers if n.key.startswith("model.") and (0.0 in (n.low, n.default) or n.unit == "rad")]
     found = tuple(n for n in of_law if not differ({n.column: 0.0}))
     if not found:
         raise ScenarioError([f"{scenario.name}: its law draws noise that no single number of it switches off"])

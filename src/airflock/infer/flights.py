@@ -72,11 +72,7 @@ def flown(walk: Walk, place: tuple, kept: Array, noise: Noise, spans: Sequence[i
                     walk.now()[:axes] -= blur
                 if own_speed:
                     speed = np.linalg.norm(was[axes:], axis=0)
-                    new = usual + gains.keep * (speed - usual) + generator.normal(0.0, noise.speed, len(state))
-                    factor = np.maximum(new, 0.05 * usual) / usual
-                    now = walk.now()
-                    now[:axes] = was[:axes] + factor * tracks.nearest(now[:axes] - was[:axes])
-                    now[axes:] *= factor
+                    stretch(walk, was, next_speed(speed, gains.keep, usual, noise.speed, generator) / usual)
             enters = (state == ENTERS) | (state == ABSENT)
             walk.now()[:, enters] = kept[k][:, enters]
             if k == begin:
@@ -85,6 +81,25 @@ def flown(walk: Walk, place: tuple, kept: Array, noise: Noise, spans: Sequence[i
             noisy = walk.now()[:axes] + generator.normal(0.0, noise.seen, (axes, len(state)))
             seen[k][:, there] = noisy[:, there]
     return restated(tracks, seen)
+
+
+def next_speed(speed: Array, keep: float, usual: float, noise: float, generator: np.random.Generator) -> Array:
+    """Own speeds (individual,) a period later, m/s: they return to the usual one, and wander.
+
+    keep : share of a difference from the usual speed that is left; noise : standard deviation of a period's change
+    """
+    found: Array = usual + keep * (speed - usual) + generator.normal(0.0, noise, len(speed))
+    return np.maximum(found, 0.05 * usual)
+
+
+def stretch(walk: Walk, was: Array, factor: Array) -> None:
+    """Make the last step of each individual so many times as long, and its velocity as large.
+
+    was : (component, individual), positions and velocities before the step
+    """
+    now, axes = walk.now(), walk.axes
+    now[:axes] = was[:axes] + factor * walk.tracks.nearest(now[:axes] - was[:axes])
+    now[axes:] *= factor
 
 
 def statistics(model: Model, u: Array, spans: Sequence[int]) -> Array:

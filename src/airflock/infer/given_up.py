@@ -7,9 +7,9 @@ import numpy as np
 
 from airflock.infer.candidates import Candidate
 from airflock.infer.fit import BOTH, FINE, Fit, beside, by_powers, climb, curvature, followed
+from airflock.infer.identifiability import acts
 from airflock.infer.likelihood import Model
 from airflock.infer.ridges import View, Way
-from airflock.infer.told import acts
 
 AWAY = 0.2  # of a range: move of a number of which is asked whether the others make up for it exactly
 DROP = 12.0  # fall of the log-likelihood at which a walk ends that looks for a higher place
@@ -59,7 +59,7 @@ def ways_of(model: Model, fit: Fit, number: int, place: float, spans: Sequence[i
     """Ways on which a number leaves a place; none where that would say nothing about the others.
 
     They say nothing of a number that changes nothing; nor of one that the others make up for exactly, such as the unit
-    of all weights: no tracks could tell it, and its default is what the others are told in.
+    of all weights: no tracks could identify it, and its default is the unit of the others.
 
     model : with the number; fit : without it
     """

@@ -18,7 +18,7 @@ from airflock.infer.likelihood import Model
 Array = NDArray[np.float64]
 TOGETHER = 4  # numbers that are drawn anew together, at most
 ALIKE = 0.8  # overlap of where two numbers act, from which they are
-GROUPS = 3  # of them, those told worst first
+GROUPS = 3  # of them, the least certain first
 SHARED = 0.5  # of a group: where more of it stands in an earlier one, other groups come first
 REDRAWN = 8  # two to the power of this: places of a group that are looked at
 ALONE, ALL, WHOLE = (16, 10), (6, 16), (4, 12)  # how many climb, by how many steps: the group, all, and on all frames
@@ -112,7 +112,7 @@ def distinct(places: Sequence[Array], group: Sequence[int], known: Sequence[Arra
 
 
 def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
-    """Groups of named numbers that act on the same steps, around those that are told worst."""
+    """Groups of named numbers that act on the same steps, around those that are least certain."""
     named = [k for k in fit.free if k < model.named]
     slopes = np.abs(jacobian(model, fit.place, named, spans, here=model.differences(fit.place, spans)[0]))
     flat = np.sqrt(slopes.reshape(-1, len(named)))  # a few steps at edges would outweigh all others
@@ -131,7 +131,7 @@ def groups(model: Model, fit: Fit, spans: Sequence[int]) -> list[list[int]]:
 def by_company(groups: Sequence[list[int]]) -> list[list[int]]:
     """Groups in their order, but those that mostly stand in earlier ones last.
 
-    Else the numbers of friction, told worst, would come three times in other company, and those of a wall never.
+    Else the numbers of friction, the least certain, would come three times in other company, and those of a wall never.
     """
     first: list[list[int]] = []
     for group in groups:

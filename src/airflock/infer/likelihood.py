@@ -16,7 +16,7 @@ from airflock.infer.tracks import COUNTED, Scale, Tracks
 from airflock.infer.walk import Gains, Walk
 
 Array = NDArray[np.float64]
-SOFT = 1.345  # of a standard deviation: where nothing is wild, numbers are told 0.95 as surely (Huber 1964)
+SOFT = 1.345  # of a standard deviation: where nothing is wild, estimates are 0.95 as efficient (Huber 1964)
 LOST, TINY = 1e6, 1e-15  # m; somebody who flew off, and less than any difference
 LOOKS = 100  # at most, for a standard deviation; about six do
 # with which normal differences keep their variance: 1 over the mean of twice Huber's function
@@ -126,8 +126,8 @@ class Model:
         twin.held = frozenset({*self.held, *numbers})
         return twin
 
-    def told_by(self, numbers: Sequence[Number]) -> "Model":
-        """The same law on the same tracks, told by other numbers of it."""
+    def with_numbers(self, numbers: Sequence[Number]) -> "Model":
+        """The same law on the same tracks, of which only these numbers are fitted."""
         assert self.law is not None
         found = Model(replace(self.law, numbers=tuple(numbers)), self.tracks, self.scale)
         return found.softened() if self.soft else found
@@ -136,7 +136,7 @@ class Model:
         """The model with one more number, and its index there; law : with all its numbers, in their order."""
         assert self.law is not None
         several = [other for other in law.numbers if other in self.law.numbers or other == number]
-        return self.told_by(several), several.index(number)
+        return self.with_numbers(several), several.index(number)
 
     def missing(self, law: Candidate) -> list[Number]:
         """Numbers of the law that the model does without; law : with all its numbers."""

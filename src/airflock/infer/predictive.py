@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.flights import Noise
+from airflock.infer.flights import Noise, next_speed, stretch
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT
 
@@ -89,11 +89,8 @@ def posterior(model: Model, place: Array, noise: Noise, flights: int, say: Calla
                 walk.now()[axes:] += generator.normal(0.0, noise.law, (axes, tracks.individuals))
             walk.fly(usual)
             if own_speed:
-                speed = usual + gains.keep * (speed - usual) + generator.normal(0.0, noise.speed, len(speed))
-                speed = np.maximum(speed, 0.05 * usual)
-                now = walk.now()
-                now[:axes] = was[:axes] + speed / usual * tracks.nearest(now[:axes] - was[:axes])
-                now[axes:] *= speed / usual
+                speed = next_speed(speed, gains.keep, usual, noise.speed, generator)
+                stretch(walk, was, speed / usual)
         rows.append(measured(flown, np.broadcast_to(there[begin], (len(flown), len(speed))), tracks.nearest))
         say()
     found = {}

@@ -4,7 +4,7 @@ The numbers of a braking curve lie on a ridge of the likelihood that bends. The 
 steps alone, and a fit that is repeated from beside its end does not walk it. So it is walked: a number is moved step by
 step, all others follow, and the places on the way tell how far each of them goes. Where numbers make up for each other
 in more than one way, the ridge is a surface, and the walk of one number passes by where another could have gone. So the
-numbers that are told worst are walked each by itself, and so are those that act alike.
+least certain numbers are walked each by itself, and so are those that act alike.
 
 A number such as a largest force acts nowhere beyond some value: a plateau, to which no walk leads on. So each end of
 each range is looked at by itself, with all others following there.
@@ -21,8 +21,8 @@ from airflock.infer.likelihood import Model
 
 Array = NDArray[np.float64]
 Way = tuple[tuple[Array, float], ...]  # places, and by how much the log-likelihood has fallen there
-WORST, WALKED = 4, 8  # numbers that are told worst, and numbers that are walked, at most
-TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however well they seem to be told
+WORST, WALKED = 4, 8  # least certain numbers, and numbers that are walked, at most
+TIED = 0.9  # correlation of the slopes of two numbers, from which both are walked, however certain they seem
 NESTED = 3  # numbers that act most like the moved one, which follow before all do
 WINDOW, LOOKS = 0.05, 14  # of a range: on which one of them looks for its place alone, at least; and how often it looks
 ALIKE = 0.5  # correlation of the slopes of two numbers, from which they act alike
@@ -66,8 +66,8 @@ def ridges(
 ) -> tuple[Fit, Ridges]:
     """Ridges through a fit, or through a better one that was met on the way, down to a fall of the likelihood.
 
-    Other ends that the search has met, and places on the way to a better fit, are told with them where they are as
-    likely: each by itself, for a valley may lie between.
+    Other ends that the search has met, and places on the way to a better fit, are added where they are as likely: each
+    by itself, for a valley may lie between.
     """
     ways: list[Way] = []
     met = list(fit.others)
@@ -106,7 +106,7 @@ def _ways(model: Model, fit: Fit, spans: Sequence[int], drop: float, leave: bool
 
 
 class View:
-    """What the curvature about a fit says of the ways along its numbers; they are told by their places among the free.
+    """What the curvature about a fit says of the ways along its numbers, by their places among the free.
 
     reach : how far each goes by the curvature until the likelihood has fallen by `drop`
     alike : how much any two act alike

@@ -10,14 +10,14 @@ import xarray as xr
 
 from airflock.errors import AirflockError, RecordingError
 from airflock.infer import select
-from airflock.infer.bootstrap import again
+from airflock.infer.bootstrap import correct
 from airflock.infer.candidates import Candidate, candidate, scenarios_of
 from airflock.infer.fit import Fit
-from airflock.infer.found import Inferred, Law, Number, rivals, tell, verdict_of
-from airflock.infer.leftover import left_over
+from airflock.infer.lack_of_fit import lack_of_fit
 from airflock.infer.likelihood import Model
 from airflock.infer.maps import maps
 from airflock.infer.predictive import posterior
+from airflock.infer.result import Inferred, Law, Number, rivals, set_numbers, verdict_of
 from airflock.infer.tracks import Scale, Tracks, scale_of, tracks_of
 from airflock.recordings.files import load_recording
 from airflock.recordings.imports.load import load_tracks
@@ -99,10 +99,10 @@ def infer(
     if found.best is not None:
         best, model = found.best, by_name[found.best.name]
         teller = _teller(say, f"{best.name}, flown again")
-        sure = again(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
-        tell(found, model, sure)
+        corrected = correct(comparison.laws[best.name], model, best.fit, comparison.spans, teller)
+        set_numbers(found, model, corrected)
         if check:
-            found.check = posterior(model, sure.place, sure.noise, check, _teller(say, "check"))
+            found.check = posterior(model, corrected.place, corrected.noise, check, _teller(say, "check"))
     return found
 
 
@@ -169,7 +169,10 @@ class _Comparison:
             for k, n in enumerate(model.numbers[: model.named])
         }
         bare = fit.score.loss() + len(fit.free), self.straight.score.loss() + len(self.straight.free)
-        left, gained = left_over(model, fit.place, self.spans), max(self.straight.score.loss() - fit.score.loss(), 0.0)
+        left, gained = (
+            lack_of_fit(model, fit.place, self.spans),
+            max(self.straight.score.loss() - fit.score.loss(), 0.0),
+        )
         return Law(
             name, float(ahead.sum()), float(np.sqrt(len(ahead)) * ahead.std(ddof=1)), float((ahead > 0.0).mean()),
             0.5 * len(numbers) * math.log(max(sum(each.counted for each in model.tracks), 2)),
@@ -183,7 +186,7 @@ def _teller(say: Callable[[str], None], name: str) -> Callable[[], None]:
 
 
 def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
-    """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without being told more."""
+    """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without options."""
     several: Iterable[Any] = [what] if isinstance(what, (xr.Dataset, str, Path)) else what
     found = []
     for number, each in enumerate(several, 1):
@@ -199,7 +202,7 @@ def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
 
 
 def _read(path: Path) -> xr.Dataset:
-    """A file of tracks as it is; what import would have to be told is said as its command."""
+    """A file of tracks that import reads without options; where it needs some, the fault gives the command."""
     try:
         return load_tracks(path)
     except RecordingError as fault:

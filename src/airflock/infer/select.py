@@ -11,9 +11,9 @@ from airflock.infer.candidates import Candidate
 from airflock.infer.fit import CLIMBS, WIDE, WORSE, Fit, climb, loss_at, settle
 from airflock.infer.given_up import taken_back
 from airflock.infer.hills import hills
+from airflock.infer.identifiability import canonical, identifiable, simplify
 from airflock.infer.likelihood import Model
 from airflock.infer.search import drawn, profile, race, scan
-from airflock.infer.told import exchanged, simplify, telling
 from airflock.infer.tracks import Scale, Tracks
 
 Array = NDArray[np.float64]
@@ -60,9 +60,9 @@ def fit(
     """
     model = Model(law, tracks, scale)
     begin = drawn(model, _begin(model, gains), model.few(), seed)
-    kept = telling(model, _begin(model, gains), begin, model.few())
+    kept = identifiable(model, _begin(model, gains), begin, model.few())
     say()
-    model = model.told_by([law.numbers[k] for k in kept])
+    model = model.with_numbers([law.numbers[k] for k in kept])
     found = race(model, _begin(model, gains), begin[:, kept], free(model), model.few(), say)
     found = polish(model, found.place)
     say()
@@ -72,8 +72,9 @@ def fit(
 def regained(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
     """The fit with those numbers that were given up before the search, but explain something beside the fit.
 
-    Whether the others make up for a number is asked before the search (`telling`), at places that explain little. At
-    the fit the answer may differ. law : with all its numbers
+    Before the search, `identifiable` asks at places that explain little; at the fit the answer may differ.
+
+    law : with all its numbers
     """
     few = model.few()
     best = climb(model, found.place, found.free, few, slopes=(WIDE,))
@@ -105,8 +106,8 @@ def simpler(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -
 
 
 def first_names(law: Candidate, model: Model, found: Fit, say: Callable[[], None]) -> tuple[Model, Fit]:
-    """The fit told by the numbers that are declared first, where either of two explains the tracks."""
-    renamed, place = exchanged(law, model, found, say)
+    """The fit in terms of the numbers that are declared first, where either of two explains the tracks."""
+    renamed, place = canonical(law, model, found, say)
     return (model, found) if renamed is model else (renamed, _nearest(renamed, place, place))
 
 
@@ -117,7 +118,7 @@ def without_spare(model: Model, found: Fit, say: Callable[[], None]) -> tuple[Mo
         return model, found
     rest = [k for k in range(len(model.numbers)) if k not in gone]
     assert model.law is not None
-    without = model.told_by([n for k, n in enumerate(model.law.numbers) if k not in gone])
+    without = model.with_numbers([n for k, n in enumerate(model.law.numbers) if k not in gone])
     less = _nearest(without, place[rest], carried[rest])
     if less.loss >= found.loss + 2.0 * len(gone):
         return model, found

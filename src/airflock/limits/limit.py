@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from airflock.errors import ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.limits.bounds import per_flight, per_hour
 from airflock.metrics.registry import numbers_of, reports
 from airflock.scenarios.scenario import Scenario
@@ -92,10 +92,10 @@ def read(text: str, scenario: Scenario) -> Limit:
     if unit == "?":
         fault = "say how often: a rate /h (flock hour), /drone-h or /flight, or a share in %"
     elif often is not None and not 0.0 < often < (1.0 if unit == "flight" else math.inf):
-        told = {"in": "the share lies outside (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
-        fault = told[word]
+        ranges = {"in": "the share lies outside (0, 100 %)", "at": "the rate must be above 0, and below 1 per flight"}
+        fault = ranges[word]
     elif unit in ("h", "drone-h") and not timed:
-        unit_of, meaning = reports(scenario.measures).get(score, ("", score))
+        _, meaning = reports(scenario.measures).get(score, ("", score))
         fault = f"{meaning} has no rate per hour; give it /flight, or as '{score}{OPPOSITE[sign]}{value} in 99%'"
     elif score == "r_min" and sign in (">", ">="):
         fault = f"near is what is dangerous; give 'r_min<{value} at ...', or 'r_min>={value} in 99%'"
@@ -122,10 +122,8 @@ def read_all(texts: list[str], scenario: Scenario) -> tuple[Limit, ...]:
     faults: list[str] = []
     found = []
     for text in texts:
-        try:
+        with gathering(faults):
             found.append(read(text, scenario))
-        except ScenarioError as fault:
-            faults += fault.faults
     if not texts:
         faults.append(f"no limit is given; {EXAMPLES}")
     radii = [limit.value for limit in found if limit.score == "r_min"]

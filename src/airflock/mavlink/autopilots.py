@@ -30,7 +30,7 @@ class Guard(NamedTuple):
     """A parameter of the autopilot that must lie between two values before anything arms, and why.
 
     own    : it must be the autopilot's own system id instead
-    silent : such a time-out, s, of which is told how far the drone flies on
+    silent : a time-out, s, until which the drone flies on; `reason` says how far
     """
 
     name: str

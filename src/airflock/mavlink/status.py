@@ -48,7 +48,7 @@ class Status(NamedTuple):
 
 
 def message(status: Status, site: Site) -> Any:
-    """The dialect's message of a status; numbers beyond what it can hold are told as the largest that it can."""
+    """The dialect's message of a status; numbers beyond what it can hold are clipped."""
     at = site.geodetic(*status.position)
     exact = at.latitude * 1e7, at.longitude * 1e7, *(100.0 * v for v in turned(*status.velocity))
     lat, lon, vx, vy, vz = whole = round(exact[0]), round(exact[1]), *(_fit(v, -32767, 32767) for v in exact[2:])

@@ -18,7 +18,7 @@ from airflock.core.contract import Model
 from airflock.core.hearing import Hearing
 from airflock.core.pilot import Pilot
 from airflock.core.silence import Parameters as Silence
-from airflock.errors import AirflockError, CardError
+from airflock.errors import CardError, gathering
 from airflock.mavlink.autopilots import AUTOPILOTS, Autopilot
 from airflock.mavlink.coordinates import Site
 from airflock.onboard.fence import Fence
@@ -163,6 +163,7 @@ def card_of(document: Any, where: str = "card") -> Card:
 
 
 def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
+    """Card from a document whose keys are all there; None where something is wrong with what they hold, as noted."""
     site = numbers_in(
         d["site"],
         "site",
@@ -174,19 +175,12 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         d["radio"], "radio", {"delay": (0.0, 30.0), "forget": (0.0, 600.0)}, faults, more=("extrapolate",)
     )
     one = numbers_in({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
-    members = d["members"]
-    sound = isinstance(members, list) and all(type(m) is int and 1 <= m <= LARGEST_SYSTEM for m in members)
-    if not sound or not members:
-        faults.append(f"members = {members!r}: give system ids from 1 to {LARGEST_SYSTEM}")
-    elif len(set(members)) < len(members):
-        faults.append(f"members = {members}: a system id occurs twice")
+    members, groups, rows = d["members"], d.get("groups", []), d["shapes"]
+    corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
+    faults += _member_faults(members)
     if not isinstance(d["autopilot"], str) or d["autopilot"] not in AUTOPILOTS:
         faults.append(f"autopilot = {d['autopilot']!r} is none of {', '.join(AUTOPILOTS)}")
-    corners: Any = d["fence"].get("corners") if isinstance(d["fence"], dict) else None
-    if not is_ring(corners):
-        faults.append("fence.corners: give a list of points [east, north] in m")
-    elif polygon_fault(corners):
-        faults.append(f"fence.corners {polygon_fault(corners)}")
+    faults += _corner_faults(corners)
     operator = hexadecimal(d["operator"], faults)
     law, parameters = law_of(d["law"], faults)
     body, numbers = body_of(d["body"], faults)
@@ -195,11 +189,7 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     silence = record(Silence, d["silence"], "silence", faults)
     topology = record(topologies.Parameters, d.get("topology", {}), "topology", faults)
     safety = record(Safety, d["safety"], "safety", faults)
-    groups = d.get("groups", [])
-    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= LARGEST_SYSTEM for g in groups)
-    if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
-        faults.append(f"groups = {groups!r}: give the number of each member's group, -1 in none")
-    rows = d["shapes"]
+    faults += _group_faults(groups, members)
     if not are_shapes(rows):
         faults.append("shapes: give the tables shapes (18 numbers each), nodes (6) and links (3)")
     if faults or law is None:
@@ -214,11 +204,34 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
         autopilot=AUTOPILOTS[d["autopilot"]], model=law, parameters=parameters, body=body, body_parameters=numbers,
         own=own, groups=tuple(groups),
         place=place, hearing=Hearing(bool(d["radio"]["extrapolate"]), radio["forget"]), delay=radio["delay"],
-        silence=silence, topology=topology, safety=safety,
-        fence=Fence(corners),
+        silence=silence, topology=topology, safety=safety, fence=Fence(corners),
         low=fence["low"], high=fence["high"], height=one["height"], flat=world.dimensions == "2",
         period=one["period"], seed=int(one["seed"]), hash=str(d["hash"]), document=d,
     )  # fmt: skip
+
+
+def _member_faults(members: Any) -> list[str]:
+    """What is wrong with the list of system ids."""
+    sound = isinstance(members, list) and all(type(m) is int and 1 <= m <= LARGEST_SYSTEM for m in members)
+    if not sound or not members:
+        return [f"members = {members!r}: give system ids from 1 to {LARGEST_SYSTEM}"]
+    return [f"members = {members}: a system id occurs twice"] if len(set(members)) < len(members) else []
+
+
+def _corner_faults(corners: Any) -> list[str]:
+    """What is wrong with the corners of the fence."""
+    if not is_ring(corners):
+        return ["fence.corners: give a list of points [east, north] in m"]
+    fault = polygon_fault(corners)
+    return [f"fence.corners {fault}"] if fault else []
+
+
+def _group_faults(groups: Any, members: Any) -> list[str]:
+    """What is wrong with the numbers of the members' groups."""
+    sound = isinstance(groups, list) and all(type(g) is int and -1 <= g <= LARGEST_SYSTEM for g in groups)
+    if not sound or (groups and isinstance(members, list) and len(groups) != len(members)):
+        return [f"groups = {groups!r}: give the number of each member's group, -1 in none"]
+    return []
 
 
 def _geometry_faults(card: Card) -> list[str]:
@@ -247,10 +260,8 @@ def _geometry_faults(card: Card) -> list[str]:
     if world.edges != "open":
         faults.append(f"world.edges = {world.edges!r}: real space is open; nothing bounces or comes in again")
     for member in card.members if card.own else card.members[:1]:
-        try:
+        with gathering(faults):
             card.pilot(member)
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
     return faults
 
 

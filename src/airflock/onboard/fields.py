@@ -1,11 +1,11 @@
 """Fields of a flight card: from plain JSON to checked records, every fault noted with its key."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
 from airflock.errors import ParameterError
+from airflock.spelling import meant
 from airflock.world.shapes import COLUMNS
 
 
@@ -17,8 +17,7 @@ def record(kind: Any, table: Any, where: str, faults: list[str]) -> Any:
     known = kind.__dataclass_fields__
     for key in table:
         if key not in known:
-            near = get_close_matches(key, known, n=1)
-            faults.append(f"{where}.{key} is not known{f'; did you mean {where}.{near[0]}?' if near else ''}")
+            faults.append(f"{where}.{key} is not known{meant(key, known, lead='; ', prefix=f'{where}.', cutoff=0.6)}")
     try:
         return kind(**frozen({key: value for key, value in table.items() if key in known}))
     except ParameterError as fault:

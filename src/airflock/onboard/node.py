@@ -20,7 +20,7 @@ from airflock.onboard.limiter import STILL, Velocity, limit
 from airflock.onboard.mission import FLY, STANDING, Facts, Phase, look
 from airflock.onboard.operator import Operator
 from airflock.onboard.peers import Peers
-from airflock.onboard.situation import SLOW, Timers, facts
+from airflock.onboard.situation import SLOW, Tick, Timers, facts
 from airflock.onboard.wire import Wire
 
 EPSILON = 1e-6  # s; two clocks of a lock-step meet within it
@@ -32,7 +32,7 @@ class Memory(NamedTuple):
     """What outlives a restart: own last stamp, last stamp of each member, when the last order was given (µs)."""
 
     sent: int = 0
-    heard: dict[int, int] = {}  # noqa: RUF012
+    heard: dict[int, int] = {}  # never changed in place
     order: int = 0
 
 
@@ -173,13 +173,13 @@ class Node:
             self._goal, self.operator.held = self.operator.goal, False
         if order == Do.RESUME and self.phase != Phase.MANUAL:
             self.operator.resume = False
-        return facts(
-            self.card, self.member, self.phase, self.wire, self.peers, self.operator, self._timers, self.utc(now), now,
-            home=self.home, order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced,
-            lost_near=self.stands, twin=self._twin,
+        tick = Tick(
+            now=now, utc=self.utc(now), phase=self.phase, before=self._before, home=self.home, twin=self._twin,
+            order=order, overload=overload, overloads=self._overloads, near_fence=self._fenced, lost_near=self.stands,
             streamed_for=0.0 if self._stream_since is None else now - self._stream_since, phase_for=now - self._since,
-            time_over=self._flew_at is not None and now - self._flew_at > s.mission_time, before=self._before,
+            time_over=self._flew_at is not None and now - self._flew_at > s.mission_time,
         )  # fmt: skip
+        return facts(self.card, self.member, self.wire, self.peers, self.operator, self._timers, tick)
 
     def _goal_outside(self) -> bool:
         goal = self.operator.goal

@@ -62,7 +62,7 @@ def _place(rest: str, text: str) -> Place:
 
 
 def _resolved(host: str, port: int) -> tuple[str, int]:
-    """An address by its number: a name is looked up once, not at each packet, and a wrong one is told before."""
+    """An address by its number: a name is looked up once, before the first packet, so a wrong one is found early."""
     return socket.gethostbyname(host), port
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn, TextIO
 
 from airflock import atomic
-from airflock.errors import AirflockError, CardError, LinkError
+from airflock.errors import AirflockError, CardError, LinkError, gathering
 from airflock.mavlink.frames import Stream
 from airflock.mavlink.keys import read_key
 from airflock.onboard.card import Card, read_card
@@ -77,18 +77,14 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
     """Card, key and open ports; all faults at once."""
     faults: list[str] = []
     card, key = None, b""
-    try:
+    with gathering(faults):
         card = read_card(given.card)
         if given.member not in card.members:
             faults.append(f"--member {given.member}: the card's members are {', '.join(map(str, card.members))}")
         if time.time() >= card.expires:
             faults.append(f"{given.card}: expired at {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime(card.expires))}")
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
-    try:
+    with gathering(faults):
         key = read_key(given.key or given.card.with_suffix(".key"))
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
     if not given.i_am_the_pilot and not given.check:
         faults.append("--i-am-the-pilot is missing: somebody must hold the transmitter, know the law of the place, and "
                       "be able to take over each drone at any time")  # fmt: skip
@@ -96,10 +92,8 @@ def checked(given: argparse.Namespace) -> tuple[Card, bytes, list[Port]]:
         sys.stderr.write("airflock: note: cryptography is not installed, so no order can be checked or obeyed\n")
     ports: list[Port] = []
     for text in (given.autopilot, *given.radio):
-        try:
+        with gathering(faults):
             ports.append(open_port(text))
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
     if faults or card is None:
         for port in ports:
             port.close()
@@ -190,7 +184,7 @@ def live(
     node: Node | Logged, ports: Sequence[Port], period: float, tell: Callable[[str], None],
     until: Callable[[], bool], save: Callable[[], None] = lambda: None,
 ) -> Generator[Rest, None, Ticks]:  # fmt: skip
-    """Tick a node every `period` s on the real clock until it is told to end, and pass bytes.
+    """Tick a node every `period` s on the real clock until `until` says so, and pass bytes.
 
     What the autopilot and serial lines send is read as it comes: an own state holds when it arrives, and a line keeps
     little. Datagrams of radios tell themselves when they hold; they wait for the tick that looks at them, which spares

@@ -1,13 +1,15 @@
 """The situation: facts for the mission table from what wire, peers and operator know at one tick."""
 
-from typing import Any
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from airflock.core.agent import State
 from airflock.core.maths import norm
+from airflock.mavlink.orders import Do
 from airflock.onboard.card import Card
 from airflock.onboard.mission import FLY, Facts, Phase
 from airflock.onboard.operator import Operator
-from airflock.onboard.peers import FRESH, Peers
+from airflock.onboard.peers import FRESH, Peer, Peers
 from airflock.onboard.wire import Wire
 
 SLOW = 0.5  # m/s; faster than this a drone does not stand, nor begin to land
@@ -15,6 +17,30 @@ ALIVE = 3.0  # s; an autopilot that says nothing for longer is not there
 SILENT = "no heartbeat from the autopilot: is it on, its port and baud rate right, and does it speak MAVLink 2?"
 GATHERED = (Phase.GATHER, Phase.FLOCK, Phase.GOTO, Phase.HOLD)
 BY_MODE = frozenset({Phase.RETURN, Phase.LAND, Phase.DONE})
+
+
+class Tick(NamedTuple):
+    """What only the node itself knows at one tick; what has no line here is as in `Facts`.
+
+    now, utc : the own clock, s, and Unix time, µs
+    home     : where it armed, in its own layer, m; None before
+    twin     : whether another sender signs as this member
+    """
+
+    now: float
+    utc: int
+    phase: Phase
+    before: Phase
+    home: tuple[float, float, float] | None
+    twin: bool
+    order: Do | None
+    overload: bool
+    overloads: int
+    near_fence: bool
+    lost_near: bool
+    streamed_for: float
+    phase_for: float
+    time_over: bool
 
 
 class Timers:
@@ -121,62 +147,82 @@ def boot_fault(card: Card, member: int, wire: Wire, twin: bool) -> str:
     return f"another sender signs as member {member}: two drones with one number?" if twin else ""
 
 
-def facts(
-    card: Card, member: int, phase: Phase, wire: Wire, peers: Peers, operator: Operator, timers: Timers, utc: int,
-    now: float, **more: Any,
-) -> Facts:  # fmt: skip
-    """Everything that the mission table asks for, at one tick; `more` is what only the node knows."""
-    s, own = card.safety, wire.state
-    home: tuple[float, float, float] | None = more.pop("home")
-    age = now - wire.state_at
+def facts(card: Card, member: int, wire: Wire, peers: Peers, operator: Operator, timers: Timers, tick: Tick) -> Facts:
+    """Everything that the mission table asks for, at one tick."""
+    s, own, now, phase = card.safety, wire.state, tick.now, tick.phase
     alive = now - wire.heartbeat_at <= ALIVE
-    gnss_bad = wire.fix < 3 or wire.h_acc > s.h_acc or now - wire.jumped_at < 1.0 or wire.disagreement(now) > s.jump
     flying = peers.flying()
-    expected = min(s.peers_least, len([p for p in flying.values() if p.phase not in BY_MODE]))
-    fresh = {who: p for who, p in flying.items() if now - p.heard_at <= FRESH}
-    offset = wire.clock_offset()
-    clock_bad = (offset is not None and abs(offset) > s.clock_error) or peers.clocks_suspect()
-    way = 0.0 if own is None or home is None else apart(own, State(*home, 0.0, 0.0, 0.0))
-    battery = 100.0 if wire.battery is None else wire.battery
-    position_bad = timers("position", not age <= s.stale or not alive, now)
-    gnss_for = timers("gnss", gnss_bad, now)
-    few_for = timers("few", peers.heard(now) < expected, now)
-    deaf_for = timers("deaf", bool(flying) and not fresh, now)
-    clock_for = timers("clock", clock_bad, now)
+    fresh = {who: peer for who, peer in flying.items() if now - peer.heard_at <= FRESH}
+    expected = min(s.peers_least, len([peer for peer in flying.values() if peer.phase not in BY_MODE]))
+    position_bad = timers("position", not now - wire.state_at <= s.stale or not alive, now)
+    gnss_bad = timers("gnss", _gnss_bad(card, wire, now), now)
+    few = timers("few", peers.heard(now) < expected, now)
+    clock_bad = timers("clock", _clock_bad(card, wire, peers), now)
     out = own is not None and phase in FLY and card.outside(*own[:3]) > 0.0
-    others = [p.state for p in fresh.values() if p.state is not None]
-    neighbour_near = own is not None and any(
-        abs(other.x - own.x) < s.near and apart(own, other) < s.near  # the first spares most roots
-        for other in others
-    )
+    near = own is not None and _anybody_near(own, fresh.values(), s.near)
     operator_lost = s.operator_lost != "ignore" and now - operator.heard_at > s.operator_time
-    calm = not (position_bad or gnss_for or few_for or clock_for or neighbour_near or more["overload"])
+    calm = not (position_bad or gnss_bad or few or clock_bad or near or tick.overload)
     calm = calm and not (operator_lost and s.operator_lost == "hold")
-    told = misses(card, member, wire, peers, utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
+    missing = misses(card, member, wire, peers, tick.utc, now) if phase in (Phase.READY, Phase.CLEARED) else ()
     if timers("silent", phase == Phase.BOOT and not alive, now) > ALIVE:
-        told = (SILENT,)
+        missing = (SILENT,)
+    battery = 100.0 if wire.battery is None else wire.battery
+    way = 0.0 if own is None or tick.home is None else apart(own, State(*tick.home, 0.0, 0.0, 0.0))
     layer = card.layer(member)
-    at_home = False
-    if own is not None and home is not None:
-        over = norm(own.x - home[0], own.y - home[1], 0.0) < s.home_radius and abs(own.z - layer) < 1.0
-        at_home = over and norm(own.vx, own.vy, 0.0) < SLOW
     return Facts(
         mode_ours=wire.mode == card.autopilot.ours, mode_land=wire.mode == card.autopilot.land,
-        armed=bool(wire.armed), landed=bool(wire.landed), healthy=not (position_bad or gnss_for),
-        killed=operator.killed, resume=operator.resume, held=operator.held, position_bad_for=position_bad,
-        gnss_bad_for=gnss_for, battery_critical=battery < s.battery_critical,
+        armed=bool(wire.armed), landed=bool(wire.landed), healthy=not (position_bad or gnss_bad),
+        order=tick.order, killed=operator.killed, resume=operator.resume, held=operator.held,
+        position_bad_for=position_bad, gnss_bad_for=gnss_bad, battery_critical=battery < s.battery_critical,
         battery_home=battery < s.battery_low + s.battery_way * way * 1e-3,
-        outside_for=timers("outside", out, now), deaf_for=deaf_for, few_for=few_for, clock_bad_for=clock_for,
-        operator_lost=operator_lost, present=alive and wire.kind == card.autopilot.number and wire.armed is not None,
-        fault=boot_fault(card, member, wire, more.pop("twin")), misses=told,
-        due=operator.due(utc, s.start_step * card.members.index(member)),
+        outside_for=timers("outside", out, now), near_fence=tick.near_fence, lost_near=tick.lost_near,
+        deaf_for=timers("deaf", bool(flying) and not fresh, now), few_for=few, clock_bad_for=clock_bad,
+        operator_lost=operator_lost, overload=tick.overload, overloads=tick.overloads,
+        present=alive and wire.kind == card.autopilot.number and wire.armed is not None,
+        fault=boot_fault(card, member, wire, tick.twin), misses=missing,
+        due=operator.due(tick.utc, s.start_step * card.members.index(member)),
+        streamed_for=tick.streamed_for, phase_for=tick.phase_for,
         at_layer=own is not None and abs(own.z - layer) < 0.5, climbing=own is not None and own.vz > 0.2,
-        neighbour_near=neighbour_near,
-        gathered=phase == Phase.GATHER and own is not None and all(
-            now - p.heard_at <= FRESH and p.phase in GATHERED and p.state is not None and apart(own, p.state) < s.gather
-            for p in peers.all.values()
-        ),
-        joined=peers.joined, calm_for=timers("calm", calm, now),
-        at_home=at_home,
-        **more,
+        neighbour_near=near, gathered=phase == Phase.GATHER and _gathered(card, own, peers, now),
+        time_over=tick.time_over, joined=peers.joined, calm_for=timers("calm", calm, now),
+        at_home=own is not None and tick.home is not None and _at_home(card, own, tick.home, layer),
+        before=tick.before,
     )  # fmt: skip
+
+
+def _gnss_bad(card: Card, wire: Wire, now: float) -> bool:
+    """Whether the own position cannot be trusted: no fix, too inaccurate, it jumped, or two sources disagree."""
+    s = card.safety
+    return wire.fix < 3 or wire.h_acc > s.h_acc or now - wire.jumped_at < 1.0 or wire.disagreement(now) > s.jump
+
+
+def _clock_bad(card: Card, wire: Wire, peers: Peers) -> bool:
+    """Whether the own clock is off the autopilot's or all peers'."""
+    offset = wire.clock_offset()
+    return (offset is not None and abs(offset) > card.safety.clock_error) or peers.clocks_suspect()
+
+
+def _anybody_near(own: State, peers: Iterable[Peer], distance: float) -> bool:
+    """Whether one of these peers is nearer than a distance, m."""
+    return any(
+        abs(peer.state.x - own.x) < distance and apart(own, peer.state) < distance  # the first spares most roots
+        for peer in peers
+        if peer.state is not None
+    )
+
+
+def _gathered(card: Card, own: State | None, peers: Peers, now: float) -> bool:
+    """Whether all members have gathered around the own position."""
+    return own is not None and all(
+        now - peer.heard_at <= FRESH
+        and peer.phase in GATHERED
+        and peer.state is not None
+        and apart(own, peer.state) < card.safety.gather
+        for peer in peers.all.values()
+    )
+
+
+def _at_home(card: Card, own: State, home: tuple[float, float, float], layer: float) -> bool:
+    """Whether the drone hovers above its home in its own layer."""
+    over = norm(own.x - home[0], own.y - home[1], 0.0) < card.safety.home_radius and abs(own.z - layer) < 1.0
+    return over and norm(own.vx, own.vy, 0.0) < SLOW

@@ -1,4 +1,4 @@
-"""Layer above recordings: figures and video, without pyplot, so that threads and notebooks may draw side by side."""
+"""Figures and video, without pyplot, so that threads and notebooks may draw side by side."""
 
 from airflock.plots.convergence import convergence
 from airflock.plots.display import stood

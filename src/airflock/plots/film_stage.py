@@ -30,6 +30,7 @@ from airflock.plots.scene_paths import built, scenery
 from airflock.plots.solid import Rendering
 from airflock.recordings.scores import over_time
 from airflock.spelling import meant
+from airflock.world.place import half_sizes
 
 Array = NDArray[Any]
 TAIL_POINTS = 9
@@ -37,6 +38,7 @@ DPI = 100.0 / 720.0  # dots per inch and pixel of height: text grows with the pi
 # the outline of a dart that flies right, in units of its length
 DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
 BEHIND = 0.25  # opacity of a dart behind a building
+HEAD = 0.085  # height of title and clock, in heights of what is below them
 BESIDE = 0.62  # width of the chart beside the picture, in heights of it
 
 
@@ -59,41 +61,28 @@ class Stage:
         left, right, bottom, top = extent(first, world, self.view, margin=0.03)
         if self.solid is not None:
             left, right, bottom, top = self.solid.box
-        head = 0.085 * (top - bottom)  # for title and clock
+        head = HEAD * (top - bottom)
         aspect = float(np.clip((right - left) / (top + head - bottom), 0.4, 3.0))
         beside = BESIDE if chart else 0.0
-        self.size = (even(height * (aspect + beside)), even(height))
         share = aspect / (aspect + beside)
+        self.size = (even(height * (aspect + beside)), even(height))
         self.dart = 0.022 * max(right - left, top - bottom) * (1.0 if self.paths.agents <= 150 else 0.6)
-        dots = DPI * self.size[1]
-        figure = style.Picture((self.size[0] + 1e-3) / dots, (self.size[1] + 1e-3) / dots)
-        figure.set_dpi(dots)
-        figure.set_layout_engine("none")
-        canvas: Any = FigureCanvasAgg(figure)
-        self.canvas = canvas
-        axes = figure.add_axes((0.0, 0.0, share, 1.0))
+        self.canvas = _canvas(self.size)
+        self.axes = axes = self.canvas.figure.add_axes((0.0, 0.0, share, 1.0))
         axes.set(xlim=(left, right), ylim=(bottom, top + head), aspect="equal")
         axes.set_axis_off()
         self._stand(axes, recording, first)
-        words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
-        large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
-        small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}
-        axes.text(0.02, 0.985, name_of(recording), weight="bold", **large, **words)
-        axes.text(0.02, 0.948, details_of(recording), **small, **words)
-        axes.text(0.98, 0.948, f"{speed:g} × real time", ha="right", **small, **words)
-        mono: dict[str, Any] = {"family": "DejaVu Sans Mono", "animated": True}
-        self.clock = axes.text(0.98, 0.985, "", ha="right", **mono, **large, **words)
+        self.clock = _head(axes, recording, speed)
         self.scale = Normalize(*speed_range(first))
         self.tails = LineCollection([], linewidths=1.6, animated=True, capstyle="butt")
         edge: dict[str, Any] = {"edgecolors": "white", "linewidths": 0.5}
         self.darts = PolyCollection([], cmap=style.SPEED, norm=self.scale, animated=True, **edge)
         axes.add_collection(self.tails, autolim=False)
         axes.add_collection(self.darts, autolim=False)
-        self.axes = axes
         _key(axes, self.scale)
-        self.cursor = _chart(figure, recording, chart, share, first) if chart else None
-        canvas.draw()
-        self.still = canvas.copy_from_bbox(figure.bbox)
+        self.cursor = _chart(self.canvas.figure, recording, chart, share, first) if chart else None
+        self.canvas.draw()
+        self.still = self.canvas.copy_from_bbox(self.canvas.figure.bbox)
 
     def picture(self, instant: float) -> Array:
         """Picture at an instant (s): (row, column, red green blue alpha), 8 bits each; valid until the next one."""
@@ -149,7 +138,7 @@ class Stage:
         """Ways along each axis that lead through a periodic face, m."""
         if self.world.edges != "periodic":
             return None
-        return 0.5 * np.array([self.world.side, self.world.side, self.world.height])[: self.paths.position.shape[1]]
+        return np.array(half_sizes(self.world)[: self.paths.position.shape[1]])
 
     def _pace(self, instant: float) -> tuple[Array, Array, Array]:
         """Velocities of all agents along the picture, and their speeds, m/s."""
@@ -172,6 +161,28 @@ class Stage:
         age = (moments[1:] - instant) / self.tail
         colors[:, 3] = np.repeat(np.clip(0.6 * (1.0 + age), 0.02, 1.0), past.shape[2])
         self.tails.set_color(colors[kept])  # type: ignore[arg-type]
+
+
+def _canvas(size: tuple[int, int]) -> Any:
+    """A canvas of so many pixels (width, height), on a figure whose text grows with its height."""
+    dots = DPI * size[1]
+    figure = style.Picture((size[0] + 1e-3) / dots, (size[1] + 1e-3) / dots)
+    figure.set_dpi(dots)
+    figure.set_layout_engine("none")
+    canvas: Any = FigureCanvasAgg(figure)
+    return canvas
+
+
+def _head(axes: Any, recording: xr.Dataset, speed: float) -> Any:
+    """Title and details above the picture; returns the clock, which is drawn with what moves."""
+    words: dict[str, Any] = {"va": "top", "transform": axes.transAxes}
+    large: dict[str, Any] = {"fontsize": 12, "color": style.INK}
+    small: dict[str, Any] = {"fontsize": 9, "color": style.GREY}
+    axes.text(0.02, 0.985, name_of(recording), weight="bold", **large, **words)
+    axes.text(0.02, 0.948, details_of(recording), **small, **words)
+    axes.text(0.98, 0.948, f"{speed:g} × real time", ha="right", **small, **words)
+    mono: dict[str, Any] = {"family": "DejaVu Sans Mono", "animated": True}
+    return axes.text(0.98, 0.985, "", ha="right", **mono, **large, **words)
 
 
 def check_chart(chart: str, known: Sequence[str], whose: str) -> None:

@@ -16,6 +16,7 @@ from airflock.recordings.scores import scenario_of
 from airflock.scenarios.geometry import ground_plan
 from airflock.scenarios.scenario import Scenario
 from airflock.world import arena
+from airflock.world.place import half_sizes
 
 Array = NDArray[Any]
 
@@ -154,7 +155,7 @@ def through_face(segments: Array, world: arena.Parameters) -> Array:
     """Which segments (segment, end, axis), m, lead through a face of a periodic world to the opposite one."""
     if world.edges != "periodic":
         return np.zeros(len(segments), bool)
-    halves = np.array([0.5 * world.side, 0.5 * world.side, 0.5 * world.height])[: segments.shape[2]]
+    halves = np.array(half_sizes(world)[: segments.shape[2]])
     return np.asarray((np.abs(segments[:, 1] - segments[:, 0]) > halves).any(axis=1))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airflock.infer.found import Inferred
+from airflock.infer.result import Inferred
 from airflock.plots import style
 
 MOST = 5  # laws that are drawn

@@ -1,1 +1,1 @@
-"""Layer 3: trajectories as labelled datasets, simulated or flown, and their scores."""
+"""Trajectories as labelled datasets, simulated or flown, and their scores."""

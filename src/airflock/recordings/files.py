@@ -21,6 +21,7 @@ from airflock.scenarios.families import Given
 from airflock.scenarios.laws import given_law
 from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
+from airflock.scenarios.scenario import Scenario
 from airflock.suffixes import RECORDINGS, suffix_fault
 from airflock.untrusted import from_outside
 
@@ -128,11 +129,32 @@ def fly_again(
     trust    : whether these files may run
     Returns whether all positions have the same bits, and what differs between then and now that could explain it.
     """
-    found: dict[str, Any] = dict(recording.attrs)
     document = attributes.scenario_document(recording)
     if document is None or not attributes.whole_number(recording, "random_start", 1):
         raise RecordingError("recording: was not flown from a scenario and a seed, so it cannot be flown again")
     own = given_law(law) if law is not None else None
+    _refuse_missing_laws(recording, document, own)
+    refuse_without_files(document, settings or {})
+    document, _ = with_files(document, settings or {})
+    name = str(recording.attrs.get("airflock_name", "recording"))
+    scenario = make(document, name, given=Given(law=own), trust=trust)
+    seed = attributes.whole_number(recording, "airflock_seed")
+    precision = attributes.whole_number(recording, "airflock_precision", 32)
+    again = simulate(
+        scenario,
+        seed,
+        precision=precision,
+        device=str(recording.attrs.get("airflock_device", "cpu")),
+        events=attributes.events(recording),
+    )
+    same = again["position"].shape == recording["position"].shape and bool(
+        np.array_equal(again["position"].values, recording["position"].values, equal_nan=True)
+    )
+    return same, _differences(recording, scenario, provenance(scenario, seed, precision))
+
+
+def _refuse_missing_laws(recording: xr.Dataset, document: Mapping[str, Any], own: Any) -> None:
+    """Raise a RecordingError for a law of the user's own that the recording names, and nobody gives."""
     if own is None and attributes.flown_with_own_law(recording):
         name = document.get("model", {}).get("kind")
         raise RecordingError(
@@ -144,33 +166,21 @@ def fly_again(
             f"recording: a group was flown with a law of its own, {name!r}, which is not in the file; it can be "
             "scored and drawn, but not flown again"
         )
-    refuse_without_files(document, settings or {})
-    document, _ = with_files(document, settings or {})
-    scenario = make(document, str(found.get("airflock_name", "recording")), given=Given(law=own), trust=trust)
-    seed = attributes.whole_number(recording, "airflock_seed")
-    precision = attributes.whole_number(recording, "airflock_precision", 32)
-    again = simulate(
-        scenario,
-        seed,
-        precision=precision,
-        device=str(found.get("airflock_device", "cpu")),
-        events=attributes.events(recording),
-    )
-    now = provenance(scenario, seed, precision)
+
+
+def _differences(recording: xr.Dataset, scenario: Scenario, now: Mapping[str, Any]) -> list[str]:
+    """What could explain other bits than those of a recording; now : provenance of the flight that is compared."""
     words = {
         "airflock_version": "version of Airflock",
         "airflock_sources": "rules and driver",
         "airflock_toolchain": "compiler",
         "airflock_processor": "processor",
     }
-    now["airflock_processor"] = processor()
-    differences = [
-        f"{text}: {found.get(key)} then, {now[key]} now" for key, text in words.items() if found.get(key) != now[key]
+    then, now = recording.attrs, {**now, "airflock_processor": processor()}
+    found = [
+        f"{text}: {then.get(key)} then, {now[key]} now" for key, text in words.items() if then.get(key) != now[key]
     ]
-    noted, flown = found.get(attributes.LAW), law_hash(scenario.model)
+    noted, flown = then.get(attributes.LAW), law_hash(scenario.model)
     if noted is not None and noted != flown:
-        differences.insert(0, f"law: {noted} then, {flown} now")
-    same = again["position"].shape == recording["position"].shape and bool(
-        np.array_equal(again["position"].values, recording["position"].values, equal_nan=True)
-    )
-    return same, differences
+        found.insert(0, f"law: {noted} then, {flown} now")
+    return found

@@ -88,7 +88,7 @@ class Opening:
             self.process.stdout.close()
 
     def answer(self, done: Callable[[float], None] | None = None) -> Any:
-        """The file as an xarray Dataset, a netCDF file decoded; `done` is told the share that has been read.
+        """The file as an xarray Dataset, a netCDF file decoded; `done` is called with the share that has been read.
 
         Raises RecordingError where it is of another kind, or takes too long.
         """

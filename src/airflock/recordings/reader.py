@@ -1,8 +1,8 @@
 """A process of its own that opens one file and hands over plain arrays; run as a script by `recordings.isolated`.
 
 HDF5 is a large library in C that a damaged file can stop, crash or keep busy for ever, and it cannot be interrupted;
-readers of ArduPilot's logs go round and round in some. So they work here, on borrowed time and memory, and whoever
-asked reads plain bytes from a pipe. This file imports nothing of Airflock, so that it starts quickly.
+readers of ArduPilot's logs go round and round in some. So they work here, on borrowed time and memory, and the
+process that asked reads plain bytes from a pipe. This file imports nothing of Airflock, so that it starts quickly.
 
 Asked on standard input, one JSON object: paths (of modules), file, how (one of READ), most (bytes of all arrays),
 seconds (of a processor).

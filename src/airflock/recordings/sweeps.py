@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from airflock.errors import AirflockError, ScenarioError
+from airflock.errors import ScenarioError, gathering
 from airflock.executors.scores import scores
 from airflock.metrics.registry import numbers_of
 from airflock.scenarios.change import variant
@@ -107,11 +107,9 @@ def scenarios_at(
     faults: list[str] = []
     found = []
     for point in points:
-        try:
+        with gathering(faults):
             changed = {**(settings or {}), **point}
             found.append(variant(what, changed, law, trust=trust))
-        except AirflockError as fault:
-            faults += [line for line in str(fault).splitlines() if line not in faults]
     if faults:
         raise ScenarioError(faults)
     return found

@@ -149,7 +149,7 @@ def _page(name: str, about: dict[str, Any], data: bytes) -> str:
 
 
 def _held(frames: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[Any]:
-    """Frames in which whoever is absent stays where it was last, or where it will be first."""
+    """Frames in which an absent agent stays where it was last, or where it will be first."""
     if present.all():
         return frames
     times = np.arange(len(frames))[:, None]

@@ -1,1 +1,1 @@
-"""Layer 2: scenarios and presets: everything about a flight but the seed."""
+"""Scenarios and presets: everything about a flight but the seed."""

@@ -1,4 +1,4 @@
-"""Change: a scenario with some of its keys set anew, as a flight in the air takes it."""
+"""Change: a scenario with some of its keys changed, as a flight in the air takes it."""
 
 import os
 from collections.abc import Mapping
@@ -16,10 +16,10 @@ LASTING = {"agents": "the number of agents", "dt": "the motion step"}  # keys at
 
 
 def remade(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = False) -> Scenario:
-    """The scenario with keys set anew, checked as a whole as if it came from a file.
+    """The scenario with keys changed, checked as a whole as if it came from a file.
 
     Its law, body, sensor, radio, topology and order parameters stay those that it has where they are no names of ours,
-    unless their kind is set anew. Nothing is asked about the start of a flight that has `started`.
+    unless their kind is changed. Nothing is asked about the start of a flight that has `started`.
     Raises ScenarioError with one line per fault.
     """
     document = {**scenario.document}
@@ -69,7 +69,7 @@ def begun(scenario: Scenario, count: int, at: float) -> Scenario:
 def variant(
     what: Scenario | str | os.PathLike[str], settings: Mapping[str, Any] | None, law: Any = None, *, trust: bool = False
 ) -> Scenario:
-    """A scenario, or the one that a name or file stands for, with keys set anew; law and trust as in `load`."""
+    """A scenario, or the one that a name or file stands for, with keys changed; law and trust as in `load`."""
     if not isinstance(what, (Scenario, str, os.PathLike)):
         return loaded(what)
     if not isinstance(what, Scenario):
@@ -80,7 +80,7 @@ def variant(
 
 
 def changed(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """The scenario with keys like "model.p_rep" set anew, for a flight in the air.
+    """The scenario with keys like "model.p_rep" changed, for a flight in the air.
 
     A flight can take everything that a scenario file says but the number of agents, the dimensions, the motion step and
     the start. Raises ScenarioError with one line per fault.

@@ -148,7 +148,7 @@ def _read(name: str, folder: Path | None) -> tuple[dict[str, Any], Path]:
     known = presets()
     path = known.get(name) or (Path(name) if folder is None else folder / name)
     if not is_file(path):
-        # whoever names a file means a preset only where the names are much alike
+        # the name of a file is meant as a preset only where the two are much alike
         word, alike = (name, 0.4) if path.suffix != ".toml" else (name.removesuffix(".toml"), 0.7)
         hint = meant(word, known, "; airflock presets lists the presets", lead="; ", cutoff=alike)
         raise ScenarioError([f"{name}: no such file or preset{hint}"])

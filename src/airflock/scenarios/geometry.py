@@ -81,7 +81,7 @@ def formation_faults(world: arena.Parameters, begin: start.Parameters, agents: i
     plan = ground_plan(world)
     if plan is None:
         return []
-    margin = 0.0 if world.edges == "open" else MOST_JITTER * begin.jitter  # a face would move whoever is outside
+    margin = 0.0 if world.edges == "open" else MOST_JITTER * begin.jitter  # a face would move an agent outside
     ends = (0, max(agents - 2, 0), agents - 1)
     for agent in dict.fromkeys(range(agents) if world.arena == "polygon" else ends):
         x, y, z = FORMATIONS[begin.kind](agent, begin.spacing_x, begin.spacing_y, begin.spacing_z)

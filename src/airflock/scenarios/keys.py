@@ -78,25 +78,25 @@ class Section(NamedTuple):
 @cache
 def sections() -> Mapping[str, Section]:
     """Sections by name: the top, each model, body, sensor and radio, other sections, lists, kinds of fault."""
-    result = {TOP: _section(TOP, "at the top", "", Flight)}
+    result = {TOP: _section("at the top", "", Flight)}
     for name in MODELS:
-        result[name] = _section(name, f'model.kind = "{name}"', "model", find_model(name).Parameters, name)
+        result[name] = _section(f'model.kind = "{name}"', "model", find_model(name).Parameters, name)
     for family, members in (("body", BODIES), ("sensors", SENSORS)):
         for name, member in members.items():
-            result[name] = _section(name, f'{family}.kind = "{name}"', family, member.Parameters, name)
+            result[name] = _section(f'{family}.kind = "{name}"', family, member.Parameters, name)
     for name, record in SECTIONS.items():
         if name not in FAMILIES:
-            result[name] = _section(name, f"[{name}]", name, record)
+            result[name] = _section(f"[{name}]", name, record)
     for name, radio in OTHER_RADIOS.items():
-        found = _section(name, f'radio.kind = "{name}"', "radio", radio.Parameters, name)
+        found = _section(f'radio.kind = "{name}"', "radio", radio.Parameters, name)
         result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
     groups = "Agents that have numbers of their own of the law or the body."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
-    shared = _section("faults", "[[faults]]", "faults", Timing)
+    shared = _section("[[faults]]", "faults", Timing)
     result["faults"] = shared
     for name, kind in KINDS.items():
         about = kind.doc.strip().split("\n\n")[0].partition(": ")[2] or kind.doc
-        found = _section(name, f'[[faults]] kind = "{name}"', "faults", kind.Parameters, name)
+        found = _section(f'[[faults]] kind = "{name}"', "faults", kind.Parameters, name)
         result[name] = found._replace(about=" ".join(f"{about[:1].upper()}{about[1:]}".split()))
     return result
 
@@ -154,7 +154,7 @@ def _last(key: Key) -> str:
     return key.name.rpartition(".")[2]
 
 
-def _section(name: str, head: str, before: str, record: type, owner: str = "") -> Section:
+def _section(head: str, before: str, record: type, owner: str = "") -> Section:
     """A section of a record, behind what of it is read as a whole."""
     about = " ".join((record.__doc__ or "").strip().split("\n\n")[0].split())
     whole = () if owner else _whole(before)

@@ -53,7 +53,7 @@ def _of_entry(scenario: Scenario, entry: Entry, number: int, seed: int, world: i
             continue
         step = round(at / dt)
         gone = _leaves(kind, entry)
-        for agent in _hit(scenario, entry, number, occurrence, seed, world):
+        for agent in _hit(entry, number, occurrence, seed, world):
             yield Onset(step, kind.name, agent, lasts, numbers)
             if gone < lasts:
                 yield Onset(step + round(gone / dt), kind.name, agent, lasts, numbers, leaves=True)
@@ -75,7 +75,7 @@ def _times(scenario: Scenario, entry: Entry, number: int, seed: int, world: int)
         yield time
 
 
-def _hit(scenario: Scenario, entry: Entry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
+def _hit(entry: Entry, number: int, occurrence: int, seed: int, world: int) -> list[int]:
     """Whom an occurrence hits: all who may be, or so many of them, drawn without going back."""
     may = entry.agents
     if entry.number is None or entry.number >= len(may):

@@ -90,7 +90,7 @@ def start_fault(scenario: Scenario, given: NDArray[Any]) -> str:
 def spot_fault(scenario: Scenario, given: NDArray[Any], agents: Sequence[int]) -> str:
     """What is wrong with places (component, agent) at which these agents are to be; empty if nothing is."""
     dims = scenario.dimensions
-    if scenario.world.edges == "bounce":  # which would put whoever starts beyond a face onto it, farther than it flies
+    if scenario.world.edges == "bounce":  # which would move an agent beyond a face onto it, farther than it flies
         beyond = np.abs(np.asarray(given, float)[:dims]) - np.array(half_sizes(scenario.world)[:dims])[:, None]
         if beyond.max() > 0.0:
             agent = agents[int(beyond.max(axis=0).argmax())]

@@ -38,6 +38,33 @@ def starting_set(v_flock: float) -> str:
     >>> print(airflock.starting_set(6.0).splitlines()[8])
     v_flock = { value = 6, unit = "m/s", source = "asked for" }
     """
+    scale = max(1.0, v_flock / 8.0)
+    growth = "Table S2: grows with the speed above 8 m/s"
+    lines = [
+        f"{formats.KEY} = {formats.FORMAT}",
+        f'title = "Starting set for {v_flock:g} m/s, by the scaling rules of Vásárhelyi et al. 2018; '
+        'tune it before flying"',
+        "agents = 100",
+        'duration = { value = 600.0, unit = "s", source = "Results" }',
+        'dt = { value = 0.01, unit = "s", source = "authors\' program" }',
+        "",
+        "[model]",
+        'kind = "vasarhelyi_2018"',
+        *_gains(v_flock),
+        "",
+        "[radio]",
+        f'range = {{ value = {80.0 * scale:.4g}, unit = "m", source = "{growth}" }}',
+        "",
+        "[world]",
+        'arena = "square"',
+        f'side = {{ value = {250.0 * scale:.4g}, unit = "m", source = "{growth}" }}',
+        'walls = "nearest_per_axis"',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _gains(v_flock: float) -> list[str]:
+    """Lines of the section [model] but its kind: each number of Table S1 for a speed, m/s, with its source."""
     columns = {
         v: tomllib.loads(presets()[f"vasarhelyi_2018/{v:g}ms"].read_text(encoding="utf-8"))["model"] for v in SPEEDS
     }
@@ -57,36 +84,14 @@ def starting_set(v_flock: float) -> str:
         "p_rep": (contact / r0_rep, "keeps p_rep · r0_rep of Table S1"),
         "v_shill": (max(v_shill, 2.0 * v_flock), f"{LINEAR}, at least twice v_flock"),
     }
-    scale = max(1.0, v_flock / 8.0)
-    growth = "Table S2: grows with the speed above 8 m/s"
-    lines = [
-        f"{formats.KEY} = {formats.FORMAT}",
-        f'title = "Starting set for {v_flock:g} m/s, by the scaling rules of Vásárhelyi et al. 2018; '
-        'tune it before flying"',
-        "agents = 100",
-        'duration = { value = 600.0, unit = "s", source = "Results" }',
-        'dt = { value = 0.01, unit = "s", source = "authors\' program" }',
-        "",
-        "[model]",
-        'kind = "vasarhelyi_2018"',
-    ]
-    for key, entry in columns[4.0].items():
+    lines = []
+    for key, entry in columns[SPEEDS[0]].items():
         if isinstance(entry, dict) and "unit" in entry:
             number, source = derived.get(key) or (_between(column(key), v_flock), BETWEEN)
             lines.append(f'{key} = {{ value = {number:.4g}, unit = "{entry["unit"]}", source = "{source}" }}')
         elif isinstance(entry, dict):
             lines.append(f'{key} = "{entry["value"]}"')
-    lines += [
-        "",
-        "[radio]",
-        f'range = {{ value = {80.0 * scale:.4g}, unit = "m", source = "{growth}" }}',
-        "",
-        "[world]",
-        'arena = "square"',
-        f'side = {{ value = {250.0 * scale:.4g}, unit = "m", source = "{growth}" }}',
-        'walls = "nearest_per_axis"',
-    ]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _between(values: list[float], v: float) -> float:

@@ -5,7 +5,6 @@ and the nearest right key for a wrong one.
 """
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from math import inf, isfinite
 from numbers import Real
 from typing import Any
@@ -100,11 +99,11 @@ def _is_wrong(value: Any, declared: Declaration) -> bool:
 
 def _unknown(section: str, key: str, may: Sequence[str], kinds: Mapping[str, type]) -> str:
     """The line for a key that a section does not have; `kinds` as of `check`."""
-    near = get_close_matches(key, may, n=1, cutoff=0.5)
     of = [kind for kind, other in kinds.items() if key in {name for name, _, _ in declarations(other)}]
-    hint = f"did you mean {f'{section}.{near[0]}'.lstrip('.')}?" if near else f"known: {', '.join(may)}"
+    prefix = f"{section}." if section else ""
+    hint = meant(key, may, f"known: {', '.join(may)}", prefix=prefix)
     hint = f"it belongs to {section}.kind = {' or '.join(map(repr, of))}" if of else hint
-    return f"{f'{section}.{key}'.lstrip('.')}: unknown key; {hint}"
+    return f"{prefix}{key}: unknown key; {hint}"
 
 
 def _line(name: str, value: Any, declared: Declaration) -> str:

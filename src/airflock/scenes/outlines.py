@@ -4,7 +4,7 @@ A file is untrusted: it is read through `untrusted`, and everything that is wron
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ MOST_KEPT = 500  # of one polygon that is flown in: each decision looks along li
 ENDLESS = 1e5  # m; heights of an obstacle that has none, where others have
 LARGE = 5000.0  # m; beyond, a degree is not the same everywhere
 Ring = list[tuple[float, float]]
+Solid = tuple[str, Polygon, Mapping[str, float]]  # name, plan in m, and heights (m) of what must not be entered
 
 
 @dataclass(frozen=True)
@@ -88,20 +89,20 @@ def _features(value: Any, name: str, properties: Mapping[str, Any] | None = None
         for number, one in enumerate(_list(value.get("features"), "features")):
             yield from _features(one, f"feature {number + 1}")
     elif kind == "Feature":
-        told = value.get("properties")
-        told = told if isinstance(told, Mapping) else {}
-        yield from _features(value.get("geometry"), bounded(str(told.get("name") or name), 60), told)
+        given = value.get("properties")
+        given = given if isinstance(given, Mapping) else {}
+        yield from _features(value.get("geometry"), bounded(str(given.get("name") or name), 60), given)
     elif kind == "GeometryCollection":
         for one in _list(value.get("geometries"), "geometries"):
             yield from _features(one, name, properties)
     elif kind in ("Polygon", "MultiPolygon"):
-        given = _list(value.get("coordinates"), "coordinates")
-        for rings in [given] if kind == "Polygon" else given:
+        polygons = _list(value.get("coordinates"), "coordinates")
+        for rings in [polygons] if kind == "Polygon" else polygons:
             shell, *holes = [_ring(ring) for ring in _list(rings, "coordinates")] or [[]]
-            yield Outline(name or "polygon", shell, holes, _told_heights(properties or {}))
+            yield Outline(name or "polygon", shell, holes, _heights(properties or {}))
 
 
-def _told_heights(properties: Mapping[str, Any]) -> dict[str, float]:
+def _heights(properties: Mapping[str, Any]) -> dict[str, float]:
     """The properties floor and ceiling, m."""
     found = {key: properties[key] for key in ("floor", "ceiling") if properties.get(key) is not None}
     for key, value in found.items():
@@ -157,8 +158,7 @@ def _coordinates(boundary: Element) -> Ring:
 
 def _open(ring: Ring) -> Ring:
     """A ring without its last point, where that is the first again, and without points that are given twice."""
-    kept = [point for point, after in zip(ring, [*ring[1:], ring[0]], strict=True) if point != after] if ring else []
-    return kept
+    return [point for point, after in zip(ring, [*ring[1:], ring[0]], strict=True) if point != after] if ring else []
 
 
 def _degrees(one: Outline) -> Iterator[str]:
@@ -184,26 +184,20 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool) -
 
     shapes = [(one, local(one.shell), [local(hole) for hole in one.holes]) for one in outlines]
     arena, plan, holes = max(shapes, key=lambda shape: shape[1].area)
-    solid: list[tuple[str, Polygon, Mapping[str, float]]] = [(arena.name, hole, {}) for hole in holes]
+    solid: list[Solid] = [(arena.name, hole, {}) for hole in holes]
     solid += [(one.name, shape, one.heights) for one, shape, _ in shapes if one is not arena]
-    faults = [f"{where}: {arena.name} {fault}" for fault in _shape_faults(plan)]
-    for name, shape, _ in solid:
-        of = "a hole of " if any(shape is hole for hole in holes) else ""
-        found = list(_shape_faults(shape))
-        if not found and not faults and not plan.covers(shape):
-            found = [f"lies outside {arena.name}" if plan.disjoint(shape) else f"reaches outside {arena.name}"]
-        faults += [f"{where}: {of}{name} {fault}" for fault in found]
+    faults = [f"{where}: {fault}" for fault in _faults(arena.name, plan, holes, solid)]
     if faults:
         raise ScenarioError(faults)
     keys: dict[str, Any] = {"arena": "polygon", "corners": _corners(plan)}
     if solid:
         keys["obstacles"] = [_corners(shape) for _, shape, _ in solid]
-    told = [heights for _, _, heights in solid]
-    dropped = "" if space or not any((arena.heights, *told)) else "; its heights are left out in a plane"
+    heights = [own for _, _, own in solid]
+    dropped = "" if space or not any((arena.heights, *heights)) else "; its heights are left out in a plane"
     if space:
         keys |= arena.heights
-        if any(told):
-            keys["heights"] = [[h.get("floor", -ENDLESS), h.get("ceiling", ENDLESS)] for h in told]
+        if any(heights):
+            keys["heights"] = [[own.get("floor", -ENDLESS), own.get("ceiling", ENDLESS)] for own in heights]
     across = max(plan.bounds[2] - plan.bounds[0], plan.bounds[3] - plan.bounds[1])
     far = f"; {across / 1000.0:.3g} km are much for a flat map" if across > LARGE else ""
     note = (
@@ -211,6 +205,18 @@ def _ground(outlines: list[Outline], where: str, simplify: float, space: bool) -
         f"origin is at latitude {origin[0]:.7f}, longitude {origin[1]:.7f}{dropped}{far}"
     )
     return Ground(keys, origin, note)
+
+
+def _faults(name: str, plan: Polygon, holes: Sequence[Polygon], solid: Sequence[Solid]) -> list[str]:
+    """What is wrong with the shapes of a field: of the arena and its plan, and of what must not be entered in it."""
+    faults = [f"{name} {fault}" for fault in _shape_faults(plan)]
+    for own, shape, _ in solid:
+        of = "a hole of " if any(shape is hole for hole in holes) else ""
+        found = list(_shape_faults(shape))
+        if not found and not faults and not plan.covers(shape):
+            found = [f"lies outside {name}" if plan.disjoint(shape) else f"reaches outside {name}"]
+        faults += [f"{of}{own} {fault}" for fault in found]
+    return faults
 
 
 def _shape_faults(shape: Polygon) -> Iterator[str]:

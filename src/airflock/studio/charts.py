@@ -40,11 +40,11 @@ def told_ends(columns: tuple[NDArray[np.float64], ...]) -> dict[str, tuple[float
 
 
 class Chart:
-    """One chart of viser, whose axis is told.
+    """One chart of viser, whose axis is set.
 
     Left alone, the page scales the axis of new values by that of the last ones. A chart that was made while it was
     hidden, or drawn too slowly, has none yet, and then shows the first second for ever (viser 1.1). An axis that is
-    told is never scaled; telling it makes the picture anew, so it is done only where a round end is passed. The other
+    set is never scaled; setting it draws a new picture, so it is done only where a round end is passed. The other
     axis scales itself unless a value is not a number, with which it would end nowhere and nothing would be drawn, or
     all are the same but for rounding, at which the page looks for ticks until its memory is full.
     """

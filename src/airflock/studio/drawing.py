@@ -16,10 +16,10 @@ from airflock.studio.collisions import Collisions
 from airflock.studio.player import Player
 from airflock.studio.shading import Shading
 from airflock.studio.side import BELOW, Side
+from airflock.studio.trails import Trails
 from airflock.studio.view import View
 
 OPEN = 8.0  # s; half of what is seen of an open world is at least the way flown in this time
-PIECE = 6  # frames of one piece of a trail
 MARGIN = 20.0  # a dart of a flock of a hundred is so many times smaller than half the picture
 BROAD = 0.8  # of the half width of two sides must fit the height of a page, which is broader than high
 APART = 2.3  # half widths between the middles of two sides
@@ -78,7 +78,8 @@ class Drawing:
 
     def __init__(self, player: Player, view: View):
         self.player, self.view = player, view
-        self.shading, self.trails, self.links, self.follow = Shading(), True, LINKS[0], FOLLOWED[0]
+        self.shading, self.links, self.follow = Shading(), LINKS[0], FOLLOWED[0]
+        self.trails = Trails(view)
         self.collisions = Collisions()
         self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
         self.stand()
@@ -108,8 +109,7 @@ class Drawing:
         beside = 0.3 * wide * np.array([1.0, 0.0 if self.flat else 0.3, 0.0])  # of the panel
         share = 1.0 if len(sides) == 1 else BROAD
         view.look_at(middle + 0.5 * step * (len(sides) - 1) + beside, share * wide, self.flat)
-        self._before: NDArray[Any] | None = None
-        self._pieces = 0
+        self.trails.restart()
         self._alert = np.zeros(count, int)
         self._shown = list(sides)
 
@@ -151,8 +151,7 @@ class Drawing:
 
     def forget(self) -> None:
         """Forget trails, and collisions that lie ahead: the flight went elsewhere."""
-        self.view.no_trails()
-        self._before = None
+        self.trails.forget()
         self.collisions.back(self.player.time, len(self.player.sides))
 
     # -------------------------------------------------------------------------------------------------- frames
@@ -168,14 +167,11 @@ class Drawing:
         self.top = max(self.top, 1.3 * usual if usual > self.top else 0.0)  # a start from rest says little
         tone = self.shading.of(flocks, velocity, self.top, self.stages[0].height).tones
         self._flash(tone)
-        trail, anew = tone.copy(), False
+        trail = tone.copy()
         if chosen is not None:
             tone[chosen] = colours.CHOSEN
         self.view.move(position, turned(velocity), tone)
-        if self._before is not None and self.trails:
-            self._pieces += 1
-            anew = self._pieces % PIECE == 0
-            self.view.trail(self._from(position), position, trail, anew)
+        self.trails.draw(position, trail, lambda before: self._begin(before, position))
         there = np.concatenate([flock.side.flight.present for flock in flocks])
         if self.follow == FOLLOWED[1] and there.any():
             self.view.follow(position[there].mean(axis=0).astype(float))
@@ -183,13 +179,10 @@ class Drawing:
             self.view.follow(position[chosen].astype(float))
         links = [flock.links(self.links) for flock in flocks]
         self.view.extra("links", np.vstack([points for points, _ in links]), np.vstack([tones for _, tones in links]))
-        if self._before is None or anew:
-            self._before = position
 
-    def _from(self, position: NDArray[Any]) -> NDArray[Any]:
+    def _begin(self, before: NDArray[Any], position: NDArray[Any]) -> NDArray[Any]:
         """Where a piece of trail begins: where the agent was, or here if it went through a periodic face."""
-        assert self._before is not None
-        begin, first = self._before.copy(), 0
+        begin, first = before.copy(), 0
         for flock in self.flocks:
             part = slice(first, first + len(flock.position))
             if flock.period is not None:

@@ -12,6 +12,7 @@ from airflock.stage.scene import turned
 from airflock.stage.shades import Shade
 from airflock.studio import measures
 from airflock.studio.side import BELOW, SPACED
+from airflock.studio.trails import Trails
 from airflock.studio.view import View
 
 # phases in the air, in the order of their colours; on the ground a drone is grey
@@ -22,7 +23,6 @@ PHASES = (
 WAYS = ("phase", "speed", "heading", "height", "battery", "neighbours heard", "packet age", "fault", "drone")
 LINKS = ("packets that arrive", "three nearest", "none")
 FOLLOWED = ("nothing", "the fleet", "the selected drone")
-PIECE = 6  # frames of one piece of a trail
 MARGIN = 26.0  # darts in half the picture
 BESIDE = np.array([0.2, 0.1, 0.0])  # half widths; the panel stands there
 ONE_WAY = 225  # grey of a link on which packets arrive one way only
@@ -31,18 +31,17 @@ ONE_WAY = 225  # grey of a link on which packets arrive one way only
 class FleetDrawing:
     """The scene of a page that watches a fleet.
 
-    way, links, follow, trails : what its controls say; shown : the last shade, whose key stands on the page
+    way, links, follow : what its controls say; trails : behind the drones
+    shown : the last shade, whose key stands on the page
     """
 
     def __init__(self, observer: Observer, view: View):
         self.observer, self.view = observer, view
-        self.way, self.links, self.follow, self.trails = WAYS[0], LINKS[0], FOLLOWED[0], True
+        self.way, self.links, self.follow, self.trails = WAYS[0], LINKS[0], FOLLOWED[0], Trails(view)
         self.members = observer.card.members
         self.field = field_of(observer.card)
         self.size = self.field.span * min(1.0, (100.0 / len(self.members)) ** 0.25) / MARGIN
         self.shown = shades.of_agents(0)
-        self._before: NDArray[np.float32] | None = None
-        self._pieces = 0
         self._build()
 
     def _build(self) -> None:
@@ -62,17 +61,13 @@ class FleetDrawing:
         self.shown = self._shade(now, velocity, position)
         tone = self.shown.tones
         tone[self._silent(now)] = shades.BLANK
-        trail, done = tone.copy(), False
+        trail = tone.copy()
         if chosen is not None:
             tone[chosen] = colours.CHOSEN
         self.view.move(position, turned(velocity), tone)
-        if self._before is not None and self.trails:
-            self._pieces += 1
-            done = self._pieces % PIECE == 0
-            new = (self._before[:, 2] <= 0.5 * BELOW)[:, None]
-            self.view.trail(np.where(new, position, self._before), position, trail, done)
-        if self._before is None or done or not self.trails:
-            self._before = position
+        self.trails.draw(
+            position, trail, lambda before: np.where((before[:, 2] <= 0.5 * BELOW)[:, None], position, before)
+        )
         self._lines(now, position, known, chosen)
         if self.follow == FOLLOWED[1] and known.any():
             self.view.follow(position[known].mean(axis=0).astype(float))
@@ -82,11 +77,6 @@ class FleetDrawing:
     def places(self, now: float) -> NDArray[np.float64]:
         """Places of all members (drone, 3), m; far below who was never heard."""
         return self._motion(now)[0].astype(float)
-
-    def forget_trails(self) -> None:
-        """Draw no trails of what was flown so far."""
-        self.view.no_trails()
-        self._before = None
 
     def _motion(self, now: float) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
         """Positions and velocities (drone, 3), and who was ever heard."""

@@ -45,7 +45,7 @@ class FleetPage:
                 "links", LINKS, LINKS[0], lambda kind: setattr(drawing, "links", kind),
                 "packets that arrive: known of fleets in software; pale where they arrive one way only",
             )  # fmt: skip
-            panel.checkbox("trails", True, told=lambda on: self.ask(lambda: self._trails(on)))
+            panel.checkbox("trails", True, told=lambda on: self.ask(lambda: self.drawing.trails.show(on)))
             panel.menu("follow", FOLLOWED, FOLLOWED[0], lambda whom: setattr(drawing, "follow", whom))
             with panel.folder("Selected drone"):
                 self.about = panel.text()
@@ -116,10 +116,6 @@ class FleetPage:
         off = np.linalg.norm(away - np.maximum(away @ way, 0.0)[:, None] * way, axis=1)
         best = int(off.argmin())
         self.choose(best if off[best] < 2.0 * self.drawing.size else None)
-
-    def _trails(self, on: bool) -> None:
-        self.drawing.trails = on
-        self.drawing.forget_trails()
 
     # ---------------------------------------------------------------------------------------------------- telling
 

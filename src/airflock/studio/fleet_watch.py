@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from airflock.errors import AirflockError, CardError
+from airflock.errors import CardError, gathering
 from airflock.fleet.observer import Observer
 from airflock.fleet.teller import WATCHED
 from airflock.mavlink.frames import Stream
@@ -38,19 +38,13 @@ def opened(card: Path, key: Path | None, radios: Sequence[str]) -> tuple[Card, b
     """Card, key and open radios. Raises CardError with all faults at once, and leaves nothing open."""
     faults: list[str] = []
     found, secret, ports = None, b"", []
-    try:
+    with gathering(faults):
         found = read_card(card)
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
-    try:
+    with gathering(faults):
         secret = read_key(key or card.with_suffix(".key"))
-    except AirflockError as fault:
-        faults += str(fault).splitlines()
     for text in radios or RADIOS:
-        try:
+        with gathering(faults):
             ports.append(open_port(text))
-        except AirflockError as fault:
-            faults += str(fault).splitlines()
     if faults or found is None:
         Radios(ports).close()
         raise CardError(faults)

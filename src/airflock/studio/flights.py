@@ -29,7 +29,7 @@ class Flights:
     at_once  : fly interpreted until the driver is compiled
 
     Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls act on; note, what
-    was done last, for the page; fault, is told of everything that was refused.
+    was done last, for the page; fault, called with everything that was refused.
     """
 
     def __init__(

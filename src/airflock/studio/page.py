@@ -80,14 +80,14 @@ class Page:
         return acted
 
     def stand(self) -> None:
-        """Draw and list everything anew: the flights are others than before."""
+        """Draw and list everything again, for other flights than before."""
         self.drawing.stand()
         for room in self.rooms:
             room.stand()
         self.frame(True)
 
     def elsewhere(self) -> None:
-        """The flights are at another time: forget trails, charts, and the collisions that lie ahead."""
+        """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
         self.drawing.forget()
         if len(self.player.sides) != len(self.drawing.flocks):
             self.stand()

@@ -63,7 +63,7 @@ class Panel:
         return made
 
     def number(self, label: str, value: int, low: int, high: int, told: Callable[[int], None], hint: str = "") -> Any:
-        """A field for a whole number; a number beyond its ends is not heard: whoever leaves the field gets the end."""
+        """A field for a whole number; beyond its ends it is ignored until the field is left, then set to the end."""
         made = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
 
         @made.on_update

@@ -36,7 +36,7 @@ class Drawn(NamedTuple):
 
 
 class Perceiving:
-    """Eyes of whoever is selected; remembers the world that it looked at, and how strong each term has been."""
+    """Eyes of the selected agent; remembers the world that it looked at, and how strong each term has been."""
 
     def __init__(self) -> None:
         self._place: tuple[Scenario, Place] | None = None

@@ -39,7 +39,7 @@ class Playing(Room):
             "colour by", ways(drawing.flocks), drawing.shading.way, lambda way: setattr(drawing.shading, "way", way)
         )
         self.key = panel.text()
-        panel.checkbox("trails", drawing.trails, told=lambda on: setattr(drawing, "trails", on))
+        panel.checkbox("trails", True, told=lambda on: player.ask(lambda: drawing.trails.show(on)))
         panel.menu(
             "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
             "to the three nearest, or to all in radio range, paler where packets are lost",

@@ -8,7 +8,7 @@ Action = Callable[[], None]
 
 
 class Asked:
-    """A queue with a bell: whoever flies can wait for the next frame or for the next wish, whichever comes first."""
+    """A queue with a bell: the thread that flies waits for the next frame or the next wish, whichever comes first."""
 
     def __init__(self) -> None:
         self._actions: SimpleQueue[Action] = SimpleQueue()

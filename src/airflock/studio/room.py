@@ -18,7 +18,7 @@ class Room:
         self.panel, self.drawing = page.view.panel, page.drawing
 
     def stand(self) -> None:
-        """The flights are others than before: another one began, or a second one joined or left."""
+        """Show other flights than before: another one began, or a second one joined or left."""
 
     def chart(self) -> None:
         """Show the present moment; a few times a second."""

@@ -62,7 +62,7 @@ class Selecting(Room):
         self.choose(best if off[best] < 2.0 * self.drawing.size else None)
 
     def push(self) -> None:
-        """Push whoever is selected, at twice the flock's speed."""
+        """Push the selected agent, at twice the flock's speed."""
         if self.chosen is not None:
             side, agent = self.drawing.whose(self.chosen)
             self.player.push(agent, 2.0 * self.drawing.top / 1.5, side)
@@ -92,7 +92,7 @@ class Selecting(Room):
         self.about.content = note(drawn.words.replace("</b>", f"{where}</b>", 1))
 
     def fail(self) -> None:
-        """Let the fault that the menu names begin in whoever is selected."""
+        """Let the fault that the menu names begin in the selected agent."""
         if self.chosen is not None:
             side, agent = self.drawing.whose(self.chosen)
             self.player.sides[side].flight.fault(self.fault.value, agent, wait=False)

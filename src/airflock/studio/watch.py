@@ -39,7 +39,7 @@ def watch(
     radios   : of a fleet: where its packets are heard, such as "udp:0.0.0.0:14600" or "serial:/dev/ttyUSB0:57600";
                by default where a fleet in software is heard, udp:127.0.0.1:14600
     key      : of a fleet: file of the mission's key; by default beside the card
-    say      : is told each line: notes, the address of the page, faults
+    say      : called with each line: notes, the address of the page, faults
 
     Raises ScenarioError for a scenario that cannot be flown, CardError for card, key and radios of a fleet, and
     StudioError for a port in use, one line each.

@@ -1,4 +1,4 @@
-"""Assumed: what a tuning took for granted, as rows of its report: what the file says, and defaults that are read."""
+"""Assumptions of a tuning, as rows of its report: what the file says, and defaults that flights read."""
 
 import re
 from collections.abc import Collection, Mapping

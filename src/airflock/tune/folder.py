@@ -11,7 +11,7 @@ from airflock.evolve.steps import Measured
 from airflock.scenarios import formats
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.plan import Plan
-from airflock.tune.tuned import PLAN, START
+from airflock.tune.result import PLAN, START
 from airflock.untrusted import from_outside, json_object, read_text
 
 MOST_SEEDS = 1_000_000  # of each step of hardening

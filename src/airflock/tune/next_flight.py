@@ -1,19 +1,15 @@
 """What to do with a tuned set: watch its worst flights, and prepare the first real one."""
 
-from typing import TYPE_CHECKING
-
 from airflock.core.parameters import declarations, with_unit
 from airflock.errors import CardError
 from airflock.evolve.space import with_parameters
-
-if TYPE_CHECKING:
-    from airflock.tune.tuned import Tuned
+from airflock.tune.result import TUNED, Tuned
 
 REPLAYS = 3  # of the worst flights, at most
 SHOWN = ("speed_max", "accel", "response", "brake", "soft_margin", "base", "mission_time")  # limits that the set moves
 
 
-def replays(found: "Tuned") -> dict[int, str]:
+def replays(found: Tuned) -> dict[int, str]:
     """Seed → file beside the report that plays this flight; of the worst flights of each limit, the worst first."""
     from airflock.recordings.flights import simulate
     from airflock.replays.build import replay
@@ -29,7 +25,7 @@ def replays(found: "Tuned") -> dict[int, str]:
     return written
 
 
-def card(found: "Tuned") -> tuple[list[tuple[str, str, str]], str]:
+def card(found: Tuned) -> tuple[list[tuple[str, str, str]], str]:
     """Limits of the flight card of this set (name, value, meaning), and what to run; or no limits, and why not."""
     from airflock.fleet.prepare import card_document
 
@@ -49,5 +45,5 @@ def card(found: "Tuned") -> tuple[list[tuple[str, str, str]], str]:
         if name in safety and name in known
     ]
     rows.append(("fence", f"{fence['low']:.4g} to {fence['high']:.4g} m high", f"{len(fence['corners'])} corners"))
-    path = found.folder / "tuned.toml"
+    path = found.folder / TUNED
     return rows, f"airflock fly prepare {path} --site LAT,LON,ALT --members 1-{len(members)} --out mission.json"

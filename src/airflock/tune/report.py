@@ -4,7 +4,7 @@ import base64
 import io
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
@@ -21,9 +21,7 @@ from airflock.plots.convergence import convergence
 from airflock.scenarios.portrait import sentence
 from airflock.tune.assumed import defaults, said
 from airflock.tune.next_flight import card, replays
-
-if TYPE_CHECKING:
-    from airflock.tune.tuned import Tuned
+from airflock.tune.result import STUDY, Tuned
 
 PAGE, FIGURES = "report.html", "figures.pdf"
 STYLE = """
@@ -38,7 +36,7 @@ td.n, th.n { text-align: right } img { max-width: 100%; break-inside: avoid }
 """
 
 
-def save(found: "Tuned") -> None:
+def save(found: Tuned) -> None:
     """Write report.html, replays and figures.pdf into the folder of a tuning, each complete or not at all."""
     figures, shows = _figures(found), replays(found)
     pictures = [_png(figure) for figure in figures.values()]
@@ -50,8 +48,8 @@ def save(found: "Tuned") -> None:
     atomic.write(found.folder / FIGURES, content.getvalue())
 
 
-def _figures(found: "Tuned") -> dict[str, Figure]:
-    with Store(found.folder / "study", write=False) as store:
+def _figures(found: Tuned) -> dict[str, Figure]:
+    with Store(found.folder / STUDY, write=False) as store:
         table = tables.candidates(store, ["fitness"])
     return {
         "What the search found, generation by generation.": convergence(table, "fitness", what=found.start.name),
@@ -65,84 +63,127 @@ def _png(figure: Figure) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def page(found: "Tuned", pictures: Sequence[str], captions: Sequence[str], shows: Mapping[int, str]) -> str:
+def page(found: Tuned, pictures: Sequence[str], captions: Sequence[str], shows: Mapping[int, str]) -> str:
     """The report as one HTML text; pictures are PNGs in base64, `shows` files beside it that play flights by seed."""
-    made, known = found.certificate, declared(found.scenario)
-    before, r = declared(found.start), found.result
-    numbers = [
-        (
-            key,
-            with_unit(f"{before[key][1]:.4g}", how.unit),
-            with_unit(f"{value:.4g}", how.unit),
-            _range(r.ranges.get(key)),
-        )
-        for key, (how, value) in known.items()
-        if key in r.parameters and value is not None
-    ]
-    steps = [
-        (s.name, f"{s.fitness:.3f}", f"{s.cost[0]:.3f}", f"{s.r_min:.2f} m", f"{s.gain[0]:.2f} m", s.verdict)
-        for s in found.steps
-    ]
-    tolerances = [
-        (a["key"], with_unit(f"{a['nominal']:.4g}", a["unit"]), with_unit(f"{a['safe']:.4g}", a["unit"]),
-         f"{a['factor']:.3g}", a.get("note", ""))
-        for a in made.tolerance.get("axis", ())
-    ]  # fmt: skip
-    limits, to_run = card(found)
-    verdict = "All limits are shown." if made.shown else "Not all limits are shown."
-    scenario = found.scenario
     body = [
-        f"<h1>{escape(str(found.start.document.get('title') or found.start.name))}</h1>",
-        f"<p>{escape(sentence(found.start))}. Airflock {__version__}.</p>",
-        f'<p class="verdict{"" if made.shown else " no"}">{verdict}</p>',
-        _list(made.statements),
-        "<h2>What was assumed</h2>",
-        _table(("key", "value", "source"), [*said(found.start, r.parameters), *defaults(found.start)]),
-        _list([*found.notes, *found.start.notes]),
+        *_summary(found),
+        *_assumed(found),
         *_identified(found.identified),
-        "<h2>What was found</h2>",
-        f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
-        f"{r.candidates:,} candidates.</p>",
-        _list([told(entry) for entry in r.limits]),
-        _table(("number", "start", "tuned", "working range of the search"), numbers),
-        "<h2>What hardening cost and gained</h2>",
-        _table(("step", "fitness", "cost", "r_min", "gain", "verdict"), steps)
-        if steps
-        else f"<p>Not hardened: {escape(found.why)}</p>",
-        "<h2>Certificate</h2>",
-        made._repr_html_(),
-        _list(
-            [
-                f"{made.campaign.limits[i].event} over the time of a flight: {h.verdict}"
-                for i, h in made.hazards.items()
-                if h.events
-            ]
-        ),
-        "<h2>How far numbers may move</h2>",
-        _table(("number", "nominal", "safe to", "factor", ""), tolerances)
-        if tolerances
-        else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
-        "<h2>Worst flights</h2>",
-        _table(("limit", "value", "fly it again", ""), [_worst(entry, shows) for entry in made.worst]),
-        "<h2>The flight card to fly next</h2>",
-        _table(("limit on board", "value", "meaning"), limits) if limits else "",
-        f"<p><code>{escape(to_run)}</code></p>" if limits else f"<p>{escape(to_run)}</p>",
+        *_searched(found),
+        *_hardened(found),
+        *_certified(found),
+        *_worst_flights(found, shows),
+        *_next_card(found),
         *(
             f'<h2>Figure {i}</h2><img alt="{escape(text)}" src="data:image/png;base64,{picture}"><p>{escape(text)}</p>'
             for i, (picture, text) in enumerate(zip(pictures, captions, strict=True), 1)
         ),
         '<h2>Signed</h2><table class="sign"><tr><td>Name, date</td><td>Signature</td></tr></table>',
     ]
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(scenario.name)}</title>'
+    title = escape(found.scenario.name)
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
     return f"{head}<style>{STYLE}</style><body>{''.join(body)}</body></html>\n"
+
+
+def _summary(found: Tuned) -> list[str]:
+    """What was tuned, and whether all limits are shown."""
+    shown, start = found.certificate.shown, found.start
+    return [
+        f"<h1>{escape(str(start.document.get('title') or start.name))}</h1>",
+        f"<p>{escape(sentence(start))}. Airflock {__version__}.</p>",
+        f'<p class="verdict{"" if shown else " no"}">{"All" if shown else "Not all"} limits are shown.</p>',
+        _list(found.certificate.statements),
+    ]
+
+
+def _assumed(found: Tuned) -> list[str]:
+    """What the tuning took for granted."""
+    return [
+        "<h2>What was assumed</h2>",
+        _table(("key", "value", "source"), [*said(found.start, found.result.parameters), *defaults(found.start)]),
+        _list([*found.notes, *found.start.notes]),
+    ]
+
+
+def _searched(found: Tuned) -> list[str]:
+    """What the search found: fitness, limits, and each number before and after."""
+    r, before = found.result, declared(found.start)
+    rows = [
+        (
+            key,
+            with_unit(f"{before[key][1]:.4g}", how.unit),
+            with_unit(f"{value:.4g}", how.unit),
+            _range(r.ranges.get(key)),
+        )
+        for key, (how, value) in declared(found.scenario).items()
+        if key in r.parameters and value is not None
+    ]
+    return [
+        "<h2>What was found</h2>",
+        f"<p>Fitness {r.fitness:.3f} (95 % interval {r.low:.3f} to {r.high:.3f}) on {r.seeds} fresh flights, from "
+        f"{r.candidates:,} candidates.</p>",
+        _list([told(entry) for entry in r.limits]),
+        _table(("number", "start", "tuned", "working range of the search"), rows),
+    ]
+
+
+def _hardened(found: Tuned) -> list[str]:
+    """What each step of hardening cost and gained."""
+    rows = [
+        (s.name, f"{s.fitness:.3f}", f"{s.cost[0]:.3f}", f"{s.r_min:.2f} m", f"{s.gain[0]:.2f} m", s.verdict)
+        for s in found.steps
+    ]
+    heads = ("step", "fitness", "cost", "r_min", "gain", "verdict")
+    return [
+        "<h2>What hardening cost and gained</h2>",
+        _table(heads, rows) if rows else f"<p>Not hardened: {escape(found.why)}</p>",
+    ]
+
+
+def _certified(found: Tuned) -> list[str]:
+    """The certificate, and how far numbers may move."""
+    made = found.certificate
+    hazards = [
+        f"{made.campaign.limits[i].event} over the time of a flight: {hazard.verdict}"
+        for i, hazard in made.hazards.items()
+        if hazard.events
+    ]
+    rows = [
+        (a["key"], with_unit(f"{a['nominal']:.4g}", a["unit"]), with_unit(f"{a['safe']:.4g}", a["unit"]),
+         f"{a['factor']:.3g}", a.get("note", ""))
+        for a in made.tolerance.get("axis", ())
+    ]  # fmt: skip
+    return [
+        "<h2>Certificate</h2>",
+        made._repr_html_(),
+        _list(hazards),
+        "<h2>How far numbers may move</h2>",
+        _table(("number", "nominal", "safe to", "factor", ""), rows)
+        if rows
+        else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",
+    ]
+
+
+def _worst_flights(found: Tuned, shows: Mapping[int, str]) -> list[str]:
+    """The worst flights of each limit, with how to fly and to watch them."""
+    rows = [
+        (entry["limit"], f"{entry['value']:.4g}", entry["replay"], shows.get(int(entry["seed"]), ""))
+        for entry in found.certificate.worst
+    ]
+    return ["<h2>Worst flights</h2>", _table(("limit", "value", "fly it again", ""), rows)]
+
+
+def _next_card(found: Tuned) -> list[str]:
+    """The flight card of the first real flight."""
+    limits, to_run = card(found)
+    head = "<h2>The flight card to fly next</h2>"
+    if not limits:
+        return [head, f"<p>{escape(to_run)}</p>"]
+    return [head, _table(("limit on board", "value", "meaning"), limits), f"<p><code>{escape(to_run)}</code></p>"]
 
 
 def _range(span: tuple[float, float] | None) -> str:
     return "" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
-
-
-def _worst(entry: dict[str, Any], shows: Mapping[int, str]) -> tuple[str, str, str, str]:
-    return entry["limit"], f"{entry['value']:.4g}", entry["replay"], shows.get(int(entry["seed"]), "")
 
 
 def _identified(told: Mapping[str, Any]) -> list[str]:

@@ -13,13 +13,13 @@ from airflock.evolve.safe import flights_that_count
 from airflock.evolve.search import Watch
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
+from airflock.tune.feasible import infeasible
 from airflock.tune.folder import keep_plan, kept_plan
 from airflock.tune.logs import TOLD, FromLogs, Paths, identified
 from airflock.tune.plan import plan_of
-from airflock.tune.reach import out_of_reach
+from airflock.tune.result import Tuned
 from airflock.tune.stages import Note, certificate, hardening, rate_of, search
 from airflock.tune.start import has_walls, start_of
-from airflock.tune.tuned import Tuned
 
 STAGES = "search", "hardening", "certificate", "report"
 
@@ -107,7 +107,7 @@ def tune(
     searched = [each.text for each in asked.limits if each.rate is not None]
     if logs is not None and not (folder / TOLD).is_file():
         logs.save(folder)
-    short = out_of_reach(asked, plan)
+    short = infeasible(asked, plan)
     for line in short:
         _say(note, line)
     _say(note, STAGES[0])
@@ -116,7 +116,7 @@ def tune(
     if result.dead:
         raise StudyError(f"{mine.name}: {result.dead}")
     _say(note, STAGES[1])
-    tuned, steps, why = hardening(folder, result, plan, searched, threads, trust)
+    tuned, steps, why = hardening(folder, plan, searched, threads, trust)
     _say(note, STAGES[2])
     shown = certificate(folder, tuned, limits, confidence, plan, threads, note)
     found = Tuned(

@@ -20,12 +20,12 @@ from airflock.evolve.run import run as evolved
 from airflock.evolve.search import Watch
 from airflock.evolve.steps import Measured
 from airflock.evolve.study import make_study
-from airflock.evolve.winner import Result
+from airflock.evolve.winner import BEST, Result
 from airflock.scenarios.files import load
 from airflock.scenarios.scenario import Scenario
 from airflock.tune.folder import document, read_steps
 from airflock.tune.plan import Plan
-from airflock.tune.tuned import CERTIFICATE, STEPS, STUDY, TUNED
+from airflock.tune.result import CERTIFICATE, STEPS, STUDY, TUNED
 
 PILOT = 4  # flights per core that tell how long one takes
 Note = Callable[[str], None]
@@ -54,13 +54,13 @@ def search(
 
 
 def hardening(
-    folder: Path, result: Result, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool
+    folder: Path, plan: Plan, limits: Sequence[str], threads: int | None, trust: bool
 ) -> tuple[Scenario, list[Measured], str]:
     """The scenario after hardening, its steps, and why there are none."""
     if (folder / STEPS).is_file():
         steps, why = read_steps(folder / STEPS)
         return load(folder / TUNED, trust=trust), steps, why
-    best = load(folder / STUDY / "best.toml", trust=trust)
+    best = load(folder / STUDY / BEST, trust=trust)
     steps, why = [], ""
     try:
         steps = harden(best, range(plan.seeds), limit=limits, threads=threads)

@@ -2,13 +2,13 @@
 
 import ast
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.spelling import meant
 
 LONGEST = 300  # characters; nothing that a column needs is longer
 OPERATIONS = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
@@ -51,9 +51,8 @@ def known(tree: ast.expr, columns: Any, where: str, target: str) -> None:
     """Raise a RecordingError if an expression asks for a column that is not there."""
     for name in names(tree):
         if name not in columns:
-            near = get_close_matches(name, [str(c) for c in columns], n=1, cutoff=0.4)
             shown = ", ".join(str(c) for c in list(columns)[:12])
-            hint = f"did you mean {near[0]}?" if near else f"it has {shown}"
+            hint = meant(name, map(str, columns), f"it has {shown}", cutoff=0.4)
             raise RecordingError(f"{where}: --map {target}: no column {name}; {hint}")
 
 

@@ -25,6 +25,7 @@ from airflock.recordings.imports import (
 )
 from airflock.recordings.imports.track import (
     ACCEPTED,
+    COMMAND,
     GEODETIC,
     POSITION,
     VELOCITY,
@@ -266,38 +267,56 @@ def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, f
     if origin is None and placed:
         origin = placed[0].origin
     for track in geodetic:
-        lat, lon = track.columns["lat"], track.columns["lon"]
-        height = track.columns.get("alt", np.zeros(len(lat)))
-        bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
-        if bad.size:
-            name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
-            findings.fault(
-                f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
-                f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
-            )
-            continue
-        if not len(lat):
-            continue
-        if origin is None:
-            origin = (float(lat[0]), float(lon[0]), float(height[0]))
-            findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
-        local = geodesy.enu(lat, lon, height, origin)
-        track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
-        flat = "alt" not in track.labels
-        track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[: 2 if flat else 3])}
-        track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
-        track.origin = origin
+        fault = _degrees_fault(track)
+        if fault:
+            findings.fault(fault)
+        elif len(track.columns["lat"]):
+            if origin is None:
+                origin = _first_fix(track)
+                findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
+            _project(track, origin)
     for track in placed:
-        assert origin is not None and track.origin is not None
-        if track.origin == origin:
-            continue
-        for names, change in (
-            (POSITION, geodesy.moved),
-            (VELOCITY, geodesy.turned),
-            (("cx", "cy", "cz"), geodesy.turned),
-        ):
-            if track.has(names):
-                change = geodesy.moved if names is POSITION else geodesy.turned
-                moved = change(track.stack(names, 3), track.origin, origin)
-                track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
-        track.origin = origin
+        assert origin is not None
+        _move(track, origin)
+
+
+def _degrees_fault(track: Track) -> str:
+    """The first row that is no latitude and longitude, and what to write; empty if all are."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    bad = np.flatnonzero((np.abs(lat) > 90.0) | (np.abs(lon) > 360.0))
+    if not bad.size:
+        return ""
+    name = track.label("lat" if abs(lat[bad[0]]) > 90.0 else "lon")
+    return (
+        f"{track.source}: column {name}, row {track.rows[bad[0]]}: {lat[bad[0]]:g}, {lon[bad[0]]:g} is no "
+        f"latitude and longitude; if it is in 1e-7 degrees, write --map 'lat:={track.label('lat')}*1e-7'"
+    )
+
+
+def _first_fix(track: Track) -> tuple[float, float, float]:
+    """Latitude, longitude (degrees) and height (m) of a track's first row; 0 m where no height is logged."""
+    height = track.columns["alt"][0] if "alt" in track.columns else 0.0
+    return float(track.columns["lat"][0]), float(track.columns["lon"][0]), float(height)
+
+
+def _project(track: Track, origin: tuple[float, float, float]) -> None:
+    """Put local metres about an origin in the place of a track's latitude, longitude and height."""
+    lat, lon = track.columns["lat"], track.columns["lon"]
+    local = geodesy.enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
+    track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
+    axes = 3 if "alt" in track.labels else 2
+    track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[:axes])}
+    track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
+    track.origin = origin
+
+
+def _move(track: Track, origin: tuple[float, float, float]) -> None:
+    """Carry a track in local metres over to the frame about another origin."""
+    assert track.origin is not None
+    if track.origin == origin:
+        return
+    for names, change in ((POSITION, geodesy.moved), (VELOCITY, geodesy.turned), (COMMAND, geodesy.turned)):
+        if track.has(names):
+            moved = change(track.stack(names, 3), track.origin, origin)
+            track.columns |= {name: moved[:, c] for c, name in enumerate(names) if name in track.columns}
+    track.origin = origin

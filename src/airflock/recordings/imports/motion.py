@@ -1,6 +1,7 @@
 """Checks of motion: axes, signs and units by velocity (rule 2), resets (5) and outliers (6)."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,54 +61,83 @@ def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArra
     return (place[k:] - place[:-k])[sound][::thin], (path[k:] - path[:-k])[sound][::thin]
 
 
-def _compare(
-    source: str, track: Track, moved: NDArray[np.float64], summed: NDArray[np.float64], findings: Findings
-) -> None:
-    axes = moved.shape[1]
-    strength = summed.std(axis=0)
-    lively = strength > 0.05 * strength.max()
-    if strength.max() <= 1e-12:
-        findings.notes.append(f"{source}: nothing moves: axes and units cannot be compared with velocities")
-        return
-    spread = moved.std(axis=0)
+class Likeness(NamedTuple):
+    """How displacements (rows) go with velocities (columns), by axis.
+
+    lively : (axis,) whether the velocity along it varies enough to compare
+    r      : (axis, axis) correlation
+    slopes : (axis,) by how many times the displacement along it changes as the velocity says
+    """
+
+    lively: NDArray[np.bool_]
+    r: Array
+    slopes: Array
+
+
+def _likeness(moved: Array, summed: Array) -> Likeness:
+    """Compare displacements with the same from velocities, both (pair, axis), m; some velocity must vary."""
+    strength, spread = summed.std(axis=0), moved.std(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         cross = (moved - moved.mean(0)).T @ (summed - summed.mean(0)) / len(moved)
-        alike = cross / np.outer(spread, strength)
-        slopes = np.diag(cross) / strength**2
-    alike = np.nan_to_num(alike)
-    names = [track.label(v) for v in VELOCITY[:axes]]
-    for i in range(axes):
-        j = int(np.abs(alike[i]).argmax())
-        if lively[i] and i != j and abs(alike[i, i]) < 0.5 and abs(alike[i, j]) > 0.8:
-            findings.fault(
-                f"{source}: column {track.label(POSITION[i])} ({POSITION[i]}), row {track.rows[0]} on: moves like "
-                f"{names[j]} ({VELOCITY[j]}; r = {alike[i, j]:.2f}): {_unswapped(track, i, j)}",
-                "axes",
-            )
-            return
-    turned = [i for i in range(axes) if lively[i] and alike[i, i] < -0.5]
+        r, slopes = np.nan_to_num(cross / np.outer(spread, strength)), np.diag(cross) / strength**2
+    return Likeness(strength > 0.05 * strength.max(), r, slopes)
+
+
+def _compare(source: str, track: Track, moved: Array, summed: Array, findings: Findings) -> None:
+    """Find where velocities contradict positions: axes that are swapped or turned round, units that differ.
+
+    track : the first of its file, for names in messages
+    moved, summed : displacements, and the same from the velocities, (pair, axis), m
+    """
+    if summed.std(axis=0).max() <= 1e-12:
+        findings.notes.append(f"{source}: nothing moves: axes and units cannot be compared with velocities")
+        return
+    likeness = _likeness(moved, summed)
+    lively, r, slopes = likeness
+    swapped = _swap_fault(source, track, likeness)
+    if swapped:
+        findings.fault(swapped, "axes")
+        return
+    axes = range(len(slopes))
+    turned = [i for i in axes if lively[i] and r[i, i] < -0.5]
     for i in turned:
+        speed = track.label(VELOCITY[i])
         findings.fault(
             f"{source}: column {track.label(POSITION[i])}, row {track.rows[0]} on: {POSITION[i]} grows where "
-            f"{names[i]} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
-            f'write --map "{VELOCITY[i]}:=-{quoted(names[i])}"',
+            f"{speed} is negative (slope {slopes[i]:.2f}): one of them points the other way; "
+            f'write --map "{VELOCITY[i]}:=-{quoted(speed)}"',
             "axes",
         )
-    wrong = [i for i in range(axes) if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
-    wrong = [i for i in wrong if abs(alike[i, i]) > 0.5]
+    wrong = [i for i in axes if lively[i] and i not in turned and abs(slopes[i] - 1.0) > TOLERANCE]
+    wrong = [i for i in wrong if abs(r[i, i]) > 0.5]
     if wrong:
-        slope = float(np.median(slopes[wrong]))
-        near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
-        words, changes = REASONS[near]
-        reason = f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
-        if abs(np.log(near / slope)) >= 0.1:
-            reason = "units differ"
-        told = ", ".join(track.label(POSITION[i]) for i in wrong)
+        columns, slope = ", ".join(track.label(POSITION[i]) for i in wrong), float(np.median(slopes[wrong]))
         findings.fault(
-            f"{source}: column {told}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
-            f"as the velocities say: {reason}",
+            f"{source}: column {columns}, row {track.rows[0]} on: positions change {slope:.3g} times as fast "
+            f"as the velocities say: {_scale_reason(track, slope)}",
             "axes",
         )
+
+
+def _swap_fault(source: str, track: Track, likeness: Likeness) -> str:
+    """The first axis of the positions that goes with another axis of the velocities; empty if none does."""
+    for i, row in enumerate(likeness.r):
+        j = int(np.abs(row).argmax())
+        if likeness.lively[i] and i != j and abs(row[i]) < 0.5 and abs(row[j]) > 0.8:
+            return (
+                f"{source}: column {track.label(POSITION[i])} ({POSITION[i]}), row {track.rows[0]} on: moves like "
+                f"{track.label(VELOCITY[j])} ({VELOCITY[j]}; r = {row[j]:.2f}): {_unswapped(track, i, j)}"
+            )
+    return ""
+
+
+def _scale_reason(track: Track, slope: float) -> str:
+    """Why positions change so many times as fast as velocities say, and what to write."""
+    near = min(REASONS, key=lambda known: abs(np.log(known / slope)))
+    if abs(np.log(near / slope)) >= 0.1:
+        return "units differ"
+    words, changes = REASONS[near]
+    return f"{words}: write {', or '.join(_mapped(track, *change) for change in changes)}"
 
 
 def _unswapped(track: Track, i: int, j: int) -> str:

@@ -110,7 +110,7 @@ class Track:
 
 @dataclass
 class Findings:
-    """Faults and notes of an import, gathered so that all are told at once."""
+    """Faults and notes of an import, gathered to be reported together."""
 
     accept: frozenset[str] = frozenset()
     faults: list[str] = field(default_factory=list)

@@ -1,10 +1,10 @@
-"""What a law leaves over: how much better the next step would be predicted with a free answer to neighbours beside it.
+"""Lack of fit: how much better the next step would be predicted by the law and a free answer to neighbours together.
 
 The differences that a law leaves are regressed on what neighbours do: sums of directions towards them and of their
 headings in shells of distance, as they are and of length one, and how many there are. Laws answer bluntly to these (the
 nearest zone that is not empty, a turn as large as the body allows), so the answer is a sum of hundreds of saturating
 functions drawn at random (random features: Rahimi & Recht 2008), the same to the left as to the right. It is fitted on
-every other span and judged on the rest, so that noise explains nothing: a test of lack of fit that knows no law.
+every other span and judged on the rest, so that noise explains nothing: a test that knows no law.
 """
 
 import math
@@ -44,8 +44,8 @@ class Frame:
     new: NDArray[np.bool_]
 
 
-def left_over(model: Model, place: Array, spans: Sequence[int]) -> float:
-    """Log-likelihood that a free answer to neighbours would still gain on the spans; 0 or more."""
+def lack_of_fit(model: Model, place: Array, spans: Sequence[int]) -> float:
+    """Log-likelihood that a free answer to neighbours would gain on the spans beside the law; 0 or more."""
     found = [frames for frames in _frames(model, place, spans) if frames]
     if not found:
         return 0.0

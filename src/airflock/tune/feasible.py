@@ -1,4 +1,4 @@
-"""Reach: whether the time that is kept for certifying can show each limit at all; told before the search begins."""
+"""Whether each limit can be shown at all in the time that is kept for certifying; said before the search begins."""
 
 import math
 
@@ -7,7 +7,7 @@ from airflock.certify.counting import least
 from airflock.tune.plan import CERTIFY, Plan
 
 
-def out_of_reach(campaign: Campaign, plan: Plan) -> list[str]:
+def infeasible(campaign: Campaign, plan: Plan) -> list[str]:
     """A line for each limit that the plan's flights could not show even if nothing ever happened in them."""
     able = int(plan.seconds * plan.rate)
     return [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_infer import PERIOD, SPEED, dataset
 
-from airflock.infer.leftover import SHELLS, left_over
+from airflock.infer.lack_of_fit import SHELLS, lack_of_fit
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import scale_of, tracks_of
 
@@ -30,7 +30,7 @@ def left_by_nobodys_law(place):
     """What is left over of going straight on."""
     tracks = [tracks_of(dataset(place))]
     model = Model(None, tracks, scale_of(tracks))
-    return left_over(model, model.first(), range(len(model.spans)))
+    return lack_of_fit(model, model.first(), range(len(model.spans)))
 
 
 def nobody(bearing, apart):

@@ -1,4 +1,4 @@
-"""Told: which numbers of a law the tracks can tell at all, and which the others make up for."""
+"""Identifiability: which numbers of a law tracks can identify, and for which of them other numbers make up."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,21 +12,21 @@ from airflock.infer.likelihood import Model
 from airflock.infer.search import scan
 
 Array = NDArray[np.float64]
-DEPENDENT = 0.2  # share of a slope that the others do not explain, below which a number cannot be told
-LOOKS = 6  # best places at which is asked what a number does
-ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where is asked whether a number does anything
-FINE = 0.005  # of a range: step by which is asked whether numbers depend on each other
+DEPENDENT = 0.2  # share of a slope that other numbers do not explain; below it a number is not identifiable
+LOOKS = 6  # best places at which the effect of a number is looked for
+ALONG = (0.1, 0.35, 0.65, 0.9)  # of a range: where the effect of a number is looked for
+FINE = 0.005  # of a range: step by which numbers are tested for depending on each other
 APART = 0.1  # of a range, from the default
-ELSEWHERE = 0.2  # of a range: move of a number of which is asked whether the others make up for it wholly
+ELSEWHERE = 0.2  # of a range: move of a number, to see whether the others make up for it wholly
 UNLIKELY = 20.0  # loss above the fit, beyond which no climb begins where another number has taken a part
 
 
-def telling(model: Model, start: Array, begin: Array, spans: Sequence[int]) -> list[int]:
-    """Named numbers that differences tell apart, in their order; the others stay at their defaults.
+def identifiable(model: Model, start: Array, begin: Array, spans: Sequence[int]) -> list[int]:
+    """Indices of the named numbers that tracks can identify, in their order; the others stay at their defaults.
 
-    A number is not told that changes nothing anywhere along its range, such as the limit of a law that has none, or
-    whose slope the earlier ones explain at the best of many places taken together, such as a mass beside all weights.
-    A radius within which nobody is at these places has no slope, but does something along its range: it is kept.
+    A number is not identifiable if it changes nothing anywhere along its range, such as the limit of a law that has
+    none; or if the earlier numbers explain its slope at the best of many places taken together, such as a mass beside
+    all weights. A radius within which nobody is at these places has no slope, but an effect along its range: kept.
     """
     places = []
     for x in begin[:LOOKS]:
@@ -68,12 +68,12 @@ def _slopes(model: Model, u: Array, numbers: Sequence[int], spans: Sequence[int]
     return found
 
 
-def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -> tuple[Model, Array]:
-    """The model told by the numbers that are declared first, and its place; the same model where nothing gives way.
+def canonical(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -> tuple[Model, Array]:
+    """The model in terms of the numbers that are declared first, and its place; the same model where nothing changes.
 
     A number that was given up before the search may come back under the name of a later one: the weight of one force as
-    the unit of all forces, a radius as another within which its neighbours act, too. Of two numbers of which either
-    explains the tracks beside the others, the one that is declared first is told; the later one takes its default.
+    the unit of all forces, a radius as another within which its neighbours act, too. Where either of two numbers
+    explains the tracks, the one that is declared first is kept; the later one takes its default.
 
     law : with all its numbers; the fit is on all spans, and its place is carried over as it is
     """
@@ -95,7 +95,9 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
                 continue
             found = climb(without, scan(without, start, rest, few)[0], rest, few, slopes=(WIDE,))
             if found.loss < lowest + WORSE:
-                model = fuller.told_by([number for f, number in enumerate(fuller.numbers[: fuller.named]) if f != k])
+                model = fuller.with_numbers(
+                    [number for f, number in enumerate(fuller.numbers[: fuller.named]) if f != k]
+                )
                 place = np.delete(start, k)
                 fit = replace(fit, free=[f - (f > k) for f in rest])
                 break
@@ -104,13 +106,13 @@ def exchanged(law: Candidate, model: Model, fit: Fit, say: Callable[[], None]) -
 
 
 def _may_go(model: Model, number: int) -> bool:
-    """Whether a number may be given up: those of the law; of the body, where the default is none at all."""
+    """Whether a number may be given up: any of the law; one of the body only if its default is 0."""
     one = model.numbers[number]
     return number != model.usual and (one.key.startswith("model.") or one.default == 0.0)
 
 
 def _away(model: Model, fit: Fit, number: int) -> bool:
-    """Whether a number stands away from its default, or its default lies beyond what is sought."""
+    """Whether a number stands away from its default, or its default lies outside the range that is searched."""
     one = model.numbers[number]
     return not one.low <= one.default <= one.high or abs(one.place(one.default) - fit.place[number]) >= APART
 
@@ -123,13 +125,14 @@ def _anywhere(model: Model, fit: Fit, curved: Array, number: int, spans: Sequenc
 
 
 def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int], Array, Array]:
-    """Named numbers without which the tracks are explained as well, and places of the rest without them.
+    """Named numbers without which the tracks are explained as well, and two places of the rest without them.
 
-    Each that stands away from its default, or whose default lies beyond what was sought, is put there in turn, the last
-    declared first, and the rest is fitted anew: from where the others make up for it, and from where another number of
-    its unit takes its part. So is one near its default that may as well stand elsewhere, such as a mass beside forces.
+    Each number that stands away from its default, or whose default lies outside the range that was searched, is put
+    there in turn, the last declared first, and the rest is fitted again: from where the others make up for it, and from
+    where another number of its unit takes its part. So is a number near its default that may as well stand elsewhere,
+    such as a mass beside forces.
 
-    The first place is where a few frames are explained best; at the second the fit's place is carried over as it is.
+    The first place is where a few frames are explained best; the second is the fit's own place, carried over.
     """
     few = model.few()
     best = climb(model, fit.place, fit.free, few, slopes=(WIDE,))
@@ -154,7 +157,7 @@ def simplify(model: Model, fit: Fit, say: Callable[[], None]) -> tuple[list[int]
 def _given_up(model: Model, fit: Fit, curved: Array, number: int, spans: Sequence[int]) -> Array:
     """The likeliest place with a number at its default: the others make up for it, or one of its unit takes its part.
 
-    model : in which the number is held
+    model : one in which this number is fixed
     """
     one, rest = model.numbers[number], [f for f in fit.free if f != number]
     moved = followed(fit, curved, number, one.place(one.default))

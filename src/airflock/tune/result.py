@@ -1,4 +1,4 @@
-"""Tuned: what a tuning found, and the names of what its folder holds."""
+"""The result of a tuning, and the names of the files in its folder."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,8 +19,11 @@ PLAN, START, STUDY, TUNED, CERTIFICATE, STEPS = (
 class Tuned:
     """What tuning found: the scenario to fly, and what each stage said.
 
-    identified : what logs told, where it began with logs
-    steps : of hardening; empty where the law has no recipe, and `why` says so
+    start      : the scenario that tuning began from; notes : what was noticed on the way
+    result     : of the search
+    steps      : of hardening; empty where the law has no recipe, and `why` says so
+    seconds    : that it took
+    identified : what logs said, where it began with logs
     """
 
     folder: Path

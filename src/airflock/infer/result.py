@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.errors import AirflockError
-from airflock.infer.bootstrap import Again
+from airflock.infer.bootstrap import Corrected
 from airflock.infer.candidates import Candidate
 from airflock.infer.candidates import Number as Sought
 from airflock.infer.fit import Fit
@@ -28,7 +28,7 @@ SURE = 2.0  # standard errors by which a law must predict better than going stra
 MOST = 0.75  # share of the spans in which it must
 APART = 2.0  # standard errors by which the best law must be ahead of the second
 SIMPLER = 1.0  # standard errors within which a law of fewer numbers is the better explanation
-EDGE = 0.01  # of a range: nearer to its end nothing is told
+EDGE = 0.01  # of a range: an end nearer to the end of the range counts as no limit
 
 
 @dataclass(frozen=True)
@@ -169,20 +169,20 @@ def rivals(laws: list[Law], apart: float = APART) -> list[Law]:
     return found
 
 
-def tell(found: Inferred, model: Model, sure: Again) -> None:
-    """Write the numbers of the best law, put right, with their intervals."""
+def set_numbers(found: Inferred, model: Model, corrected: Corrected) -> None:
+    """Give the best law its corrected numbers with their intervals, and the scenario file what it is to say of them."""
     assert found.best is not None
     numbers: dict[str, Number] = {}
     for k, n in enumerate(model.numbers[: model.named]):
-        ends = [end for low, high in (sure.alone, sure.joint) for end in (_low(n, low[k]), _high(n, high[k]))]
-        numbers[n.key] = Number(n.key, n.value(sure.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3])
-    noise = sure.noise
+        ends = [end for low, high in (corrected.alone, corrected.joint) for end in (_low(n, low[k]), _high(n, high[k]))]
+        numbers[n.key] = Number(n.key, n.value(corrected.place[k]), ends[0], ends[1], n.unit, ends[2], ends[3])
+    noise = corrected.noise
     known = {n.column: (n.key, n.unit) for n in found.best.candidate.noises}
     if found.best.candidate.body_noise >= 0:
         known[found.best.candidate.body_noise] = ("body.noise", "m^2/s^3")
     if noise.column in known:
         key, unit = known[noise.column]
-        (low, high), (least, most) = sure.noises
+        (low, high), (least, most) = corrected.noises
         numbers[key] = Number(key, noise.law, low, high, unit, least, most)
     found.best.numbers, found.noise = numbers, noise
     today = datetime.date.today().isoformat()
