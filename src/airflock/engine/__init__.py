@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from airflock.engine.flight import Flight as Flight
     from airflock.engine.measuring import measure_frames as measure_frames
-    from airflock.engine.moments import Snapshot as Snapshot
     from airflock.engine.plan import Plan as Plan
     from airflock.engine.planning import plan_of as plan_of
     from airflock.engine.simulate import compile_for as compile_for
@@ -19,12 +18,13 @@ if TYPE_CHECKING:
     from airflock.engine.simulate import picked as picked
     from airflock.engine.simulate import score_flight as score_flight
     from airflock.engine.simulate import score_flights as score_flights
+    from airflock.engine.snapshots import Snapshot as Snapshot
     from airflock.engine.state import State as State
 
 _WHERE = {
     "Flight": "flight",
     "Plan": "plan",
-    "Snapshot": "moments",
+    "Snapshot": "snapshots",
     "State": "state",
     "compile_for": "simulate",
     "driver_text": "simulate",

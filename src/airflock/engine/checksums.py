@@ -16,7 +16,7 @@ from typing import Any
 
 from numba.core.caching import IndexDataCacheFile
 
-from airflock.engine.locked import one_at_a_time
+from airflock.engine.compile_lock import one_at_a_time
 
 ENDING = ".seal"
 

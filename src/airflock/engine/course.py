@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from airflock import __version__
 from airflock.engine import cpu, failure
 from airflock.engine.background_compile import compile_aside
-from airflock.engine.carry import carry
 from airflock.engine.drivers import device_of, flying, is_compiled
-from airflock.engine.moments import Snapshot, Window, sendable
+from airflock.engine.handover import carry
 from airflock.engine.simulate import opened, to_fly
+from airflock.engine.snapshots import Snapshot, Window, sendable
 from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.change import begun

@@ -7,18 +7,18 @@ from typing import Any, NoReturn
 import numpy as np
 
 from airflock.core.view import View
-from airflock.engine import failure, portrait
-from airflock.engine.acting import Acting
+from airflock.engine import failure, notebook
+from airflock.engine.actions import Actions
 from airflock.engine.course import Course
 from airflock.engine.look import view
-from airflock.engine.moments import Snapshot
+from airflock.engine.snapshots import Snapshot
 from airflock.errors import FlightError
 from airflock.scenarios.events import Event, events_of
 from airflock.scenarios.files import loaded
 from airflock.scenarios.seeds import sound_seed
 
 
-class Flight(Acting):
+class Flight(Actions):
     """One flight of a scenario, open: it goes on when it is told to, and may be changed on its way.
 
     Its bits are those of the closed flight, whatever the parts in which it is advanced. A change is a scenario: checked
@@ -75,7 +75,7 @@ class Flight(Acting):
 
     def _repr_html_(self) -> str:
         """Where it stands and its scores so far, for a notebook."""
-        return portrait.html(self)
+        return notebook.html(self)
 
     @property
     def ready(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories, memories, of_pairs
+from airflock.engine.initial_rows import first_memories, memories, of_pairs
 from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.stages.decide import NEAR
 from airflock.engine.totals import sums_of

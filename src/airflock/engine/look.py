@@ -14,7 +14,7 @@ from airflock.core.hearing import carried, lasts
 from airflock.core.maths import norm
 from airflock.core.topology import met_of
 from airflock.core.view import View
-from airflock.engine.beginnings import NEVER
+from airflock.engine.initial_rows import NEVER
 from airflock.engine.state import State
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.surroundings import Place

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories, memories, of_pairs
+from airflock.engine.initial_rows import first_memories, memories, of_pairs
 from airflock.scenes.tree import AWAY
 
 if TYPE_CHECKING:

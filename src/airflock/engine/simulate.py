@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from airflock.engine import cpu, devices, failure, needs
+from airflock.engine import cpu, devices, failure, requirements
 from airflock.engine.drivers import flight_driver, is_loaded
 from airflock.engine.passes.driver import flight as flight_text
 from airflock.engine.plan import Plan
@@ -49,7 +49,7 @@ def fly(
         start = sound_start(scenario, plan, start)
     chosen = device if device == "cpu" else _choice(device, [scenario], [plan], say)
     if chosen != "cuda":
-        needs.check(scenario, plan)
+        requirements.check(scenario, plan)
     flown = devices.fly_one(scenario, plan, seed, chosen, start)
     return checked(scenario, seed, flown, chosen, precision, start)
 
@@ -145,7 +145,7 @@ def to_fly(
     """The plan that `opened` flies by, before any text is made. Raises FlightError where memory cannot hold it."""
     plan = plan_of(scenario, precision=precision, record=record, absence=absence)
     plan = plan.built(grid=False, bits=64) if device == "python" else plan
-    needs.check(scenario, plan)
+    requirements.check(scenario, plan)
     return plan.built(given_start=given_start)
 
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories
 from airflock.engine.drivers import device_of, driver_of, flying
+from airflock.engine.fault_columns import strike
+from airflock.engine.initial_rows import first_memories
 from airflock.engine.layout import aligned_zeros, layout_of
 from airflock.engine.passes import grid
 from airflock.engine.passes.flock import scratch_of
@@ -19,7 +20,6 @@ from airflock.engine.plan import WHOLE, Plan
 from airflock.engine.presence import leave
 from airflock.engine.stages.flight import BEGUN, ENDED, GAP
 from airflock.engine.stages.state import own_row
-from airflock.engine.striking import strike
 from airflock.engine.tables import Tables, tables
 from airflock.engine.totals import combined, goals_reached
 from airflock.scenarios.onsets import Onset

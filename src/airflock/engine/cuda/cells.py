@@ -8,12 +8,12 @@ loss.
 
 from typing import Any
 
-from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.sorting import FOURS, PLAIN_FOURS, SORT
 from airflock.engine.cuda.start import heading_off, tried
 from airflock.engine.cuda.state import numbers
+from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, loop
 from airflock.engine.passes.driver import MADE
 from airflock.engine.plan import Plan

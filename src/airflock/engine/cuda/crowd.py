@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import defaults
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.cells import COMMON, NEAR, crowd, rest_columns
 from airflock.engine.cuda.memory import SHARE, unfit
+from airflock.engine.initial_rows import defaults
 from airflock.engine.measuring import measured
 from airflock.engine.passes.build import columns
 from airflock.engine.passes.flock import owners

@@ -1,11 +1,11 @@
 """Kernel: a whole flight of one flock per block, as the order in which the stages run."""
 
-from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import CudaBuilder
 from airflock.engine.cuda.individuals import begin_faults
 from airflock.engine.cuda.shape import Shape
 from airflock.engine.cuda.start import agents, begin, own
 from airflock.engine.cuda.state import memory
+from airflock.engine.initial_rows import defaults
 from airflock.engine.passes.build import branch, columns, loop
 from airflock.engine.passes.driver import make
 from airflock.engine.passes.measure import measured

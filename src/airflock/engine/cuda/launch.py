@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories, memories, of_pairs
 from airflock.engine.cpu import Flown
 from airflock.engine.cuda.individuals import due, presence
 from airflock.engine.cuda.kernel import ARGUMENTS, flight
 from airflock.engine.cuda.memory import SHARE, lacking, layout_of, needed, scratch_of, sizes
 from airflock.engine.cuda.shape import Shape
+from airflock.engine.initial_rows import first_memories, memories, of_pairs
 from airflock.engine.passes.build import columns
 from airflock.engine.plan import Plan
 from airflock.engine.store import load_driver

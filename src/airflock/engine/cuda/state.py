@@ -2,9 +2,9 @@
 
 import re
 
-from airflock.engine.beginnings import defaults
 from airflock.engine.cuda.build import REDUCED, CudaBuilder, reciprocal_lines
 from airflock.engine.cuda.start import tables
+from airflock.engine.initial_rows import defaults
 from airflock.engine.passes import flock
 from airflock.engine.passes.build import columns, loop
 from airflock.engine.plan import WHOLE, Plan

@@ -1,7 +1,7 @@
 """Faults: the one place where a flight asks the rules of faults, each in the stage that it disturbs.
 
 A fault of an agent is a column: when it began, how long it lasts (0 where there is none), its numbers, and what its
-rules want to know of that moment. Columns are written between two steps (`engine.striking`); here they are only read.
+rules want to know of that moment. Columns are written between two steps (`engine.fault_columns`), and only read here.
 """
 
 from collections.abc import Callable, Iterable

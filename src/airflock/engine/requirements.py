@@ -1,4 +1,4 @@
-"""Needs: how much memory and time a flight takes on this machine, judged before it is compiled and flown.
+"""Requirements: how much memory and time a flight takes on this machine, judged before it is compiled and flown.
 
 What grows with the flock is counted: rows of numbers, past states that a delay asks for, a packet of each pair where
 the radio keeps them, the grid, and the frames of a recording; and looks at pairs, at what stands in the way, at wings.

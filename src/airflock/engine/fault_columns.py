@@ -1,4 +1,4 @@
-"""Striking: the columns that are written when a fault begins."""
+"""Fault columns: what is written when a fault begins."""
 
 from typing import TYPE_CHECKING, Any
 

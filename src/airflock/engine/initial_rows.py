@@ -1,4 +1,4 @@
-"""Beginnings: what agents and pairs carry before they have flown or heard anything."""
+"""Initial rows: what agents and pairs carry before they have flown or heard anything."""
 
 from itertools import accumulate
 from typing import Any

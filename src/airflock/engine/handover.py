@@ -1,11 +1,11 @@
-"""Carry: the state of a flight handed to another driver, by the names of its rows, so that the flight goes on."""
+"""Handover: the state of a flight handed to another driver, by the names of its rows, so that the flight goes on."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import first_memories, rows_of_metrics
+from airflock.engine.initial_rows import first_memories, rows_of_metrics
 from airflock.engine.passes.flock import scratch_of
 from airflock.engine.passes.slots import sorted_by_cells
 from airflock.engine.plan import Plan

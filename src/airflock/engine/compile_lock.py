@@ -1,4 +1,4 @@
-"""Locked: of several processes that need a driver nobody has compiled yet, one compiles it and the others load it.
+"""Compile lock: of several processes that need a driver nobody has compiled yet, one compiles it, the others load it.
 
 The lock is one of the system's on a file beside the driver: it ends with the process that holds it, however that ends.
 """
@@ -15,7 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import trigger_event
 
 from airflock.engine.compile_shortcuts import implementations, seldom_collected
-from airflock.engine.waiting import waiting_briefly
+from airflock.engine.thread_waiting import waiting_briefly
 
 NAME = "lock"
 LOOK = 0.05  # s from one try to the next

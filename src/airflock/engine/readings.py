@@ -1,13 +1,13 @@
-"""Standing: what can be read of an open flight: where it stands, who is there, what has happened."""
+"""Readings: what can be read of an open flight: where it stands, who is there, what has happened."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.engine.beginnings import NEVER
 from airflock.engine.course import Course
-from airflock.engine.moments import Window
+from airflock.engine.initial_rows import NEVER
+from airflock.engine.snapshots import Window
 from airflock.engine.state import State
 from airflock.errors import FlightError
 from airflock.scenarios.events import Event, agent_number, agent_numbers
@@ -15,7 +15,7 @@ from airflock.scenarios.onsets import told
 from airflock.scenarios.scenario import Scenario
 
 
-class Standing:
+class Readings:
     """A flight on its course, to be read."""
 
     _course: Course

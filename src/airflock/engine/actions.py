@@ -1,4 +1,4 @@
-"""Acting: what is done to an open flight on its way. Each act is noted as an event, to be done again."""
+"""Actions: what is done to an open flight on its way. Each act is noted as an event, to be done again."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 
 from airflock.engine.presence import join, leave
-from airflock.engine.standing import Standing
+from airflock.engine.readings import Readings
 from airflock.errors import FlightError
 from airflock.scenarios.change import changed, named
 from airflock.scenarios.document import keyed
@@ -18,7 +18,7 @@ FARTHEST = 1e6  # m from the centre: the largest arena; beyond it single precisi
 FASTEST = 1e3  # m/s; our choice: faster than anything that these bodies are made for
 
 
-class Acting(Standing):
+class Actions(Readings):
     """A flight whose agents are overruled, changed, hit, taken out and put back."""
 
     def sense(self) -> Self:

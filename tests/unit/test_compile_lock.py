@@ -31,7 +31,7 @@ print(json.dumps([sum(driver.advance.stats.cache_hits.values()), sum(driver.adva
 HELD = """
 import sys, time
 from pathlib import Path
-from airflock.engine.locked import alone
+from airflock.engine.compile_lock import alone
 
 with alone(Path(sys.argv[1])) as held:
     print(held, flush=True)

@@ -1,4 +1,4 @@
-"""Moments: a stretch of a flight with its scores, and a moment of one to go back to."""
+"""Snapshots: a stretch of a flight with its scores, and a moment of one to go back to."""
 
 import pickle
 from dataclasses import dataclass
