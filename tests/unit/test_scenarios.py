@@ -199,6 +199,19 @@ def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(nam
     assert not any("{" in note for note in other.notes)
 
 
+@pytest.mark.parametrize("entry", [[3.78, 0.1], {"mean": 3.78, "sd": 0.1}, 3.78, [3.78], {"mean": 3.78}])
+def test_what_a_paper_reports_is_shown_however_it_is_written(entry):
+    """Only tables were read; numbers and pairs, which `airflock keys top` offers, were dropped without a word."""
+    mean, sd = load("vasarhelyi_2018/4ms", {"published": {"phi_vel": entry}}).published["phi_vel"]
+    assert mean == 3.78 and sd == (0.1 if "0.1" in str(entry) else None)
+
+
+@pytest.mark.parametrize("entry", ["3 m/s", [], [1.0, 2.0, 3.0], {"sd": 0.1}, {"meen": 3.0}, float("nan"), True])
+def test_what_a_paper_cannot_report_is_refused(entry):
+    (line,) = faults_of({"published": {"phi_vel": entry}})
+    assert line.startswith("vasarhelyi_2018/4ms: published.phi_vel = ") and "give a number, [mean, sd]" in line
+
+
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():
     found = load("vasarhelyi_2018/4ms", {
         "agents": np.int64(3), "model.v_flock": np.float32(5), "world.arena": "polygon", "world.walls": "every_edge",

@@ -175,9 +175,12 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
     )
     one = numbers_in({key: d[key] for key in NUMBERS}, "", NUMBERS, faults)
     members = d["members"]
-    sound = isinstance(members, list) and all(type(m) is int and 1 <= m <= LARGEST_SYSTEM for m in members)
-    if not sound or not members:
-        faults.append(f"members = {members!r}: give system ids from 1 to {LARGEST_SYSTEM}")
+    listed = members if isinstance(members, list) else []
+    wrong = [m for m in listed if type(m) is not int or not 1 <= m <= LARGEST_SYSTEM]
+    if wrong:
+        faults.append(f"members: {wrong[0]!r} is no system id; they are whole numbers from 1 to {LARGEST_SYSTEM}")
+    elif not listed:
+        faults.append(f"members = {members!r}: give a list of system ids from 1 to {LARGEST_SYSTEM}")
     elif len(set(members)) < len(members):
         faults.append(f"members = {members}: a system id occurs twice")
     if not isinstance(d["autopilot"], str) or d["autopilot"] not in AUTOPILOTS:
