@@ -166,9 +166,9 @@ def _score(what, files, changed, trust, series, aero, as_json) -> None:  # type:
     from airflock.recordings.attributes import faults, told_faults
     from airflock.recordings.files import load_recording
     from airflock.recordings.lengths import told as told_unsaid
-    from airflock.recordings.scores import aero_settings, measure, not_told, scenario_of
+    from airflock.recordings.scores import aero_settings, between_frames, measure, not_told, scenario_of
 
-    rows, courses, befell, untold = [], [], [], []
+    rows, courses, befell, untold, seen = [], [], [], [], []
     about: dict[str, tuple[str, str]] = {}
     for source, path in zip(what, files, strict=True):
         recording = load_recording(source)
@@ -180,6 +180,7 @@ def _score(what, files, changed, trust, series, aero, as_json) -> None:  # type:
         courses.append(course.assign(file=str(path)))
         befell.append(faults(recording))
         untold.append(not_told(recording, scenario, settings))
+        seen.append(between_frames(recording, scenario))
     if series is not None:
         import io
 
@@ -203,6 +204,8 @@ def _score(what, files, changed, trust, series, aero, as_json) -> None:  # type:
     for path, found in zip(files, befell, strict=True):
         if found:
             tables.say(f"{path}: {told_faults(found)}")
-    for path, needed in zip(files, untold, strict=True):
+    for path, needed, coarse in zip(files, untold, seen, strict=True):
         if needed:
             tables.say(f"{path}: {told_unsaid(needed)}")
+        if coarse:
+            tables.say(f"{path}: {coarse}")
