@@ -187,6 +187,15 @@ def test_presets_are_sound_and_every_number_has_a_source(name):
                 assert value.get("source"), f"{name}: {section}.{key} has no source"
 
 
+def test_a_battery_that_does_not_last_is_told():
+    """150 W for 48 s: who flew in space for two minutes with 2 Wh fell by kilometres without a word."""
+    keys = {"body.kind": "quadrotor", "body.battery": "lithium", "body.capacity": "2 Wh", "body.hover_power": 150.0}
+    notes = {
+        t: [n for n in load("vasarhelyi_2018/4ms", {**keys, "duration": t}).notes if "hovering" in n] for t in (40, 120)
+    }
+    assert notes[40] == [] and len(notes[120]) == 1 and "lasts about 48 s of hovering" in notes[120][0]
+
+
 @pytest.mark.parametrize("name", presets())
 def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(name):
     """Also where the preset says `kind = { value = "links", source = ... }`; the kind of today leaves all as it is."""

@@ -213,6 +213,14 @@ def _notes(scenario: Scenario) -> list[str]:
     notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
     notes += timing.notes(scenario) + wings.notes(scenario) + group_notes(scenario)
     p = scenario.parameters
+    body, duration = scenario.body, scenario.flight.duration
+    if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:
+        lasts = body.capacity / body.hover_power
+        if lasts < duration:
+            notes.append(
+                f"body.capacity = {body.capacity:g} J lasts about {lasts:.3g} s of hovering, less than duration = "
+                f"{duration:g} s: then its motors stop"
+            )
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
         notes.append(
             f"model.r0_frict = {p.r0_frict:g} m lies below model.r0_rep = {p.r0_rep:g} m: agents may not flock"
