@@ -51,6 +51,14 @@ def test_a_key_swept_twice_is_refused(grounded):
     ]
 
 
+@pytest.mark.parametrize("key", ["seed", "fitness"])
+def test_a_key_that_the_table_has_as_another_column_is_asked_for_whole(grounded, key):
+    """The flights of `--over seed=1,2`, which is scene.seed, were told by their own seeds, as if those were swept."""
+    (line,) = refused("sweep", "kidger/final_2d", "--over", f"{key}=1,2" if key == "seed" else f"{key}=paper,sound")
+    section = {"seed": "scene", "fitness": "metrics"}[key]
+    assert line == f"kidger/final_2d: {key}: is a column of the table already; write {section}.{key}"
+
+
 def test_a_picture_of_three_keys_is_refused(grounded, tmp_path):
     more = ["--over", "agents=10,11", "--over", "model.w_c=1,2", "--plot", tmp_path / "map.png"]
     (line,) = refused("sweep", BEST, *OVER, *more)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -106,6 +107,23 @@ def test_a_recording_scores_like_its_flight_and_flies_again_to_the_same_bits(tmp
     again = called("validate", file)
     assert again.returncode == 0 and "same bits" in again.stdout
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_recording_says_what_its_flight_looked_for_between_frames(tmp_path):
+    """A flight looks for collisions at every step; its recording has frames 0.2 s apart and told others, in silence."""
+    file = tmp_path / "flight.nc"
+    for more, told in (([], 1), (["--set", "metrics.collision_period=0.2"], 0)):
+        assert called("run", "vasarhelyi_2018/4ms", "--save", file, *more, *SHORT).returncode == 0
+        done = called("score", file)
+        assert done.stderr.count("phi_coll, n_coll and what follows from them: by frames 0.2 s apart") == told
+        assert done.stderr.count("looked every 0.01 s") == told
+
+
+def test_a_preset_is_shown_as_json_too():
+    """`--json` was taken, and TOML was printed."""
+    for words in (["vicsek_1995/ordered"], ["--for-speed", "6"]):
+        plain, found = called("presets", *words).stdout, called("presets", *words, "--json").stdout
+        assert json.loads(found) == tomllib.loads(plain)
 
 
 def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):

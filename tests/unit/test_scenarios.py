@@ -187,6 +187,15 @@ def test_presets_are_sound_and_every_number_has_a_source(name):
                 assert value.get("source"), f"{name}: {section}.{key} has no source"
 
 
+def test_a_battery_that_does_not_last_is_told():
+    """150 W for 48 s: who flew in space for two minutes with 2 Wh fell by kilometres without a word."""
+    keys = {"body.kind": "quadrotor", "body.battery": "lithium", "body.capacity": "2 Wh", "body.hover_power": 150.0}
+    notes = {
+        t: [n for n in load("vasarhelyi_2018/4ms", {**keys, "duration": t}).notes if "hovering" in n] for t in (40, 120)
+    }
+    assert notes[40] == [] and len(notes[120]) == 1 and "lasts about 48 s of hovering" in notes[120][0]
+
+
 @pytest.mark.parametrize("name", presets())
 def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(name):
     """Also where the preset says `kind = { value = "links", source = ... }`; the kind of today leaves all as it is."""
@@ -197,6 +206,19 @@ def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(nam
     other = load(name, {"radio.kind": "constant", "sensors.kind": "perfect"})
     assert (other.transceiver.name, other.radio.delay, other.sensor.name) == ("constant", plain.radio.delay, "perfect")
     assert not any("{" in note for note in other.notes)
+
+
+@pytest.mark.parametrize("entry", [[3.78, 0.1], {"mean": 3.78, "sd": 0.1}, 3.78, [3.78], {"mean": 3.78}])
+def test_what_a_paper_reports_is_shown_however_it_is_written(entry):
+    """Only tables were read; numbers and pairs, which `airflock keys top` offers, were dropped without a word."""
+    mean, sd = load("vasarhelyi_2018/4ms", {"published": {"phi_vel": entry}}).published["phi_vel"]
+    assert mean == 3.78 and sd == (0.1 if "0.1" in str(entry) else None)
+
+
+@pytest.mark.parametrize("entry", ["3 m/s", [], [1.0, 2.0, 3.0], {"sd": 0.1}, {"meen": 3.0}, float("nan"), True])
+def test_what_a_paper_cannot_report_is_refused(entry):
+    (line,) = faults_of({"published": {"phi_vel": entry}})
+    assert line.startswith("vasarhelyi_2018/4ms: published.phi_vel = ") and "give a number, [mean, sd]" in line
 
 
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from airflock.errors import ScenarioError
 from airflock.scenarios.files import load
+from airflock.scenarios.making import make
 from airflock.scenarios.units import SPELLINGS, UNITS, factor
 
 NAME = "vasarhelyi_2018/4ms"
@@ -116,3 +117,23 @@ def test_a_number_in_quotes_without_a_unit_is_refused_whatever_its_digits(key, r
 @pytest.mark.parametrize(("text", "rate"), [("1 1/min", 1 / 60), ("0.5 1/s", 0.5), ("6e1 1/min", 1.0), ("0.5Hz", 0.5)])
 def test_a_unit_may_begin_with_a_digit_after_a_blank(text, rate):
     assert load(NAME, {"model.p_rep": text}).parameters.p_rep == pytest.approx(rate)
+
+
+@pytest.mark.parametrize("delay", [{"value": "0.4 s"}, {"value": "400 ms"}, {"value": 400, "unit": "ms"}, "0.4 s", 0.4])
+def test_a_value_means_the_same_as_text_and_in_a_table_with_its_source(delay):
+    """`{ value = "0.4 s" }`, in the unit that is declared, was no number, while `{ value = "400 ms" }` was one."""
+    given = {**delay, "source": "measured"} if isinstance(delay, dict) else delay
+    assert load(NAME, {"radio.delay": given}).radio.delay == 0.4
+    groups = [{"name": "slow", "agents": 3, "body": {"tau": {"value": "1.2 s", "spread": "100 ms"}}}]
+    (found,) = load(NAME, {"groups": groups}).groups
+    assert found.numbers["b", "tau"] == 1.2 and found.spread["b", "tau"] == 0.1
+
+
+def test_a_conversion_is_told_with_its_key_in_the_order_of_the_file():
+    keys = {"loss": "5 %", "range": "0.1 km", "delay": "400 ms"}
+    groups = [{"agents": 3, "body": {"tau": {"value": 1.2, "spread": "100 ms"}}}]
+    faults = [{"kind": "motor", "share": "30 %", "at": "0.5 min"}]
+    notes = make({"model": {"kind": "vasarhelyi_2018"}, "radio": keys, "groups": groups, "faults": faults}).notes
+    told = [note.partition(" = ")[0] for note in notes if " is " in note]
+    assert told[:3] == ["radio.loss", "radio.range", "radio.delay"]
+    assert told[3:6] == ["groups[0].body.spread.tau", "faults[0].at", "faults[0].share"]

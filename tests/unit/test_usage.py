@@ -1,5 +1,6 @@
 """A wrong command line ends with one line in the words of every other fault, and with status 2."""
 
+import math
 import re
 from bdb import BdbQuit
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+import airflock
 from airflock.cli.main import app, main
 from airflock.cli.sweep import alike
 from airflock.errors import AirflockError
@@ -33,6 +35,13 @@ from airflock.scenarios.files import load
         ("run x --duration soon", "--duration soon: write a time above 0 such as 90s, 10min or 2h"),
         ("run x --seeds 0 --seeds 5 --threads 0", "run: --threads 0 lies outside [1, inf]"),
         ("run x --seeds", "--seeds needs a value"),
+        ("presets --for-speed nan", "presets: --for-speed nan is not a finite number; give [0.1, 100]"),
+        ("harden x --out y.toml --cost nan", "harden: --cost nan is not a finite number; give [0, inf]"),
+        ("display AIR --spacing=nan", "display: --spacing nan is not a finite number; give [2.5, 100]"),
+        ("replay x --rate NaN", "replay: --rate nan is not a finite number; give [0.1, 100]"),
+        ("fly prepare x --site 0,0,0 --members 1 --margin 1e999", "fly prepare: --margin inf is not a finite number"),
+        ("fly prepare x --site 0,0,0 --members 1 --fast-bits nan", "fly prepare: --fast-bits nan is not a finite"),
+        ("fly order m.json start --radio udp:1 --in nan", "fly order: --in nan is not a finite number; give [0, 60]"),
         ("run", "run: PRESET|FILE is missing; for instance: airflock run vasarhelyi_2018/4ms --seeds 20"),
         ("run a b c", "run: unexpected b c; it takes PRESET|FILE and options; for instance: airflock run"),
         ("doctor a", "doctor: unexpected a; it takes options alone; for instance: airflock doctor"),
@@ -151,3 +160,18 @@ def test_no_command_writes_over_the_file_that_it_reads(words, file, tmp_path, mo
         main()
     assert ended.value.code == 2 and f"{file}: is read here, and would be lost; give another" in capsys.readouterr().err
     assert Path(file).read_text() == "duration = 5.0\n"
+
+
+@pytest.mark.parametrize("ours", [math.nan, math.inf, -1.0])
+def test_what_is_no_number_is_refused_in_python_too(ours, tmp_path):
+    """nan passed the comparisons with the ends of ranges: a set of nans was written, and hardening kept whatever."""
+    small = {"agents": 4, "duration": 1.0}
+    for call in (
+        lambda: airflock.starting_set(ours),
+        lambda: airflock.harden(load("vasarhelyi_2018/4ms", small), range(2), cost=ours),
+        lambda: airflock.display(["I"], 4, spacing=ours),
+        lambda: airflock.replay(airflock.simulate(load("vasarhelyi_2018/4ms", small)), rate=ours),
+        lambda: airflock.tune("vasarhelyi_2018/4ms", tmp_path / "tuned", budget=ours),
+    ):
+        with pytest.raises(AirflockError, match=f"{ours:g}"):
+            call()

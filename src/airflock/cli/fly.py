@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from airflock.cli import options, tables
+from airflock.cli.verb import Verb
 from airflock.errors import CardError, ScenarioError, gathering
 from airflock.spelling import meant
 from airflock.untrusted import is_file
@@ -51,7 +52,7 @@ def card(ctx: typer.Context) -> None:
     raise typer.Exit(main(ctx.args))
 
 
-@app.command("prepare")
+@app.command("prepare", cls=Verb)
 def prepare(
     scenario: options.Where,
     site: Annotated[
@@ -205,7 +206,7 @@ def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
         tables.say(f"set {guard.name} {safe}: {why}")
 
 
-@app.command("order")
+@app.command("order", cls=Verb)
 def order(
     card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
     do: Annotated[
@@ -262,7 +263,7 @@ def order(
     tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}{told}")
 
 
-@app.command("replay")
+@app.command("replay", cls=Verb)
 def replay(
     card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
     log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of a node.", show_default=False)],

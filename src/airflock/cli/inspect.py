@@ -1,5 +1,6 @@
 """Verbs presets, validate and doctor: what there is, whether it is right, and whether this machine can run it."""
 
+import tomllib
 from typing import Annotated, Any
 
 import typer
@@ -28,13 +29,14 @@ def presets(
     if for_speed is not None:
         from airflock.scenarios.scaling import starting_set
 
-        typer.echo(starting_set(for_speed), nl=False)
+        _show(starting_set(for_speed), as_json)
         return
     if name is not None:
         if name not in known and not is_file(name):
             files.load(name)  # complains about a wrong name
         with from_outside(name):
-            typer.echo(read_text(known.get(name) or name), nl=False)
+            text = read_text(known.get(name) or name)
+        _show(text, as_json and bool(files.load(name)))  # a file that is none is refused as any other
         return
     found = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
@@ -43,6 +45,14 @@ def presets(
     width = max(len(key) for key in found)
     for key, title in found.items():
         typer.echo(f"{key:<{width}}  {title}")
+
+
+def _show(text: str, as_json: bool) -> None:
+    """Print a scenario as it is written, or as one JSON object."""
+    if as_json:
+        tables.emit_json(tomllib.loads(text))
+    else:
+        typer.echo(text, nl=False)
 
 
 def validate(

@@ -35,6 +35,7 @@ from airflock.cli import (
     watch,
 )
 from airflock.cli.usage import usage_fault
+from airflock.cli.verb import Verb
 from airflock.errors import AirflockError, bounded, bounded_lines, printable, reason
 
 HELP = """Decentralised flocks of drones and birds: simulate, score, evolve, plot.
@@ -112,7 +113,7 @@ for _panel, _verbs in PANELS.items():
         if isinstance(_verb, typer.Typer):
             app.add_typer(_verb, name=_name, rich_help_panel=_panel)
         else:
-            app.command(_name, rich_help_panel=_panel)(_verb)
+            app.command(_name, cls=Verb, rich_help_panel=_panel)(_verb)
 
 
 def _version(asked: bool) -> None:

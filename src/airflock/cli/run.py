@@ -176,6 +176,7 @@ class Measured(NamedTuple):
 
     values, course : order parameters, and a table of them over time; about : unit and meaning of each by name
     faults   : what befell its agents; not_told : order parameters for want of a length, with the keys that they need
+    coarse   : what to know of order parameters that a flight looks at between its frames, if anything
     """
 
     path: Path
@@ -184,6 +185,7 @@ class Measured(NamedTuple):
     about: Mapping[str, tuple[str, str]]
     faults: Any
     not_told: Any
+    coarse: str
 
 
 def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool) -> Measured:
@@ -191,14 +193,14 @@ def _measured(source: Any, path: Path, changed: Scores, trust: bool, aero: bool)
     from airflock.metrics.registry import reports
     from airflock.recordings.attributes import faults
     from airflock.recordings.files import load_recording
-    from airflock.recordings.scores import aero_settings, measure, not_told, scenario_of
+    from airflock.recordings.scores import aero_settings, between_frames, measure, not_told, scenario_of
 
     recording = load_recording(source)
     settings = aero_settings(recording, changed) if aero else changed
     values, course = measure(recording, settings, trust=trust)
     scenario = scenario_of(recording, settings, trust=trust)
-    untold = not_told(recording, scenario, settings)
-    return Measured(path, values, course, reports(scenario.measures), faults(recording), untold)
+    untold, coarse = not_told(recording, scenario, settings), between_frames(recording, scenario)
+    return Measured(path, values, course, reports(scenario.measures), faults(recording), untold, coarse)
 
 
 def _save_series(measured: Sequence[Measured], path: Path) -> None:
@@ -241,3 +243,5 @@ def _tell_measured(measured: Sequence[Measured], as_json: bool) -> None:
     for each in measured:
         if each.not_told:
             tables.say(f"{each.path}: {told_unsaid(each.not_told)}")
+        if each.coarse:
+            tables.say(f"{each.path}: {each.coarse}")

@@ -1,5 +1,6 @@
 """What is wrong with a command line, as one line in the words of every other fault."""
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -19,6 +20,17 @@ def usage_fault(fault: Any, words: Sequence[str]) -> str:
     context = getattr(fault, "ctx", None)
     verb = _path(context).partition(" ")[2]
     return f"{verb}: {_said(fault, context, words)}" if verb else _said(fault, context, words)
+
+
+def infinite(context: Any) -> list[str]:
+    """Options with a range that were given nan or inf, one line each."""
+    faults = []
+    for parameter in context.command.params:
+        value, ends = context.params.get(parameter.name), _ends(parameter)
+        if isinstance(value, float) and not math.isfinite(value) and ends != (None, None):
+            verb = _path(context).partition(" ")[2]
+            faults.append(f"{verb}: {_name(parameter)} {value:g} is not a finite number; give {_span(*ends)}")
+    return faults
 
 
 def _said(fault: Any, context: Any, words: Sequence[str]) -> str:
@@ -87,7 +99,7 @@ def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
     low, high = _ends(parameter)
     if value is None or (low is None and high is None and "valid" not in message):
         return f"{name}: {message.strip().rstrip('.')}"
-    span = f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
+    span = _span(low, high)
     give = "" if low is None and high is None else f"; give {span}"
     try:
         number = float(value)
@@ -114,6 +126,11 @@ def _ends(parameter: Any) -> tuple[float | None, float | None]:
         end = getattr(parameter, name, getattr(getattr(parameter, "type", None), name, None))
         ends.append(None if end is None else float(end))
     return ends[0], ends[1]
+
+
+def _span(low: float | None, high: float | None) -> str:
+    """A range for a person."""
+    return f"[{'-inf' if low is None else f'{low:.10g}'}, {'inf' if high is None else f'{high:.10g}'}]"
 
 
 def _choices(parameter: Any) -> list[str]:

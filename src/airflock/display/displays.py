@@ -1,5 +1,6 @@
 """The public door to displays: shapes by their names, flown one after another."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -82,6 +83,9 @@ def plan(
     faults = []
     if not 0.0 <= failing <= 0.9:
         faults.append(f"{dash}failing = {failing:g} lies outside [0, 0.9]")
+    if not 0.0 < spacing < math.inf:
+        faults.append(f"{dash}spacing = {spacing:g} m is not above 0")
+        spacing = 3.0  # by which the rest is judged
     if failure not in FAILURES:
         faults.append(f"{dash}failure = {failure!r} is none of {', '.join(FAILURES)}")
     count = drones if points is None else points

@@ -97,6 +97,7 @@ def harden(
     single = isinstance(scenario, (Scenario, str, os.PathLike))
     scenarios = [loaded(each) for each in ([scenario] if single else scenario)]  # type: ignore[list-item, union-attr]
     held, faults = read_limits({"limits": limit}, scenarios)
+    faults += [] if 0.0 <= cost < math.inf else [f"cost = {cost:g} is not a fitness of 0 or more"]
     if faults:
         raise ScenarioError(faults)
     trial = _Trial(scenarios, recipe(scenarios[0], steps)[0], seeds, cost, held, threads, done)

@@ -212,10 +212,13 @@ def _made(d: Mapping[str, Any], faults: list[str]) -> Card | None:
 
 def _member_faults(members: Any) -> list[str]:
     """What is wrong with the list of system ids."""
-    sound = isinstance(members, list) and all(type(m) is int and 1 <= m <= LARGEST_SYSTEM for m in members)
-    if not sound or not members:
-        return [f"members = {members!r}: give system ids from 1 to {LARGEST_SYSTEM}"]
-    return [f"members = {members}: a system id occurs twice"] if len(set(members)) < len(members) else []
+    listed = members if isinstance(members, list) else []
+    wrong = [m for m in listed if type(m) is not int or not 1 <= m <= LARGEST_SYSTEM]
+    if wrong:
+        return [f"members: {wrong[0]!r} is no system id; they are whole numbers from 1 to {LARGEST_SYSTEM}"]
+    if not listed:
+        return [f"members = {members!r}: give a list of system ids from 1 to {LARGEST_SYSTEM}"]
+    return [f"members = {members}: a system id occurs twice"] if len(set(listed)) < len(listed) else []
 
 
 def _corner_faults(corners: Any) -> list[str]:

@@ -143,6 +143,24 @@ def not_told(
     return unsaid(names, scenario.measures.name, settings or {}, arena=scenario.world.arena != "none")
 
 
+def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
+    """What a simulated recording cannot tell as its flight did, which looked between its frames; empty if nothing.
+
+    scenario : `scenario_of` the recording
+    """
+    if scenario_document(recording) is None or recording.attrs.get("airflock_device") == "fleet":
+        return ""
+    q, (_, period, _) = scenario.measured_by(), frames_of(recording)
+    names = [name for each in scenario.measures.of(q) if each.clock == "collision" for name in each.reports]
+    looked = q.collision_period or period
+    if not names or looked > 0.99 * period:
+        return ""
+    return (
+        f"{', '.join(names)} and what follows from them: by frames {period:g} s apart; its flight looked every "
+        f"{looked:g} s, and told others"
+    )
+
+
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
     known = reports(scenario.measures)

@@ -9,7 +9,8 @@ import pandas as pd
 
 from airflock.errors import ScenarioError, gathering
 from airflock.executors.scores import scores
-from airflock.metrics.registry import numbers_of
+from airflock.metrics.registry import numbers_of, reports
+from airflock.scenarios import short_keys
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
@@ -110,9 +111,20 @@ def scenarios_at(
         with gathering(faults):
             changed = {**(settings or {}), **point}
             found.append(variant(what, changed, law, trust=trust))
+    faults += _columns_given_twice(points, found)
     if faults:
         raise ScenarioError(faults)
     return found
+
+
+def _columns_given_twice(points: Sequence[Mapping[str, Any]], scenarios: Sequence[Scenario]) -> list[str]:
+    """Keys by their last word that the table has as another column: the seed of a flight, or an order parameter."""
+    faults: list[str] = []
+    for key in points[0] if points and scenarios else ():
+        if key == "seed" or any(key in reports(found.measures) for found in scenarios):
+            whole = " or ".join(short_keys.places(scenarios[0].records).get(key, ()))
+            faults.append(f"{scenarios[0].name}: {key}: is a column of the table already; write {whole}")
+    return faults
 
 
 def flown(

@@ -70,7 +70,8 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
                 cluster, group, fault, a number that differs among agents, or a variable of the recording with one
                 number for each individual (at each time, or for good)
 
-    Individuals that are absent are not drawn. Raises RecordingError for a colour that the recording does not know.
+    Individuals that are absent are not drawn. Raises RecordingError for a colour that the recording does not know, and
+    for a rate that is none.
 
     Returns
     -------
@@ -83,6 +84,8 @@ def replay(recording: xr.Dataset, *, rate: float = RATE, colour: str = "speed") 
     >>> airflock.replay(airflock.simulate(short)).name
     'vasarhelyi_2018/4ms'
     """
+    if not 0.0 < rate < math.inf:
+        raise RecordingError(f"rate = {rate:g} frames per second is not above 0")
     frames, period, present = frames_of(recording)
     axes = frames.shape[1] // 2
     stride = max(1, math.ceil(1.0 / (rate * period) - 1e-6))

@@ -105,13 +105,10 @@ def _entry(
     names = ("kind", "agents", "group")
     timing = {key: value for key, value in table.items() if key in KEYS and key not in names}
     rest = {key: value for key, value in table.items() if key not in KEYS}
-    document = {where: timing, f"{where} ": rest}
-    document, notes, wrong = units.converted(document, {where: Timing, f"{where} ": kind.Parameters})
+    when, notes, wrong = _record(where, timing, Timing)
     faults += wrong
-    when, wrong = schema.check(where, document[where], Timing)
-    faults += wrong
-    numbers, wrong = schema.check(where, document[f"{where} "], kind.Parameters, KEYS)
-    faults += wrong
+    numbers, told, wrong = _record(where, rest, kind.Parameters, KEYS)
+    notes, faults = notes + told, faults + wrong
     who, wrong = _who(where, table, agents, groups)
     faults += wrong
     if sequential and PERCEPTION & set(kind.rules):
@@ -128,6 +125,15 @@ def _entry(
         math.inf if when.until is None else when.until, math.inf if when.lasts is None else when.lasts,
     )  # fmt: skip
     return entry, notes, faults
+
+
+def _record(
+    where: str, table: Mapping[str, Any], record: type, beside: Sequence[str] = ()
+) -> tuple[Any, list[str], list[str]]:
+    """A record made from keys of an entry, in SI units, or None; notes; what is wrong."""
+    document, notes, faults = units.converted({where: table}, {where: record})
+    made, wrong = schema.check(where, document[where], record, beside)
+    return made, notes, faults + wrong
 
 
 def _kind(

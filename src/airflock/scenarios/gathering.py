@@ -102,7 +102,8 @@ def carries(carried: Body, found: Model | None, kind: str) -> list[str]:
     """Why a body cannot fly what a model commands, one line."""
     if found is None or carried.accepts == found.command:
         return []
+    taken = f"{'an' if carried.accepts[0] in 'aeiou' else 'a'} {carried.accepts}"
     return [
-        f"body.kind = {kind!r} takes a {carried.accepts}, but model {found.name} commands {found.command}; "
+        f"body.kind = {kind!r} takes {taken}, but model {found.name} commands {found.command}; "
         f"body.kind = {body_for(found.command)!r} takes it"
     ]

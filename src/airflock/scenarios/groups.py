@@ -160,10 +160,11 @@ def _section(where: str, table: Any, record: type) -> tuple[dict[str, float], di
             values |= {key: inner if isinstance(inner, Mapping) else rest} if "value" in rest else {}
         else:
             values[key] = value
-    converted, notes, wrong = units.converted({where: values, "spread": spreads}, {where: record, "spread": record})
+    apart = f"{where}.spread"
+    converted, notes, wrong = units.converted({where: values, apart: spreads}, {where: record, apart: record})
     made, more = schema.check(where, converted[where], record)
     faults += wrong + more
-    off, more = _spreads(where, converted["spread"], known)
+    off, more = _spreads(where, converted[apart], known)
     numbers = {key: float(getattr(made, key)) for key in converted[where]} if made is not None and not more else {}
     return numbers, off, notes, faults + more
 

@@ -64,13 +64,14 @@ def make(
     parts, more = _parts(whole, flown)
     faults += more + _faults_between(parts, flown, started)
     individuals, told_of, more = _individuals(whole, parts, flown, given, folder, trust)
-    faults += more
+    published, wrong = _published(whole.get("published", {}))
+    faults += more + wrong
     if faults or flown.law is None:
         raise ScenarioError([f"{where}: {fault}" for fault in faults])
     parts["scene"] = _beside(parts["scene"], folder)
     scenario = Scenario(
         name=where, model=flown.law, vehicle=flown.vehicle, sensor=flown.sensor, transceiver=flown.transceiver,
-        measures=flown.measures, own_topology=flown.own_topology, published=_published(whole.get("published", {})),
+        measures=flown.measures, own_topology=flown.own_topology, published=published,
         document=whole, **parts, **individuals,
     )  # fmt: skip
     if faults := _derived_faults(scenario) or places.place_faults(scenario, started):
@@ -184,18 +185,26 @@ def _faults_between(parts: Mapping[str, Any], flown: Gathered, started: bool) ->
     return faults + checks.body_faults(flown.vehicle, parts, law, started) + checks.sensor_faults(flown.sensor, parts)
 
 
-def _published(table: Any) -> dict[str, tuple[float, float | None]]:
-    """Numbers of a paper by name: mean, and standard deviation where it is given; what is no number is left out."""
-
-    def number(value: Any) -> bool:
-        return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
-
+def _published(table: Any) -> tuple[dict[str, tuple[float, float | None]], list[str]]:
+    """Numbers of a paper by name: mean, and standard deviation where it is given; and what is none, one line each."""
+    if not isinstance(table, Mapping):
+        return {}, [f"published = {table!r} is not a table of order parameters"]
     found: dict[str, tuple[float, float | None]] = {}
-    for key, entry in (table if isinstance(table, Mapping) else {}).items():
-        if isinstance(entry, Mapping) and number(entry.get("mean")):
-            spread = entry.get("sd")
-            found[key] = (float(entry["mean"]), float(spread or 0.0) if number(spread) else None)
-    return found
+    faults: list[str] = []
+    for key, entry in table.items():
+        if isinstance(entry, Mapping) and set(entry) <= {"mean", "sd"}:
+            told = [entry.get("mean"), *([entry["sd"]] if "sd" in entry else [])]
+        else:
+            told = list(entry) if isinstance(entry, (list, tuple)) else [entry]
+        if 1 <= len(told) <= 2 and all(map(_finite, told)):
+            found[key] = (float(told[0]), float(told[1]) if len(told) == 2 else None)
+        else:
+            faults.append(f"published.{key} = {entry!r}: give a number, [mean, sd], or {{ mean = ..., sd = ... }}")
+    return found, faults
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
 
 
 def _notes(scenario: Scenario) -> list[str]:
@@ -204,6 +213,14 @@ def _notes(scenario: Scenario) -> list[str]:
     notes = checks.pair_notes(scenario.flight, scenario.metrics, scenario.order_parameters, cells)
     notes += timing.notes(scenario) + wings.notes(scenario) + group_notes(scenario)
     p = scenario.parameters
+    body, duration = scenario.body, scenario.flight.duration
+    if getattr(body, "battery", "endless") == "lithium" and getattr(body, "hover_power", 0.0) > 0.0:
+        lasts = body.capacity / body.hover_power
+        if lasts < duration:
+            notes.append(
+                f"body.capacity = {body.capacity:g} J lasts about {lasts:.3g} s of hovering, less than duration = "
+                f"{duration:g} s: then its motors stop"
+            )
     if getattr(p, "r0_frict", None) is not None and p.r0_frict < getattr(p, "r0_rep", 0.0):
         notes.append(
             f"model.r0_frict = {p.r0_frict:g} m lies below model.r0_rep = {p.r0_rep:g} m: agents may not flock"

@@ -3,6 +3,7 @@
 import math
 import tomllib
 
+from airflock.models.vasarhelyi_2018 import Parameters
 from airflock.scenarios import formats
 from airflock.scenarios.files import presets
 
@@ -24,6 +25,11 @@ def starting_set(v_flock: float) -> str:
     str
         TOML text; tune it before flying.
 
+    Raises
+    ------
+    ParameterError
+        If the speed lies outside the range of model.v_flock.
+
     Notes
     -----
     r0_rep and v_shill grow linearly with v_flock (their ratio to it, which Table S1 holds within 15 %, is interpolated
@@ -38,6 +44,7 @@ def starting_set(v_flock: float) -> str:
     >>> print(airflock.starting_set(6.0).splitlines()[8])
     v_flock = { value = 6, unit = "m/s", source = "asked for" }
     """
+    Parameters(v_flock=v_flock)  # refuses what is no speed
     scale = max(1.0, v_flock / 8.0)
     growth = "Table S2: grows with the speed above 8 m/s"
     lines = [

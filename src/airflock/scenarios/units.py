@@ -70,7 +70,7 @@ def converted(document: Mapping[str, Any], records: Mapping[str, type]) -> tuple
         if not isinstance(given, Mapping):
             continue
         changed = {}
-        for key in known.keys() & given.keys():
+        for key in (key for key in given if key in known):  # in the order of the file, so that notes are
             name = f"{section}.{key}".lstrip(".")
             changed[key], note, fault = _converted(name, given[key], known[key])
             notes += [note] if note else []
@@ -99,8 +99,8 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
             return None, "", f"{name} = {value!r} {_unitless(match[1], declared)}"
         value, unit = float(match[1]), match[2]
     if not isinstance(unit, str) or unit in ("", declared.unit):
-        if not long and unit == declared.unit and unit:
-            return value, "", ""
+        if unit and isinstance(unit, str) and unit == declared.unit:
+            return ({**given, "value": value, "unit": unit} if long else value), "", ""
         return given, "", ""
     times = factor(unit, declared.unit)
     if times is None:

@@ -24,7 +24,9 @@ WHOLE_KEYS: Mapping[str, Mapping[str, Whole]] = {
     "": {
         "title": Whole("text", "what the scenario is, for pictures and lists"),
         "extends": Whole("text", "a preset or a file to begin from; what is not given here is taken from there"),
-        "published": Whole("table", "order parameter → value, or [value, SD], that a paper reports; shown beside ours"),
+        "published": Whole(
+            "table", "order parameter → mean, [mean, SD] or { mean, sd } that a paper reports; shown beside ours"
+        ),
         "model.kind": Whole("choice", "the law that flies", (*MODELS, OWN)),
         "body.kind": Whole("choice", "what turns commands into motion", (*BODIES, OWN)),
         "sensors.kind": Whole("choice", "how an agent knows its own state", (*SENSORS, OWN)),

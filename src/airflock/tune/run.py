@@ -1,5 +1,6 @@
 """The public door: start, evolve, harden, certify, report; each stage is continued where it was left."""
 
+import math
 import os
 import time
 from collections.abc import Mapping, Sequence
@@ -94,6 +95,8 @@ def tune(
     airflock.errors.ScenarioError: limit 'r_mim<3 at 1%': r_mim: unknown order parameter; did you mean r_min?
     """
     began = time.monotonic()
+    if not 0.0 < budget < math.inf:
+        raise StudyError(f"budget = {budget:g} s is not positive")
     folder = Path(out)
     mine, logs = _mine(folder, scenario, like, heard, settings, trust)
     start, notes = start_of(mine)
