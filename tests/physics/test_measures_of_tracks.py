@@ -7,10 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import ParameterError
+from airflock.recordings.flights import simulate
 from airflock.recordings.imports.load import load_tracks
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.measures import bursts, correlation, delays, milling, neighbours, shape, surroundings, turning
 from airflock.recordings.measures.states import states
+from airflock.recordings.scores import score
+from airflock.scenarios.files import load
 
 
 def recording(place, speed, period=0.1):
@@ -248,6 +251,25 @@ def test_of_a_pair_one_leads_and_the_other_follows_in_a_periodic_flight():
     angle = np.arange(200)[:, None] * 2.0 * np.pi / 20 + np.array([0.0, np.pi])  # half a turn apart: before is behind
     table = delays.leadership(tracks(np.stack([np.cos(angle), np.sin(angle)], axis=1)), 1.5)
     assert table["delay"].abs().to_list() == pytest.approx([1.0, 1.0]) and table["delay"].sum() == 0.0
+
+
+@pytest.mark.parametrize("shift", [(1.7, -2.2), (2.5, 2.5), (-0.4, 4.9)])
+def test_in_a_periodic_world_neighbours_are_near_across_its_border(shift):
+    """Wherever the border is drawn, the flock is the same; and the scores say the same of it."""
+    found = simulate(load("vicsek_1995/ordered", {"agents": 40, "duration": 3.0}), 1, precision=64)
+    moved = found.copy(deep=True)
+    place = moved["position"].values + np.array(shift)[None, :, None, None]
+    moved["position"].values[:] = (place + 2.5) % 5.0 - 2.5
+    for measure in (
+        neighbours.nearest_distances,
+        lambda r: neighbours.pair_distances(r, 0.25, 2.5),
+        lambda r: correlation.velocity_correlation(r, 0.5),
+        lambda r: surroundings.density_map(r, 2.0, 5),
+        lambda r: surroundings.anisotropy(r, 1.0),
+    ):
+        np.testing.assert_allclose(measure(moved), measure(found), rtol=1e-9, atol=1e-9)
+    told = score(found, settings={"metrics.kind": "vasarhelyi"})["r_min_mean"][0]
+    assert float(neighbours.nearest_distances(found).mean()) == pytest.approx(told, rel=1e-9)
 
 
 def test_velocities_of_all_who_move_alike_have_no_correlation():

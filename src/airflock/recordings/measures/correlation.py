@@ -5,6 +5,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
+from airflock.recordings import images
 from airflock.recordings.measures.states import states
 
 NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
@@ -31,7 +32,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         u = u - u.mean(axis=1, keepdims=True)
         alone, count = alone + float((u * u).sum()), count + u.shape[1]
         i, j = np.triu_indices(u.shape[1], 1)
-        bins = np.floor(np.linalg.norm(x[:, i] - x[:, j], axis=0) / width).astype(int)
+        apart = np.linalg.norm(images.nearest(x[:, j] - x[:, i], found.box), axis=0)
+        bins = np.floor(apart / width).astype(int)
         alike = (u[:, i] * u[:, j]).sum(axis=0)
         number, total = np.bincount(bins), np.bincount(bins, alike)
         for b in np.flatnonzero(number):

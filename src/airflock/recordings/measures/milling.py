@@ -11,6 +11,7 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
     slowest : speed (m/s) at or below which one has no heading; it still counts for the centre
+    In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
     """
     found = states(recording)
     course = np.full(len(found.time), np.nan)
