@@ -132,7 +132,8 @@ def _fill(
     logged = track.has(VELOCITY)
     slopes = _slopes(own, rows, track.breaks, usual)
     for c, name in enumerate(VELOCITY[:axes] if logged else ()):
-        slopes[:, c] = track.columns.get(name, slopes[:, c])  # a height without a climb rate is differentiated
+        told = track.columns.get(name, slopes[:, c])
+        slopes[:, c] = np.where(np.isfinite(told), told, slopes[:, c])  # what is not logged is differentiated
     p, v = _hermite(rows, slopes, before, after, step, part)
     if logged:  # between two rows the logged velocity itself, not the slope of the curve through the positions
         v = slopes[before] + part[:, None] * (slopes[after] - slopes[before])

@@ -170,6 +170,7 @@ def read_tracks(
     """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
     tracks = _read(what, options, findings)
     findings.refuse()
+    checks.check_columns(tracks, findings)
     for track in tracks:
         checks.check_time(track, findings)
     checks.check_names(tracks, findings)
@@ -282,8 +283,8 @@ def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, f
             origin = (float(lat[0]), float(lon[0]), float(height[0]))
             findings.notes.append(f"origin of the local frame: {origin[0]:.7f}, {origin[1]:.7f}, {origin[2]:.2f} m")
         local = geodesy.enu(lat, lon, height, origin)
+        flat = "alt" not in track.columns
         track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
-        flat = "alt" not in track.labels
         track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[: 2 if flat else 3])}
         track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
         track.origin = origin
