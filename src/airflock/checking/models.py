@@ -1,5 +1,6 @@
 """The standing list for a flocking law: symmetries, a lone agent, two agents, time step, units, single precision."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -54,7 +55,7 @@ def check_model(
 
     Parameters
     ----------
-    law : Model, module, class, mapping or str
+    law : Model, module, class, mapping, str or path
         A flocking law: a Model, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -82,7 +83,9 @@ def check_model(
     >>> report.broken
     ()
     """
-    found = law if isinstance(law, Model) else find_model(law, trust=True) if isinstance(law, str) else model(law)
+    if isinstance(law, (str, os.PathLike)):
+        law = find_model(str(law), trust=True)
+    found = law if isinstance(law, Model) else model(law)
     made = law_of(found, dict(parameters or {}), dimensions)
     rng = np.random.default_rng(seed)
     scenes = [made.scene(rng) for _ in range(SCENES)]

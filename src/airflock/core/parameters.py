@@ -251,7 +251,8 @@ def quantity_fault(value: Any, declared: Quantity) -> str:
 
 def choice_fault(value: Any, declared: Choice) -> str:
     """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
-    return "" if value in declared.options else f"= {value!r} is none of {', '.join(declared.options)}"
+    known = isinstance(value, str) and value in declared.options
+    return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
 def points_fault(value: Any, declared: Points) -> str:

@@ -89,6 +89,8 @@ def sweep(
 
 def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     """All combinations of the values of several keys; raises a ScenarioError that names keys without a list of them."""
+    if not isinstance(over, Mapping):
+        raise ScenarioError([f"over = {over!r}: give keys with lists of values, such as {{'radio.delay': [0.0, 1.0]}}"])
     lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
     if lacking:
         raise ScenarioError([f"{key} = {over[key]!r}: give the values to sweep over in a list" for key in lacking])

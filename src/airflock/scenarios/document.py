@@ -29,12 +29,21 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
 
 
 def keyed(settings: Any, where: str) -> dict[str, Any]:
-    """Settings as a dict of keys and values; none for None. Raises ScenarioError for anything else."""
+    """Settings as a dict of keys and plain values; none for None. Raises ScenarioError for anything else."""
     if settings is None:
         return {}
     if not isinstance(settings, Mapping) or not all(isinstance(key, str) for key in settings):
         raise ScenarioError([f"{where}: settings {settings!r} are no keys with values, such as {{'dt': '10 ms'}}"])
-    return dict(settings)
+    return {key: _plain(value) for key, value in settings.items()}
+
+
+def _plain(value: Any) -> Any:
+    """A value without NumPy's types at any depth, as a file holds it: a recording writes it down as JSON."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
 
 
 def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:

@@ -107,6 +107,7 @@ def _entry(
     rest = {key: value for key, value in table.items() if key not in KEYS}
     document = {where: timing, f"{where} ": rest}
     document, notes, wrong = units.converted(document, {where: Timing, f"{where} ": kind.Parameters})
+    notes, wrong = ([line.replace(f"{where} .", f"{where}.") for line in lines] for lines in (notes, wrong))
     faults += wrong
     when, wrong = schema.check(where, document[where], Timing)
     faults += wrong

@@ -3,8 +3,12 @@
 import math
 import tomllib
 
+from airflock.core.parameters import Quantity, declarations, quantity_fault
+from airflock.errors import ScenarioError
+from airflock.numeric import is_number
 from airflock.scenarios import formats
 from airflock.scenarios.files import presets
+from airflock.scenarios.laws import find_model
 
 SPEEDS = (4.0, 6.0, 8.0, 16.0, 32.0)  # columns of Table S1, m/s
 LINEAR = "Table S3: grows linearly with v_flock"
@@ -38,6 +42,11 @@ def starting_set(v_flock: float) -> str:
     >>> print(airflock.starting_set(6.0).splitlines()[8])
     v_flock = { value = 6, unit = "m/s", source = "asked for" }
     """
+    declared = next(how for name, how, _ in declarations(find_model("vasarhelyi_2018").Parameters) if name == "v_flock")
+    assert isinstance(declared, Quantity)
+    wrong = quantity_fault(float(v_flock) if is_number(v_flock) else v_flock, declared)
+    if wrong:
+        raise ScenarioError([f"v_flock {wrong}"])
     columns = {
         v: tomllib.loads(presets()[f"vasarhelyi_2018/{v:g}ms"].read_text(encoding="utf-8"))["model"] for v in SPEEDS
     }

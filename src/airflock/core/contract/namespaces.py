@@ -3,8 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from airflock.errors import RuleError, bounded
+
 
 def names_of(namespace: Any, name: str = "") -> tuple[dict[str, Any], str]:
     """What a module, a class or a mapping of names holds, and what it is called: `name`, its NAME, or its module's."""
+    if not isinstance(namespace, Mapping) and not hasattr(namespace, "__dict__"):
+        told = bounded(repr(namespace), 80)
+        raise RuleError(f"{told} holds no rules; give a module, a class, or names such as globals()")
     found = dict(namespace) if isinstance(namespace, Mapping) else dict(vars(namespace))
     return found, name or str(found.get("NAME") or found.get("__name__", "own")).rpartition(".")[2].strip("_")
