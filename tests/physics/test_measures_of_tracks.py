@@ -326,3 +326,29 @@ def test_velocities_beside_a_gap_are_those_of_the_scores():
     frames, _, present = frames_of(tracks(place))
     found = states(tracks(place))
     assert (found.present == present).all() and np.array_equal(found.velocity, frames[:, 2:], equal_nan=True)
+
+
+def test_each_measure_says_its_units():
+    """Turned into centimetres, each value grows as its unit says."""
+    place, speed = crowd(5, frames=30)
+    speed[:, 0] += 4.0 * np.sin(np.arange(30))[:, None]
+    metres, centimetres = recording(place, speed), recording(100.0 * place, 100.0 * speed)
+    measures = {
+        bursts.bursts: (0.5,), correlation.velocity_correlation: (2.0,), delays.delay_correlation: (),
+        delays.leadership: (1.0, -1.0), milling.milling: (), neighbours.nearest_distances: (),
+        neighbours.pair_distances: (2.0, 40.0), shape.group_shape: (), surroundings.density_map: (10.0, 4),
+        turning.turning_speed: (),
+    }  # fmt: skip
+    lengths = {bursts.bursts, correlation.velocity_correlation, neighbours.pair_distances, surroundings.density_map}
+    factors = {"1": 1.0, "s": 1.0, "rad/s": 1.0, "m": 100.0, "m/s": 100.0, "m^2": 1e4, "1/m": 0.01, "1/m^2": 1e-4}
+    for measure, numbers in measures.items():
+        scale = [100.0 if measure in lengths and isinstance(number, float) else 1 for number in numbers]
+        larger = [by * number for by, number in zip(scale, numbers, strict=True)]
+        one, other = measure(metres, *numbers), measure(centimetres, *larger)
+        units = one.attrs["units"]
+        if isinstance(units, dict):
+            assert set(units) == set(one.select_dtypes("number").columns), measure
+            for name, unit in units.items():
+                np.testing.assert_allclose(other[name], factors[unit] * one[name], rtol=1e-9, err_msg=name)
+        else:
+            np.testing.assert_allclose(other, factors[units] * one, rtol=1e-9, atol=1e-12)

@@ -513,3 +513,20 @@ def test_a_masked_place_is_missing_and_an_object_that_is_a_number_is_one():
     assert np.array_equal(values(airflock.load_tracks(array.astype(object), fps=RATE, unit="m")), whole)
     assert "holds what is no number" in refused(np.full((5, 2, 2), "x", object), fps=1.0, unit="m")
     assert "holds complex128, not numbers" in refused(array + 1j, fps=1.0, unit="m")
+
+
+def test_a_dataset_whose_time_is_dates_or_durations_needs_no_unit():
+    plain = airflock.load_tracks(flock(), precision=64)
+    seconds = plain["time"].values
+    for times in (
+        pd.to_timedelta(seconds, unit="s"),
+        pd.Timestamp("2024-03-31T00:59:50") + pd.to_timedelta(seconds, "s"),
+    ):
+        found = airflock.load_tracks(plain.assign_coords(time=times), precision=64)
+        assert found.attrs["fps"] == RATE
+        np.testing.assert_allclose(values(found), values(plain), atol=1e-5)
+
+
+def test_two_individuals_of_one_name_in_a_dataset_are_told():
+    found = airflock.load_tracks(flock(1))
+    assert "bird_0 is also in dataset" in refused(xr.concat([found, found], "individual"))

@@ -9,7 +9,7 @@ import pandas as pd
 
 from airflock.errors import AirflockError, ScenarioError
 from airflock.executors.scores import scores
-from airflock.metrics.registry import numbers_of
+from airflock.metrics.registry import numbers_of, reports
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
 from airflock.scenarios.seeds import sound_seeds
@@ -79,6 +79,8 @@ def sweep(
     >>> table = airflock.sweep(short, {"radio.delay": [0.0, 0.4, 0.8]}, seeds=2)
     >>> table.shape[0], list(table.columns[:2])
     (6, ['radio.delay', 'seed'])
+    >>> table.attrs["units"]["phi_vel"], table.attrs["meanings"]["phi_vel"]
+    ('m/s', 'mean speed')
     """
     points = grid(over)
     scenarios = scenarios_at(what, points, settings, law, trust=trust)
@@ -126,7 +128,11 @@ def flown(
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
     rows = scores(flights, [seed for _, _, seed in jobs], **options)
-    return pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    known = {name: told for found in scenarios for name, told in reports(found.measures).items()}
+    for place, about in (("units", 0), ("meanings", 1)):
+        table.attrs[place] = {name: known[name][about] for name in table.columns if name in known}
+    return table
 
 
 def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:

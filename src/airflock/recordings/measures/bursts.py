@@ -29,7 +29,10 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
                 at = found.time[begin + np.array([low, top, last])]
                 s = speed[begin + np.array([low, top]), i]
                 rows.append((name, at[0], at[1] - at[0], at[2] - at[1], s[0], s[1]))
-    return pd.DataFrame(rows, columns=["individual", "begin", "burst", "coast", "speed_before", "speed_top"])
+    units = {"begin": "s", "burst": "s", "coast": "s", "speed_before": "m/s", "speed_top": "m/s"}
+    table = pd.DataFrame(rows, columns=["individual", *units])
+    table.attrs["units"] = units
+    return table
 
 
 def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int]]:

@@ -40,10 +40,8 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
                 rows.append((name, what, found.time[first], found.time[k - 1], *at))
             for what in now - set(begun):
                 begun[what] = k
-    columns = ["individual", "what", "begin", "end", "east", "north", "up"]
-    table = pd.DataFrame(rows, columns=columns)
-    return (
-        table.sort_values(["begin", "individual"], kind="stable", ignore_index=True)
-        if len(rows)
-        else table.astype(dict.fromkeys(columns[2:], np.float64))
-    )
+    units = {"begin": "s", "end": "s", "east": "m", "north": "m", "up": "m"}
+    table = pd.DataFrame(rows, columns=["individual", "what", *units]).astype(dict.fromkeys(units, np.float64))
+    table = table.sort_values(["begin", "individual"], kind="stable", ignore_index=True)
+    table.attrs["units"] = units
+    return table

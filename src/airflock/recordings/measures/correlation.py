@@ -44,7 +44,10 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     last = max(sums, default=0) if farthest is None else int(farthest / width)
     kept = [b for b in sorted(sums) if b <= last]
     index = pd.Index([(b + 0.5) * width for b in kept], name="distance")
-    return pd.Series([sums[b][0] / sums[b][1] / scale for b in kept], index=index, name="correlation", dtype=float)
+    course = [sums[b][0] / sums[b][1] / scale for b in kept]
+    series = pd.Series(course, index=index, name="correlation", dtype=float)
+    series.attrs["units"] = "1"
+    return series
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:

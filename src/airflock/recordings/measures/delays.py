@@ -27,7 +27,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
         both = there[0].T @ there[1]
         summed = np.einsum("tci,tcj->ij", np.nan_to_num(first), np.nan_to_num(later))
         table[:, :, k] = np.where(both > 0, summed / np.maximum(both, 1.0), np.nan)
-    coordinates = {"leader": found.names, "follower": found.names, "delay": shifts * found.period}
+    late = ("delay", shifts * found.period, {"units": "s"})
+    coordinates = {"leader": found.names, "follower": found.names, "delay": late}
     return xr.DataArray(table, coordinates, ("leader", "follower", "delay"), attrs={"units": "1"})
 
 
@@ -57,4 +58,6 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
                 best[j, i] = 0.0 - float(shifts[k]), float(course[k])
     names = table["leader"].values
     rows = [(names[i], names[j], *best[i, j]) for i, j in sorted(best)]
-    return pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
+    told = pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
+    told.attrs["units"] = {"delay": "s", "correlation": "1"}
+    return told

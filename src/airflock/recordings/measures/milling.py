@@ -25,4 +25,6 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
         flat = np.zeros((2, 3, int(moves.sum())))
         flat[0, : len(out)], flat[1, : len(out)] = out, h[k][:, moves]
         course[k] = float(np.linalg.norm(np.cross(flat[0].T, flat[1].T).mean(axis=0)))
-    return pd.Series(course, index=pd.Index(found.time, name="time"), name="milling")
+    series = pd.Series(course, index=pd.Index(found.time, name="time"), name="milling")
+    series.attrs["units"] = "1"
+    return series

@@ -19,7 +19,7 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
             apart = np.linalg.norm(found.offsets(x), axis=0)
             np.fill_diagonal(apart, np.inf)
             table[k, there] = apart.min(axis=1)
-    coordinates = {"time": found.time, "individual": found.names}
+    coordinates = {"time": ("time", found.time, {"units": "s"}), "individual": found.names}
     return xr.DataArray(table, coordinates, ("time", "individual"), attrs={"units": "m"})
 
 

@@ -37,9 +37,8 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     middle = 0.5 * (edges[1:] + edges[:-1])
     area = (edges[1] - edges[0]) ** 2
     attributes = {"units": "1/m^2", "focal": focal}
-    return xr.DataArray(
-        total / (max(focal, 1) * area), {"left": middle, "front": middle}, ("left", "front"), attrs=attributes
-    )
+    coordinates = {axis: (axis, middle, {"units": "m"}) for axis in ("left", "front")}
+    return xr.DataArray(total / (max(focal, 1) * area), coordinates, ("left", "front"), attrs=attributes)
 
 
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:

@@ -20,5 +20,5 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
         before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
     else:  # one frame has no turn
         before = after = np.full((len(h), h.shape[2]), np.nan)
-    coordinates = {"time": found.time, "individual": found.names}
+    coordinates = {"time": ("time", found.time, {"units": "s"}), "individual": found.names}
     return xr.DataArray(0.5 * (before + after), coordinates, ("time", "individual"), attrs={"units": "rad/s"})
