@@ -85,6 +85,24 @@ def test_other_calls_name_what_they_cannot_use(wrong):
         assert len(told(lambda: airflock.simulate(load(PAPER, SMALL), keep=wrong))) == 1
 
 
+@pytest.mark.parametrize("wrong", [None, *WRONG])
+def test_a_number_of_a_measure_that_is_none_is_named(wrong):
+    recording, m = tracks(), airflock.measures
+    calls = {
+        "least": (m.bursts.bursts, m.delays.leadership),
+        "width": (m.correlation.velocity_correlation, m.correlation.correlation_length),
+        "longest": (m.delays.delay_correlation, m.delays.leadership),
+        "slowest": (m.milling.milling, m.turning.turning_speed),
+        "reach": (m.surroundings.density_map, m.surroundings.anisotropy),
+    }
+    for name, measures in calls.items():
+        for measure in measures:
+            assert told(lambda f=measure, n=name: f(recording, **{n: wrong})) == [f"{name} = {wrong!r} is not a number"]
+    for others in ({"cells": wrong}, {"slowest": wrong}):
+        assert len(told(lambda o=others: m.surroundings.density_map(recording, 1.0, **o))) == 1
+    assert len(told(lambda: m.neighbours.pair_distances(recording, wrong, wrong))) == 2
+
+
 def test_a_speed_that_nobody_flies_has_no_starting_set():
     for speed in (0.0, -1.0, float("nan"), 1e9):
         assert told(lambda speed=speed: airflock.starting_set(speed))[0].endswith("lies outside [0.1, 100] m/s")

@@ -5,7 +5,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import sound, states
 from airflock.recordings.scores import scenario_of
 from airflock.world.place import Place, Shapes
 
@@ -21,6 +21,7 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     """
     scenario = scenario_of(recording)
     radius = scenario.metrics.r_body if radius is None else radius
+    sound(radius=radius)
     if not 0.0 <= radius < float("inf"):
         raise ParameterError(f"radius = {radius:g} m is not a radius")
     stands = scenario.stands()

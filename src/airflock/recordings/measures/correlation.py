@@ -6,7 +6,7 @@ import xarray as xr
 
 from airflock.errors import ParameterError
 from airflock.recordings import images
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import sound, states
 
 NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
 
@@ -19,6 +19,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
     """
+    sound(width=width, **({} if farthest is None else {"farthest": farthest}))
     found = states(recording)
     if not width > 0.0:
         raise ParameterError(f"width = {width:g} m must be above 0")

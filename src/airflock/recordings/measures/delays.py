@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import headings, sound, states
 
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
@@ -15,6 +16,9 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     longest : largest delay, s; slowest: headings at this speed (m/s) or less do not count
     nan where two are never there together. Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
+    sound(longest=longest, slowest=slowest)
+    if not 0.0 <= longest < float("inf"):
+        raise ParameterError(f"longest = {longest:g} s must be 0 or more")
     found = states(recording)
     h = headings(found.velocity, slowest)
     shifts = np.arange(-round(longest / found.period), round(longest / found.period) + 1)
@@ -43,6 +47,7 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     slowest : headings at this speed (m/s) or less do not count
     Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
+    sound(longest=longest, least=least, slowest=slowest)
     table = delay_correlation(recording, longest, slowest)
     shifts, n = table["delay"].values, table.sizes["leader"]
     best: dict[tuple[int, int], tuple[float, float]] = {}

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
@@ -13,6 +13,7 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     slowest : speed (m/s) at or below which one has no heading; it still counts for the centre
     In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
     """
+    sound(slowest=slowest)
     found = states(recording)
     course = np.full(len(found.time), np.nan)
     h = headings(found.velocity, slowest)

@@ -6,7 +6,7 @@ import xarray as xr
 
 from airflock.errors import ParameterError
 from airflock.recordings import images
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import sound, states
 
 
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
@@ -29,6 +29,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     width    : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
     farthest : end of the last bin, m; a pair exactly so far apart counts
     """
+    sound(width=width, farthest=farthest)
     if not 0.0 < width < farthest:
         raise ParameterError(f"width = {width:g} m must lie between 0 and farthest = {farthest:g} m")
     found = states(recording)

@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
+from airflock.errors import ParameterError, RecordingError
+from airflock.numeric import is_number
 from airflock.recordings import images
 from airflock.recordings.attributes import scenario_document
 from airflock.recordings.differences import velocities
@@ -68,6 +69,13 @@ def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
     world = scenario_of(recording).world if scenario_document(recording) is not None else None
     box = images.sides(world, position.shape[1]) if world is not None else None
     return States(time, position, velocity, placed, present, individuals, box)
+
+
+def sound(**given: Any) -> None:
+    """Refuse what is given as a number of a measure and is none, all at once. Raises ParameterError."""
+    faults = [f"{name} = {value!r} is not a number" for name, value in given.items() if not is_number(value)]
+    if faults:
+        raise ParameterError("\n".join(faults))
 
 
 def headings(velocity: Array, slowest: float = 0.0) -> Array:

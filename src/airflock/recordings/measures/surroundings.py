@@ -5,7 +5,7 @@ import xarray as xr
 
 from airflock.errors import ParameterError
 from airflock.recordings import images
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
@@ -14,8 +14,10 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     reach : half the side of the map, m; cells: along each side; slowest: speed (m/s) at or below which one has no front
     In space the map is horizontal: distances in height are left out.
     """
-    if not reach > 0.0 or cells < 1:
-        raise ParameterError(f"reach = {reach:g} m and cells = {cells} must be above 0")
+    sound(reach=reach, cells=cells, slowest=slowest)
+    if not reach > 0.0 or cells < 1 or cells % 1:
+        raise ParameterError(f"reach = {reach:g} m and cells = {cells}, a whole number, must be above 0")
+    cells = int(cells)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
     box = None if found.box is None else found.box[:2]
@@ -47,6 +49,7 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
     slowest : speed (m/s) at or below which one has no front
     In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
     """
+    sound(reach=reach, slowest=slowest)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
     box = None if found.box is None else found.box[:2]

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
@@ -12,6 +12,7 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     slowest : speed (m/s) at or below which one has no heading
     A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
     """
+    sound(slowest=slowest)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
