@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -55,6 +56,38 @@ def test_what_holds_no_rules_is_told_so(wrong):
     if wrong is not None:
         for name in ("body", "sensor", "radio", "topology", "faults"):
             assert told(lambda name=name: load(PAPER, **{name: wrong}))[0].endswith(end), name
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "line"),
+    [
+        ("model", "reynolds_1987", "model.sped: unknown key"),
+        ("body", "multirotor", "body.sped: unknown key"),
+        ("sensor", "gnss", "sensors.sped: unknown key"),
+        ("radio", "shadow", "radio.sped: unknown key"),
+        ("topology", "nearest", "topology.sped: unknown key"),
+    ],
+)
+def test_a_number_that_a_rule_does_not_have_is_told_by_its_check(name, kind, line):
+    check = getattr(airflock, f"check_{name}")
+    assert told(lambda: check(kind, {"sped": 1.0}))[0].startswith(line)
+    assert "are no keys with values" in told(lambda: check(kind, [1.0]))[0]
+    assert told(lambda: check(kind, seed="one")) == ["seed = 'one' is not a whole number in [0, 2^64 - 1]"]
+
+
+def test_a_static_method_is_told_to_be_a_plain_function():
+    class Height:
+        REPORTS = {"height": ("m", "mean height")}  # noqa: RUF012
+
+        class Sample(NamedTuple):
+            height: float
+
+        @staticmethod
+        def sample(mean):
+            return Height.Sample(mean.z)
+
+    lines = told(lambda: airflock.score(load(PAPER, SMALL, metrics=Height)))
+    assert lines[0].endswith("rule sample: has a decorator; a rule is a plain function")
 
 
 def test_a_law_is_checked_by_the_path_of_its_file():

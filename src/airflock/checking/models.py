@@ -29,8 +29,10 @@ from airflock.core.contract import Model, model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
 from airflock.engine import fly, plan_of
+from airflock.scenarios.document import keyed
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 SCENES = 12  # random scenes that each symmetry is tried on
 CLOSE = 1e-9  # of the largest command: more than rounding
@@ -86,8 +88,8 @@ def check_model(
     if isinstance(law, (str, os.PathLike)):
         law = find_model(str(law), trust=True)
     found = law if isinstance(law, Model) else model(law)
-    made = law_of(found, dict(parameters or {}), dimensions)
-    rng = np.random.default_rng(seed)
+    made = law_of(found, keyed(parameters, f"check of {found.name}"), dimensions)
+    rng = np.random.default_rng(sound_seed(seed))
     scenes = [made.scene(rng) for _ in range(SCENES)]
     turns = [turn_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
     truths: Truths = {
