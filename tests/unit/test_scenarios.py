@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import AirflockError, ScenarioError
+from airflock.scenarios.change import variant
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.making import make
 
@@ -197,6 +198,20 @@ def test_another_kind_takes_the_place_of_one_that_is_written_with_its_source(nam
     other = load(name, {"radio.kind": "constant", "sensors.kind": "perfect"})
     assert (other.transceiver.name, other.radio.delay, other.sensor.name) == ("constant", plain.radio.delay, "perfect")
     assert not any("{" in note for note in other.notes)
+
+
+def test_another_law_begins_from_its_own_numbers():
+    """As another body, sensor or radio does, and as `law=` and `extends` do: r0_frict is no number of Algorithm A."""
+    given, named = (
+        load("vasarhelyi_2018/4ms", law="viragh_2014"),
+        load("vasarhelyi_2018/4ms", {"model.kind": "viragh_2014"}),
+    )
+    assert named.parameters == given.parameters and not named.published
+    assert "model.kind = 'viragh_2014': the numbers of the file's vasarhelyi_2018 are left out" in named.notes
+    same = load("vasarhelyi_2018/4ms", {"model.kind": "vasarhelyi_2018"})
+    assert same.parameters == load("vasarhelyi_2018/4ms").parameters and same.published
+    assert load("vasarhelyi_2018/4ms", {"model.kind": "viragh_2014", "model.v_flock": 3.0}).parameters.v_flock == 3.0
+    assert variant(named, {"model.kind": "vicsek_1995", "body.kind": "heading"}).model.name == "vicsek_1995"
 
 
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():

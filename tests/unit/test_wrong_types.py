@@ -75,6 +75,19 @@ def test_a_number_that_a_rule_does_not_have_is_told_by_its_check(name, kind, lin
     assert told(lambda: check(kind, seed="one")) == ["seed = 'one' is not a whole number in [0, 2^64 - 1]"]
 
 
+def test_what_is_no_flight_and_what_are_no_events_is_told():
+    assert told(lambda: airflock.recording_of(3)) == ["int is no open flight; airflock.open gives one"]
+    for wrong in (None, 3):
+        line = f"events = {wrong}: give a list of events, such as those of a flight"
+        assert told(lambda events=wrong: airflock.open(load(PAPER, SMALL), 1, events=events)) == [line]
+
+
+def test_a_number_without_a_range_is_told():
+    assert told(lambda: airflock.quantity(1.0, "m", low=0.0, high=None, meaning="reach")) == [
+        "high = None is not a number (reach)"
+    ]
+
+
 def test_a_static_method_is_told_to_be_a_plain_function():
     class Height:
         REPORTS = {"height": ("m", "mean height")}  # noqa: RUF012

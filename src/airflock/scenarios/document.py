@@ -14,7 +14,10 @@ TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "upda
 
 
 def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """A document without the numbers of its body, sensor, radio or topology where settings name another; notes."""
+    """A document without the numbers of its law, body, sensor, radio or topology where settings name another; notes.
+
+    With its law goes what a paper published of it.
+    """
     notes: list[str] = []
     for family in FAMILIES:
         section = family.section
@@ -25,6 +28,13 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
         if set(given) - {"kind", *kept}:
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
         document = {**document, section: kept}
+    law = document.get("model", {})
+    before = law.get("kind") if isinstance(law, Mapping) else None
+    before = before["value"] if isinstance(before, Mapping) and "value" in before else before
+    if "model.kind" in settings and before not in (None, settings["model.kind"]):
+        if set(law) - {"kind"}:
+            notes.append(f"model.kind = {settings['model.kind']!r}: the numbers of the file's {before} are left out")
+        document = {**document, "model": {}, "published": {}}
     return document, tuple(notes)
 
 
