@@ -527,6 +527,19 @@ def test_a_dataset_whose_time_is_dates_or_durations_needs_no_unit():
         np.testing.assert_allclose(values(found), values(plain), atol=1e-5)
 
 
+@pytest.mark.parametrize(("begin", "end"), [(3.02, None), (3.02, 7.01), (3.05, 7.05), (-1.01, None), (0.0, 25.0)])
+def test_a_window_holds_the_frames_that_lie_in_it(begin, end):
+    """One that began between two frames held none of them: places halfway between, and an absent one in front."""
+    own = circle()
+    found = airflock.load_tracks(own, begin=begin, end=end, precision=64)
+    times = found["time"].values + found.attrs["airflock_begin"]
+    assert begin <= times[0] + 1e-9 < begin + 1.0 / RATE + 1e-9
+    there = found["confidence"].values[:, 0, 0] == 1.0
+    inside = own[(own["t"] >= begin - 1e-9) & (own["t"] <= (end or 1e9) + 1e-9)]
+    np.testing.assert_array_equal(values(found)[there, :, 0], inside[["x", "y"]].to_numpy())
+    np.testing.assert_allclose(times[there], inside["t"], atol=1e-9)
+
+
 def test_two_individuals_of_one_name_in_a_dataset_are_told():
     found = airflock.load_tracks(flock(1))
     assert "bird_0 is also in dataset" in refused(xr.concat([found, found], "individual"))
