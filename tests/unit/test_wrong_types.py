@@ -82,6 +82,19 @@ def test_what_is_no_flight_and_what_are_no_events_is_told():
         assert told(lambda events=wrong: airflock.open(load(PAPER, SMALL), 1, events=events)) == [line]
 
 
+def test_what_is_no_law_and_what_holds_no_tracks_is_told_before_anything_is_fitted():
+    assert told(lambda: airflock.infer(3)) == ["int holds no tracks; give recordings or files"]
+    assert told(lambda: airflock.infer(tracks(), 3)) == [
+        "infer: models = 3: give a list of laws, such as ['couzin_2002']"
+    ]
+    assert told(lambda: airflock.infer(tracks(), [None])) == [
+        "None is no law; give a name of ours, a preset, a scenario file or a Scenario"
+    ]
+    assert told(lambda: airflock.infer(tracks(), "couzin_2002")) == [
+        "recording 1: 20 frames are too few to infer a law from; 120 or more"
+    ]
+
+
 def test_a_number_without_a_range_is_told():
     assert told(lambda: airflock.quantity(1.0, "m", low=0.0, high=None, meaning="reach")) == [
         "high = None is not a number (reach)"
