@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from airflock.errors import AirflockError, CardError, ScenarioError, bounded, reason
+from airflock.errors import AirflockError, CardError, RecordingError, ScenarioError, bounded, reason
 from airflock.spelling import raised
 
 MOST_BYTES = 5_000_000  # of one text; a polygon of 100,000 corners takes some 4 MB
@@ -76,6 +76,13 @@ def from_outside(where: object, kind: type[AirflockError] = ScenarioError) -> It
 def _one(kind: type[AirflockError], line: str) -> AirflockError:
     line = bounded(" ".join(line.split()))
     return kind([line]) if issubclass(kind, (ScenarioError, CardError)) else kind(line)
+
+
+def path_of(path: Any) -> Path:
+    """The name of a file as a path. Raises RecordingError for what is no name."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise RecordingError(f"{bounded(repr(path), 80)} is no name of a file; give a text or a Path")
+    return Path(path)
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:

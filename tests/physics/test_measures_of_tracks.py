@@ -7,10 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import ParameterError
+from airflock.recordings.flights import simulate
 from airflock.recordings.imports.load import load_tracks
 from airflock.recordings.layout import dataset, frames_of
 from airflock.recordings.measures import bursts, correlation, delays, milling, neighbours, shape, surroundings, turning
 from airflock.recordings.measures.states import states
+from airflock.recordings.scores import score
+from airflock.scenarios.files import load
 
 
 def recording(place, speed, period=0.1):
@@ -250,6 +253,25 @@ def test_of_a_pair_one_leads_and_the_other_follows_in_a_periodic_flight():
     assert table["delay"].abs().to_list() == pytest.approx([1.0, 1.0]) and table["delay"].sum() == 0.0
 
 
+@pytest.mark.parametrize("shift", [(1.7, -2.2), (2.5, 2.5), (-0.4, 4.9)])
+def test_in_a_periodic_world_neighbours_are_near_across_its_border(shift):
+    """Wherever the border is drawn, the flock is the same; and the scores say the same of it."""
+    found = simulate(load("vicsek_1995/ordered", {"agents": 40, "duration": 3.0}), 1, precision=64)
+    moved = found.copy(deep=True)
+    place = moved["position"].values + np.array(shift)[None, :, None, None]
+    moved["position"].values[:] = (place + 2.5) % 5.0 - 2.5
+    for measure in (
+        neighbours.nearest_distances,
+        lambda r: neighbours.pair_distances(r, 0.25, 2.5),
+        lambda r: correlation.velocity_correlation(r, 0.5),
+        lambda r: surroundings.density_map(r, 2.0, 5),
+        lambda r: surroundings.anisotropy(r, 1.0),
+    ):
+        np.testing.assert_allclose(measure(moved), measure(found), rtol=1e-9, atol=1e-9)
+    told = score(found, settings={"metrics.kind": "vasarhelyi"})["r_min_mean"][0]
+    assert float(neighbours.nearest_distances(found).mean()) == pytest.approx(told, rel=1e-9)
+
+
 def test_velocities_of_all_who_move_alike_have_no_correlation():
     place = crowd(11, frames=1)[0] + np.arange(50)[:, None, None] * np.array([[0.1], [0.02]])
     rounded = np.float32(0.7) * (1.0 + np.random.default_rng(1).integers(-1, 2, place.shape) * np.float32(6e-8))
@@ -304,3 +326,29 @@ def test_velocities_beside_a_gap_are_those_of_the_scores():
     frames, _, present = frames_of(tracks(place))
     found = states(tracks(place))
     assert (found.present == present).all() and np.array_equal(found.velocity, frames[:, 2:], equal_nan=True)
+
+
+def test_each_measure_says_its_units():
+    """Turned into centimetres, each value grows as its unit says."""
+    place, speed = crowd(5, frames=30)
+    speed[:, 0] += 4.0 * np.sin(np.arange(30))[:, None]
+    metres, centimetres = recording(place, speed), recording(100.0 * place, 100.0 * speed)
+    measures = {
+        bursts.bursts: (0.5,), correlation.velocity_correlation: (2.0,), delays.delay_correlation: (),
+        delays.leadership: (1.0, -1.0), milling.milling: (), neighbours.nearest_distances: (),
+        neighbours.pair_distances: (2.0, 40.0), shape.group_shape: (), surroundings.density_map: (10.0, 4),
+        turning.turning_speed: (),
+    }  # fmt: skip
+    lengths = {bursts.bursts, correlation.velocity_correlation, neighbours.pair_distances, surroundings.density_map}
+    factors = {"1": 1.0, "s": 1.0, "rad/s": 1.0, "m": 100.0, "m/s": 100.0, "m^2": 1e4, "1/m": 0.01, "1/m^2": 1e-4}
+    for measure, numbers in measures.items():
+        scale = [100.0 if measure in lengths and isinstance(number, float) else 1 for number in numbers]
+        larger = [by * number for by, number in zip(scale, numbers, strict=True)]
+        one, other = measure(metres, *numbers), measure(centimetres, *larger)
+        units = one.attrs["units"]
+        if isinstance(units, dict):
+            assert set(units) == set(one.select_dtypes("number").columns), measure
+            for name, unit in units.items():
+                np.testing.assert_allclose(other[name], factors[unit] * one[name], rtol=1e-9, err_msg=name)
+        else:
+            np.testing.assert_allclose(other, factors[units] * one, rtol=1e-9, atol=1e-12)

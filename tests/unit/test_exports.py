@@ -38,6 +38,19 @@ def test_tables_come_back_with_the_same_bits(recording, tmp_path, ending):
     assert back["confidence"].values[60, 0, 2] == 0.0
 
 
+@pytest.mark.parametrize(("command", "unit"), [("heading", "1"), ("acceleration", "m/s^2")])
+@pytest.mark.parametrize("layout", ["movement", "px4"])
+def test_what_is_commanded_is_no_velocity_because_it_was_a_table(recording, tmp_path, command, unit, layout):
+    """A heading came back as 1 m/s, which identify took for the largest speed; an acceleration was refused."""
+    given = recording.copy()
+    given["command"] = given["command"].assign_attrs(units=unit)
+    path = airflock.export(given, tmp_path / "tracks.csv", layout=layout)
+    assert f"cx [{unit}]" in pd.read_csv(path, nrows=1)
+    back = airflock.load_tracks(path, axes="ned" if layout == "px4" else "")
+    assert "command" not in back and "no commanded velocity: left out" in back.attrs["airflock_import"]
+    np.testing.assert_allclose(back["position"].values[:, :2], recording["position"].values, atol=1e-5)
+
+
 @pytest.mark.parametrize("space", [2, 3])
 def test_a_table_like_a_log_of_px4_comes_back_by_its_axes(recording, tmp_path, space):
     from airflock.recordings.layout import dataset

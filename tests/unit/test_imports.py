@@ -430,3 +430,116 @@ def test_places_that_nobody_flies_at_are_refused_in_one_line(far):
     table["x"] += far
     line = refused(table.drop(columns=["vx", "vy", "cx", "cy"]))
     assert "\n" not in line and "m from the origin" in line and "bird_" in line
+
+
+def plane(count=40, **columns):
+    """One bird of Movebank that goes north, a row each second."""
+    return pd.DataFrame({
+        "timestamp": pd.date_range("2024-01-01", periods=count, freq="1s"),
+        "location-long": 19.04,
+        "location-lat": 47.5 + 1e-5 * np.arange(count),
+        "individual-local-identifier": "stork",
+        **columns,
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("lacking", [slice(0, 5), slice(10, 12), slice(35, 40)])
+def test_a_row_without_a_height_does_not_take_the_others_along(lacking):
+    """The first fix is the origin; where its height was missing nobody was anywhere, and nobody was told."""
+    heights = np.full(40, 300.0)
+    whole = airflock.load_tracks(plane(**{"height-above-ellipsoid": heights}), origin=(47.5, 19.04, 300.0))
+    heights[lacking] = np.nan
+    found = airflock.load_tracks(plane(**{"height-above-ellipsoid": heights}), origin=(47.5, 19.04, 300.0), bridge=0.0)
+    there = found["confidence"].values[:, 0, 0] == 1.0
+    kept = np.delete(values(whole), lacking, axis=0)
+    np.testing.assert_allclose(values(found)[there], kept, atol=1e-4)
+    assert np.isnan(values(found)[~there]).all() and there.sum() == np.isfinite(heights).sum()
+    assert "rows of stork without a height left out" in found.attrs["airflock_import"]
+    assert np.isfinite(values(airflock.load_tracks(plane(**{"height-above-ellipsoid": heights})))[-8:-6]).all()
+
+
+def test_a_column_of_heights_without_one_is_none():
+    flat = airflock.load_tracks(plane())
+    found = airflock.load_tracks(plane(**{"height-above-ellipsoid": np.nan}))
+    assert np.array_equal(values(found), values(flat)) and "holds no height" in found.attrs["airflock_import"]
+    assert values(airflock.load_tracks(circle().assign(z=np.nan))).shape == (400, 2, 1)
+    table = pd.concat([circle().assign(id="a", z=5.0), circle(1).assign(id="b", z=np.nan)])
+    assert 'column z holds no height of b, but of others; leave it out, or put all at one height: --map "z:=0"' in (
+        refused(table)
+    )
+
+
+def test_velocities_that_are_not_there_are_differentiated():
+    table = circle()
+    bare = values(airflock.load_tracks(table[["t", "x", "y"]]), "velocity")
+    empty = airflock.load_tracks(table.assign(vx=np.nan, vy=np.nan))
+    assert np.array_equal(values(empty, "velocity"), bare) and "no velocity" in empty.attrs["airflock_import"]
+    table.loc[5:8, "vx"] = np.nan
+    found = values(airflock.load_tracks(table), "velocity")
+    assert np.array_equal(found[5:9, 0], bare[5:9, 0])
+    np.testing.assert_array_equal(found[20:, 0, 0], circle()["vx"].to_numpy(np.float32)[20:])
+
+
+def test_rows_that_cannot_be_placed_are_told():
+    table = flock()
+    table.loc[0:4, "id"] = None
+    table.loc[10, "t"] = np.nan
+    table.loc[table["id"] == "bird_2", "x"] = np.nan
+    found = airflock.load_tracks(table)
+    notes = json.loads(found.attrs["airflock_import"])["notes"]
+    assert "DataFrame: 5 rows without an id left out, first row 0" in notes
+    assert "DataFrame: 1 rows without a time left out, first row 10" in notes
+    assert "DataFrame: bird_2: has no position at any time: left out" in notes
+    assert list(found["individual"].values) == ["bird_0", "bird_1"]
+    assert refused(table.assign(x=np.nan)) == "DataFrame: no row has both a time and a position"
+
+
+def test_rows_without_satellite_time_are_kept():
+    """A receiver tells the time once a second, the estimator its position twenty times."""
+    table = circle()
+    second = np.arange(len(table)) % 20 == 0
+    table["utc"] = np.where(second, 1.7e9 + table["t"], np.nan)
+    found = airflock.load_tracks(table)
+    np.testing.assert_allclose(values(found)[:, :, 0], circle()[["x", "y"]].to_numpy(), atol=1e-5)
+
+
+def test_a_masked_place_is_missing_and_an_object_that_is_a_number_is_one():
+    array = np.stack([circle(i)[["x", "y"]].to_numpy() for i in range(2)], axis=1)
+    hidden = np.ma.array(array, mask=False)
+    hidden[100:200, 0] = np.ma.masked
+    found = values(airflock.load_tracks(hidden, fps=RATE, unit="m"))
+    assert np.isnan(found[100:200, :, 0]).all() and np.isfinite(found[:, :, 1]).all()
+    whole = values(airflock.load_tracks(array, fps=RATE, unit="m"))
+    assert np.array_equal(values(airflock.load_tracks(array.astype(object), fps=RATE, unit="m")), whole)
+    assert "holds what is no number" in refused(np.full((5, 2, 2), "x", object), fps=1.0, unit="m")
+    assert "holds complex128, not numbers" in refused(array + 1j, fps=1.0, unit="m")
+
+
+def test_a_dataset_whose_time_is_dates_or_durations_needs_no_unit():
+    plain = airflock.load_tracks(flock(), precision=64)
+    seconds = plain["time"].values
+    for times in (
+        pd.to_timedelta(seconds, unit="s"),
+        pd.Timestamp("2024-03-31T00:59:50") + pd.to_timedelta(seconds, "s"),
+    ):
+        found = airflock.load_tracks(plain.assign_coords(time=times), precision=64)
+        assert found.attrs["fps"] == RATE
+        np.testing.assert_allclose(values(found), values(plain), atol=1e-5)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(3.02, None), (3.02, 7.01), (3.05, 7.05), (-1.01, None), (0.0, 25.0)])
+def test_a_window_holds_the_frames_that_lie_in_it(begin, end):
+    """One that began between two frames held none of them: places halfway between, and an absent one in front."""
+    own = circle()
+    found = airflock.load_tracks(own, begin=begin, end=end, precision=64)
+    times = found["time"].values + found.attrs["airflock_begin"]
+    assert begin <= times[0] + 1e-9 < begin + 1.0 / RATE + 1e-9
+    there = found["confidence"].values[:, 0, 0] == 1.0
+    inside = own[(own["t"] >= begin - 1e-9) & (own["t"] <= (end or 1e9) + 1e-9)]
+    np.testing.assert_array_equal(values(found)[there, :, 0], inside[["x", "y"]].to_numpy())
+    np.testing.assert_allclose(times[there], inside["t"], atol=1e-9)
+
+
+def test_two_individuals_of_one_name_in_a_dataset_are_told():
+    found = airflock.load_tracks(flock(1))
+    assert "bird_0 is also in dataset" in refused(xr.concat([found, found], "individual"))

@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airflock.errors import AirflockError, ScenarioError
+from airflock.scenarios.change import variant
 from airflock.scenarios.files import load, presets
 from airflock.scenarios.making import make
 
@@ -219,6 +220,20 @@ def test_what_a_paper_reports_is_shown_however_it_is_written(entry):
 def test_what_a_paper_cannot_report_is_refused(entry):
     (line,) = faults_of({"published": {"phi_vel": entry}})
     assert line.startswith("vasarhelyi_2018/4ms: published.phi_vel = ") and "give a number, [mean, sd]" in line
+
+
+def test_another_law_begins_from_its_own_numbers():
+    """As another body, sensor or radio does, and as `law=` and `extends` do: r0_frict is no number of Algorithm A."""
+    given, named = (
+        load("vasarhelyi_2018/4ms", law="viragh_2014"),
+        load("vasarhelyi_2018/4ms", {"model.kind": "viragh_2014"}),
+    )
+    assert named.parameters == given.parameters and not named.published
+    assert "model.kind = 'viragh_2014': the numbers of the file's vasarhelyi_2018 are left out" in named.notes
+    same = load("vasarhelyi_2018/4ms", {"model.kind": "vasarhelyi_2018"})
+    assert same.parameters == load("vasarhelyi_2018/4ms").parameters and same.published
+    assert load("vasarhelyi_2018/4ms", {"model.kind": "viragh_2014", "model.v_flock": 3.0}).parameters.v_flock == 3.0
+    assert variant(named, {"model.kind": "vicsek_1995", "body.kind": "heading"}).model.name == "vicsek_1995"
 
 
 def test_numbers_of_numpy_are_numbers_and_texts_and_truth_values_are_not():

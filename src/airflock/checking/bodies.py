@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.aero.wing import Parameters as Wing
+from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.scenes import MIRROR, turn_about_vertical
 from airflock.checking.single import run
@@ -17,6 +18,7 @@ from airflock.core.parameters import choices
 from airflock.core.vocabulary import asks
 from airflock.rules import law
 from airflock.scenarios.families import BODY
+from airflock.scenarios.seeds import sound_seed
 
 MOTIONS = 40  # random motions that each truth is tried on
 REMEMBERED = 5  # steps after which a body that remembers is looked at
@@ -59,9 +61,9 @@ def check_body(what: Any, parameters: Mapping[str, Any] | None = None, *, seed: 
     ()
     """
     found = accepted(BODY.given(what))
-    b = found.Parameters(**dict(parameters or {}))
+    b = with_values(found.Parameters, parameters, "body")
     speed = float(min(getattr(b, "speed", getattr(b, "speed_max", 5.0)), 5.0))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(sound_seed(seed))
     motions = [_motion(found, rng, speed) for _ in range(MOTIONS)]
     turn = turn_about_vertical(1.1)
     truths: Truths = {

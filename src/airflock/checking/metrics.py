@@ -17,6 +17,7 @@ from airflock.rules import law
 from airflock.scenarios.families import METRICS, Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 AGENTS, INSTANTS, FLIGHTS = 6, 5, 8
 CLOSE = 1e-9
@@ -59,7 +60,7 @@ def check_metric(what: Any, *, dimensions: int = 3, seed: int = 0) -> Report:
     """
     found = accepted(METRICS.given(what))
     scenario = _scenario(found, dimensions)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(sound_seed(seed))
     flocks = [_flock(rng, dimensions) for _ in range(FLIGHTS)]
     turn = turn_about_vertical(rng.uniform(0.5, 2.5))
     order = rng.permutation(AGENTS)

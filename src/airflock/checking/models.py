@@ -1,5 +1,6 @@
 """The standing list for a flocking law: symmetries, a lone agent, two agents, time step, units, single precision."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -28,8 +29,10 @@ from airflock.core.contract import Model, model
 from airflock.core.parameters import choices
 from airflock.core.vocabulary import Own, Percept, asks
 from airflock.engine import fly, plan_of
+from airflock.scenarios.document import keyed
 from airflock.scenarios.laws import find_model
 from airflock.scenarios.scenario import Scenario
+from airflock.scenarios.seeds import sound_seed
 
 SCENES = 12  # random scenes that each symmetry is tried on
 CLOSE = 1e-9  # of the largest command: more than rounding
@@ -54,7 +57,7 @@ def check_model(
 
     Parameters
     ----------
-    law : Model, module, class, mapping or str
+    law : Model, module, class, mapping, str or path
         A flocking law: a Model, a namespace such as globals(), a name of ours, or a file that ends in .py.
     parameters : mapping, optional
         Values that differ from the defaults, by name.
@@ -82,9 +85,11 @@ def check_model(
     >>> report.broken
     ()
     """
-    found = law if isinstance(law, Model) else find_model(law, trust=True) if isinstance(law, str) else model(law)
-    made = law_of(found, dict(parameters or {}), dimensions)
-    rng = np.random.default_rng(seed)
+    if isinstance(law, (str, os.PathLike)):
+        law = find_model(str(law), trust=True)
+    found = law if isinstance(law, Model) else model(law)
+    made = law_of(found, keyed(parameters, f"check of {found.name}"), dimensions)
+    rng = np.random.default_rng(sound_seed(seed))
     scenes = [made.scene(rng) for _ in range(SCENES)]
     turns = [turn_about_vertical(rng.uniform(0.1, 6.2)) for _ in scenes]
     truths: Truths = {

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.single import run
 from airflock.checking.units import OTHERS, Units, rescaled
@@ -15,6 +16,7 @@ from airflock.core.radio import RULES, Radio
 from airflock.core.vocabulary import VOCABULARY, asks
 from airflock.rules import law
 from airflock.scenarios.families import RADIO
+from airflock.scenarios.seeds import sound_seed
 
 TRIES = 60  # random pairs that each truth is tried on
 CLOSE = 1e-9
@@ -56,7 +58,7 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
     ()
     """
     found = accepted(RADIO.given(what))
-    k = found.Parameters(**dict(parameters or {}))
+    k = with_values(found.Parameters, parameters, "radio")
     pairs = list(_pairs(found, seed))
     rules = [rule for kind in RULES if (rule := getattr(found, kind)) is not None]
     truths: Truths = {
@@ -72,7 +74,7 @@ def check_radio(what: Any, parameters: Mapping[str, Any] | None = None, *, seed:
 
 def _pairs(found: Radio, seed: int) -> Iterator[dict[str, Any]]:
     """What rules may be asked with of random pairs of agents."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(sound_seed(seed))
     names = {name for kind in RULES for name in VOCABULARY[kind]}
     for number in range(TRIES):
         offset = 30.0 * rng.normal(size=3)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.checking.flock import of_model
+from airflock.checking.given import with_values
 from airflock.checking.units import Units
 from airflock.core.agent import Heard, State, decide
 from airflock.core.contract import Model
@@ -99,7 +100,7 @@ class Law:
 
 def law_of(found: Model, parameters: Mapping[str, Any], dimensions: int) -> Law:
     """A law in a scene of its own size: a square arena of a few ranges, decisions every fifth step."""
-    p = found.Parameters(**parameters)
+    p = with_values(found.Parameters, parameters, "model")
     known = found.interaction_range or found.reach
     length = min(float(known(p)), 1e3) if known else 20.0
     keys = {f"model.{name}": value for name, value in parameters.items()}

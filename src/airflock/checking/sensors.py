@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.single import run
 from airflock.checking.units import OTHERS, Units, rescaled
@@ -16,6 +17,7 @@ from airflock.core.sensor import COMPONENTS, Sensor
 from airflock.core.vocabulary import asks
 from airflock.rules import law
 from airflock.scenarios.families import SENSOR
+from airflock.scenarios.seeds import sound_seed
 
 TRACKS, MEASUREMENTS = 8, 60  # random tracks that each truth is tried on, and how often each is measured
 LONG = 3000  # measurements after which an error is still bounded
@@ -56,9 +58,9 @@ def check_sensor(what: Any, parameters: Mapping[str, Any] | None = None, *, seed
     ()
     """
     found = accepted(SENSOR.given(what))
-    s = found.Parameters(**dict(parameters or {}))
+    s = with_values(found.Parameters, parameters, "sensors")
     period = s.period or 0.2
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(sound_seed(seed))
     tracks = [_track(rng, period) for _ in range(TRACKS)]
     rule = found.measure or found.error
     assert rule is not None

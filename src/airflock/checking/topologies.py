@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from airflock.checking.given import with_values
 from airflock.checking.report import Report, Truths, accepted, reported
 from airflock.checking.units import OTHERS, rescaled
 from airflock.core.maths import FAR, TINY
@@ -14,6 +15,7 @@ from airflock.core.topology import Topology
 from airflock.core.vocabulary import asks
 from airflock.rules import law
 from airflock.scenarios.families import TOPOLOGY
+from airflock.scenarios.seeds import sound_seed
 from airflock.topology.parameters import Parameters as Usual
 
 TRIES = 40  # random flocks that each truth is tried on
@@ -66,7 +68,7 @@ def check_topology(what: Any, parameters: Mapping[str, Any] | None = None, *, se
     ()
     """
     found = _gathered(what)
-    t = (found.Parameters or Usual)(**dict(parameters or {}))
+    t = with_values(found.Parameters or Usual, parameters, "topology")
     flocks = list(_flocks(found, seed))
     truths: Truths = {
         "rule": ("the rule holds nothing that a compiler refuses", lambda: "".join(law.faults(found.meet)[:1])),
@@ -88,7 +90,7 @@ def _gathered(what: Any) -> Topology:
 
 def _flocks(found: Topology, seed: int) -> Iterator[Others]:
     """The others of an agent, at random places and on a lattice, some of them not heard."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(sound_seed(seed))
     for number in range(TRIES):
         count = int(rng.integers(1, 25))
         offsets = 20.0 * rng.normal(size=(count, 3))

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from airflock.core.vectors import MOST, Vector, Vectors
 from airflock.errors import ParameterError
+from airflock.numeric import is_number
 
 
 def with_unit(text: str, unit: str) -> str:
@@ -129,6 +130,9 @@ def quantity(
         raise ParameterError(f"default = {default} of several numbers needs their size ({meaning})")
     if usual is not None and not low <= usual[0] < usual[1] <= high:
         raise ParameterError(f"usual = {usual} is no span inside [{low:g}, {high:g}] ({meaning})")
+    for name, end in (("low", low), ("high", high)):
+        if not is_number(end):
+            raise ParameterError(f"{name} = {end!r} is not a number ({meaning})")
     record = Quantity(unit, float(low), float(high), meaning, source, default is None, whole, usual)
     return field(default=default, metadata={"airflock": record})
 
@@ -251,7 +255,8 @@ def quantity_fault(value: Any, declared: Quantity) -> str:
 
 def choice_fault(value: Any, declared: Choice) -> str:
     """What is wrong with a choice, as the rest of a sentence; empty if nothing is."""
-    return "" if value in declared.options else f"= {value!r} is none of {', '.join(declared.options)}"
+    known = isinstance(value, str) and value in declared.options
+    return "" if known else f"= {value!r} is none of {', '.join(declared.options)}"
 
 
 def points_fault(value: Any, declared: Points) -> str:

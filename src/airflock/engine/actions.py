@@ -121,12 +121,12 @@ class Actions(Readings):
         wait   : as in `change`
         Raises ScenarioError, and the flight is as it was.
         """
-        given = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
+        whom = {} if agents is None else {"agents": [*agents] if isinstance(agents, Iterable) else [agents]}
+        given = keyed({"kind": kind, **whom, **numbers}, self.scenario.name)
         base = self._course.latest
         at = (self.step + (1 if self._course.sensed else 0)) * self.scenario.flight.dt
-        entry = {"kind": kind, "at": at, **given, **numbers}
-        data = {"kind": kind, **given, **numbers}
-        return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", data), wait)
+        entry = {"at": at, **given}
+        return self._change({"faults": [*named(base), entry]}, Event(self.step, "fault", given), wait)
 
     def remove(self, agent: int | Sequence[int], reason: str = "") -> Self:
         """Let an agent, or several, drop out: landed or failed. From now on nobody meets, hears, feels or counts them.

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Future
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -258,9 +259,9 @@ class Course:
 
     def to_world(self, world: Any) -> None:
         """Draw from another world's random numbers from now on. Raises FlightError."""
-        if isinstance(world, bool) or not isinstance(world, int) or not 0 <= world < 2**32:
+        if isinstance(world, bool) or not isinstance(world, Integral) or not 0 <= int(world) < 2**32:
             raise FlightError(f"world = {world!r} is not a whole number from 0 to 2^32 - 1")
-        self.world = world
+        self.world = world = int(world)
         self.state.set_whole("world", world)
         if self.state.plan.faults:
             before = [onset for onset in self.state.tables.due if onset.step < self.step]

@@ -1,6 +1,7 @@
 """Scores of many flights, in their order: flown in this process, or on the workers of a scheduler."""
 
 from collections.abc import Callable, Sequence
+from numbers import Integral
 from typing import Any
 
 from airflock.engine import picked, score_flights
@@ -25,6 +26,8 @@ def scores(
     scheduler : address of a dask scheduler whose workers fly; None: this process, with so many threads on a device
     Raises FlightError for a flight that goes wrong, StudyError for a scheduler that does not answer.
     """
+    if threads is not None and not isinstance(threads, Integral):
+        raise FlightError(f"threads = {threads!r} is not a whole number of flights side by side")
     if scheduler is not None:
         return _on_workers(scheduler, scenarios, seeds, precision, device, done)
     device = picked(scenarios, device, precision=precision, say=say)

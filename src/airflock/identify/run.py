@@ -203,7 +203,7 @@ def identify(
         raise AirflockError(f"{scenario.name}: its body is not the multirotor that identify knows")
     if not isinstance(scenario.sensors, langevin.Parameters):
         raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
-    findings = Findings(frozenset(accept))
+    findings = Findings(frozenset([accept] if isinstance(accept, str) else accept))
     logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
     if heard is not None:
         logs, aligned = _on_one_clock(logs, packets.checked(heard))

@@ -76,6 +76,9 @@ def infer(
     >>> found.verdict  # doctest: +SKIP
     'couzin_2002 explains the tracks best'
     """
+    models = [models] if isinstance(models, str) else models
+    if not isinstance(models, Iterable):
+        raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
         raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
     say = done or (lambda _: None)
@@ -188,6 +191,8 @@ def _teller(say: Callable[[str], None], name: str) -> Callable[[], None]:
 def recordings_of(what: Any) -> list[tuple[str, xr.Dataset]]:
     """Recordings by name: given ones, saved ones, or files that `load_tracks` reads without options."""
     several: Iterable[Any] = [what] if isinstance(what, (xr.Dataset, str, Path)) else what
+    if not isinstance(several, Iterable):
+        raise RecordingError(f"{type(what).__name__} holds no tracks; give recordings or files")
     found = []
     for number, each in enumerate(several, 1):
         if isinstance(each, xr.Dataset):

@@ -23,7 +23,7 @@ from airflock.scenarios.making import make
 from airflock.scenarios.own_code import law_hash
 from airflock.scenarios.scenario import Scenario
 from airflock.suffixes import RECORDINGS, suffix_fault
-from airflock.untrusted import from_outside
+from airflock.untrusted import from_outside, path_of
 
 
 def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
@@ -57,8 +57,8 @@ def save(recording: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     >>> airflock.save(airflock.simulate(short), "flight.nc").name
     'flight.nc'
     """
-    check(recording, str(path))
-    target = Path(path)
+    target = path_of(path)
+    check(recording, str(target))
     wrong = suffix_fault(target, RECORDINGS)
     if wrong:
         raise RecordingError(wrong)

@@ -126,6 +126,8 @@ def recording_of(flight: Flight) -> xr.Dataset:
     >>> airflock.recording_of(flight).sizes["time"]
     3
     """
+    if not isinstance(flight, Flight):
+        raise FlightError(f"{type(flight).__name__} is no open flight; airflock.open gives one")
     scenario, seed, precision, start = flight.origin
     attributes = provenance(scenario, seed, precision) | {"random_start": int(start is None)}
     attributes |= {"airflock_device": flight.device} if flight.device != "cpu" else {}

@@ -10,9 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings import images
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import measure, scenario_of
-from airflock.world.place import half_sizes
 
 BETWEEN = {
     "r_centres": ("m", "mean distance of the centres of two groups; nan in a periodic world"),
@@ -40,7 +40,7 @@ def group_scores(
         rows[group.name] = measure(recording.isel(individual=list(group.agents)), settings, trust=trust)[0]
     frames, _, present = frames_of(recording)
     dims, world = frames.shape[1] // 2, scenario.world
-    box = 2.0 * np.array(half_sizes(world)[:dims]) if world.edges == "periodic" else None
+    box = images.sides(world, dims)
     for one, other in combinations(groups, 2):
         pair = (list(one.agents), list(other.agents))
         rows[f"{one.name} to {other.name}"] = _between(frames, present, pair, dims, box)
@@ -64,9 +64,7 @@ def _between(
         if not len(part):
             continue
         (xa, xb), (ha, hb) = ([array[part][:, :, who] for who in pair] for array in (x, heading))
-        gap = xb[:, :, None, :] - xa[:, :, :, None]
-        if box is not None:
-            gap -= box[None, :, None, None] * np.round(gap / box[None, :, None, None])
+        gap = images.nearest(xb[:, :, None, :] - xa[:, :, :, None], box, axis=1)
         nearest = min(nearest, float(np.nanmin(np.linalg.norm(gap, axis=1))))
         apart += np.linalg.norm(np.nanmean(xb, axis=2) - np.nanmean(xa, axis=2), axis=1).tolist()
         cosines += np.nanmean((hb[:, :, None, :] * ha[:, :, :, None]).sum(axis=1), axis=(1, 2)).tolist()

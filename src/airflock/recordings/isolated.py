@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from airflock.errors import RecordingError
-from airflock.untrusted import from_outside, is_file
+from airflock.untrusted import from_outside, is_file, path_of
 
 LEAST_TIME = 15.0  # s of a processor that a file of any size may take
 WAIT = 4.0  # times as long it may take where processors are busy with other things
@@ -44,7 +44,7 @@ class Opening:
 
         Raises RecordingError where there is no such file or no process can be started.
         """
-        self.path = Path(path)
+        self.path = path_of(path)
         if not is_file(self.path):
             raise RecordingError(f"{self.path}: no such file")
         if how == "recording" and self.path.suffix.lower() in FOREIGN:

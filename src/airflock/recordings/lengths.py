@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from airflock.errors import RecordingError
+from airflock.numeric import is_number
 
 FITNESS = "r_cluster", "r_coll", "r_comm", "v_flock"
 # Order parameter: keys of `metrics` that it depends on.
@@ -54,6 +55,8 @@ def in_bodies(length: float) -> dict[str, float]:
     RecordingError
         If the length is not a positive number.
     """
+    if not is_number(length):
+        raise RecordingError(f"body_length = {length!r} is not a number; give (0, 1000] m")
     if not 0.0 < length <= 1000.0:
         raise RecordingError(f"body_length = {length:g} m lies outside (0, 1000] m")
     return {f"metrics.{key}": share * length for key, share in IN_BODIES.items()}

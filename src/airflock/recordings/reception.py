@@ -8,9 +8,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import RecordingError
+from airflock.recordings import images
 from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import scenario_of
-from airflock.world.place import half_sizes
 
 BINS = 24
 LEVELS = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
@@ -60,13 +60,11 @@ def _of_recording(recording: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
     if age.shape != (len(frames), agents, agents):
         raise RecordingError(f"recording: age has the sizes {age.shape}, not {(len(frames), agents, agents)}")
     world = scenario_of(recording).world if recording.attrs.get("airflock_scenario") else None
-    box = 2.0 * np.array(half_sizes(world)[:axes]) if world is not None and world.edges == "periodic" else None
+    box = images.sides(world, axes) if world is not None else None
     off = ~np.eye(agents, dtype=bool)
     distances, ages = [], []
     for place, old, there in zip(frames[:, :axes], age, present, strict=True):
-        gap = place[:, None, :] - place[:, :, None]
-        if box is not None:
-            gap -= box[:, None, None] * np.round(gap / box[:, None, None])
+        gap = images.nearest(place[:, None, :] - place[:, :, None], box)
         both = off & there[:, None] & there[None, :]
         distances.append(np.sqrt((gap**2).sum(axis=0))[both])
         ages.append(old[both])

@@ -25,6 +25,7 @@ from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.recordings.own_kinds import missing_kinds, with_files
 from airflock.scenarios.change import variant
+from airflock.scenarios.document import keyed
 from airflock.scenarios.families import Given
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
@@ -105,7 +106,8 @@ def score(
     ([0, 1, 2], 'm/s')
     """
     if isinstance(what, xr.Dataset):
-        settings = in_bodies(body_length) | dict(settings or {}) if body_length is not None else settings
+        settings = keyed(settings, "recording")
+        settings = in_bodies(body_length) | settings if body_length is not None else settings
         settings = aero_settings(what, settings) if aero else settings
         if groups:
             from airflock.recordings.groups import BETWEEN, group_scores
@@ -270,9 +272,10 @@ def scenario_of(recording: xr.Dataset, settings: Mapping[str, Any] | None = None
     """
     check_format(recording)
     document = scenario_document(recording)
+    settings = keyed(settings, str(recording.attrs.get("airflock_name", "recording")))
     if document is not None:
         with from_outside(str(recording.attrs.get("airflock_name", "recording")), RecordingError):
-            return _flown(document, settings or {}, recording, trust)
+            return _flown(document, settings, recording, trust)
     frames, period, _ = frames_of(recording)
     dims = frames.shape[1] // 2
     speed = float(np.nanmean(np.linalg.norm(frames[:, dims:], axis=1)))

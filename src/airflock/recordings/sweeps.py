@@ -80,6 +80,8 @@ def sweep(
     >>> table = airflock.sweep(short, {"radio.delay": [0.0, 0.4, 0.8]}, seeds=2)
     >>> table.shape[0], list(table.columns[:2])
     (6, ['radio.delay', 'seed'])
+    >>> table.attrs["units"]["phi_vel"], table.attrs["meanings"]["phi_vel"]
+    ('m/s', 'mean speed')
     """
     points = grid(over)
     scenarios = scenarios_at(what, points, settings, law, trust=trust)
@@ -90,6 +92,8 @@ def sweep(
 
 def grid(over: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     """All combinations of the values of several keys; raises a ScenarioError that names keys without a list of them."""
+    if not isinstance(over, Mapping):
+        raise ScenarioError([f"over = {over!r}: give keys with lists of values, such as {{'radio.delay': [0.0, 1.0]}}"])
     lacking = [key for key, values in over.items() if isinstance(values, str) or not isinstance(values, Iterable)]
     if lacking:
         raise ScenarioError([f"{key} = {over[key]!r}: give the values to sweep over in a list" for key in lacking])
@@ -134,7 +138,11 @@ def flown(
     jobs = [(point, found, seed) for point, found in zip(points, scenarios, strict=True) for seed in seeds]
     flights = [found for _, found, _ in jobs]
     rows = scores(flights, [seed for _, _, seed in jobs], **options)
-    return pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    table = pd.DataFrame([{**point, "seed": seed, **row} for (point, _, seed), row in zip(jobs, rows, strict=True)])
+    known = {name: told for found in scenarios for name, told in reports(found.measures).items()}
+    for place, about in (("units", 0), ("meanings", 1)):
+        table.attrs[place] = {name: known[name][about] for name in table.columns if name in known}
+    return table
 
 
 def shown(asked: str | None, scenarios: Sequence[Scenario]) -> str:

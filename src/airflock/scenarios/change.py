@@ -37,7 +37,7 @@ def remade(scenario: Scenario, settings: Mapping[str, Any], *, started: bool = F
     kinds = {entry.fault.name: entry.fault for entry in scenario.faults}
     if "faults" not in settings and "faults" in document:
         document["faults"] = named(scenario)
-    law = None if shipped else scenario.model
+    law = None if shipped or "model.kind" in settings else scenario.model
     given = Given(law=law, kinds=kinds, laws=own_laws(scenario), **own)
     return make(document, scenario.name, settings, given=given, started=started)
 

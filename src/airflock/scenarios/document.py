@@ -14,7 +14,10 @@ TOP = ("model", *SECTIONS, "groups", "faults", "agents", "duration", "dt", "upda
 
 
 def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[str, ...]]:
-    """A document without the numbers of its body, sensor, radio or topology where settings name another; notes."""
+    """A document without the numbers of its law, body, sensor, radio or topology where settings name another; notes.
+
+    With its law goes what a paper published of it.
+    """
     notes: list[str] = []
     for family in FAMILIES:
         section = family.section
@@ -25,16 +28,32 @@ def with_kinds(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tupl
         if set(given) - {"kind", *kept}:
             notes.append(f"{key} = {settings[key]!r}: the numbers of the file's {family.kind(document)} are left out")
         document = {**document, section: kept}
+    law = document.get("model", {})
+    before = law.get("kind") if isinstance(law, Mapping) else None
+    before = before["value"] if isinstance(before, Mapping) and "value" in before else before
+    if "model.kind" in settings and before not in (None, settings["model.kind"]):
+        if set(law) - {"kind"}:
+            notes.append(f"model.kind = {settings['model.kind']!r}: the numbers of the file's {before} are left out")
+        document = {**document, "model": {}, "published": {}}
     return document, tuple(notes)
 
 
 def keyed(settings: Any, where: str) -> dict[str, Any]:
-    """Settings as a dict of keys and values; none for None. Raises ScenarioError for anything else."""
+    """Settings as a dict of keys and plain values; none for None. Raises ScenarioError for anything else."""
     if settings is None:
         return {}
     if not isinstance(settings, Mapping) or not all(isinstance(key, str) for key in settings):
         raise ScenarioError([f"{where}: settings {settings!r} are no keys with values, such as {{'dt': '10 ms'}}"])
-    return dict(settings)
+    return {key: _plain(value) for key, value in settings.items()}
+
+
+def _plain(value: Any) -> Any:
+    """A value without NumPy's types at any depth, as a file holds it: a recording writes it down as JSON."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return type(value)(map(_plain, value)) if type(value) in (list, tuple) else value
 
 
 def merged(document: Mapping[str, Any], settings: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:

@@ -32,6 +32,8 @@ KINDS = ("change", "command", "push", "place", "fault", "remove", "add", "branch
 
 def events_of(given: Sequence[Event | Mapping[str, Any]]) -> list[Event]:
     """Events from events or their plain dicts, in the order of their steps. Raises FlightError for one that is none."""
+    if not isinstance(given, Iterable):
+        raise FlightError(f"events = {given!r}: give a list of events, such as those of a flight")
     events = []
     for number, entry in enumerate(given):
         try:

@@ -134,6 +134,8 @@ def keys(section: str | None = None) -> list[Key]:
     every = [key for found in known.values() for key in found.keys]
     if section is None:
         return every
+    if not isinstance(section, str):
+        raise ScenarioError([f"{section!r} is no section or key; give its name, such as 'radio' or 'radio.delay'"])
     if section in KINDS:  # all that an entry of this kind may hold, and keys of the same name
         return [*known[section].keys, *known["faults"].keys, *(key for key in every if _last(key) == section)]
     if section in OTHER_RADIOS:  # behind what all radios have

@@ -91,7 +91,7 @@ def _python(value: Any, declared: Declaration | None) -> Any:
 def _is_wrong(value: Any, declared: Declaration) -> bool:
     """Whether a value of Python's own types is not what was declared."""
     if isinstance(declared, Quantity):
-        return value in (inf, -inf) or bool(quantity_fault(value, declared))
+        return bool(quantity_fault(value, declared)) or value in (inf, -inf)
     if isinstance(declared, Choice):
         return bool(choice_fault(value, declared))
     return not isinstance(value, str) if isinstance(declared, Text) else bool(points_fault(value, declared))

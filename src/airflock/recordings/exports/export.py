@@ -9,6 +9,7 @@ from airflock.errors import RecordingError
 from airflock.recordings.exports.movement import write_movement
 from airflock.recordings.exports.tables import write_csv, write_parquet
 from airflock.suffixes import suffix_fault
+from airflock.untrusted import path_of
 
 ENDINGS = (".csv", ".parquet", ".nc")
 LAYOUTS = ("movement", "movement-0.16", "px4")
@@ -44,7 +45,7 @@ def export(recording: xr.Dataset, path: str | os.PathLike[str], *, layout: str =
     >>> airflock.export(airflock.simulate(short), "flight.csv").name
     'flight.csv'
     """
-    target = Path(path)
+    target = path_of(path)
     wrong = suffix_fault(target, ENDINGS)
     if wrong:
         raise RecordingError(wrong)

@@ -16,7 +16,7 @@ COLUMNS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz"), "command
 
 
 def to_table(recording: xr.Dataset) -> pd.DataFrame:
-    """Long table: id, t [s], x [m], ..., vx [m/s], ..., cx, ...; rows where an individual is absent are left out."""
+    """Long table: id, t [s], x [m], ..., vx [m/s], ..., cx [m/s], ...; no rows where one is absent."""
     check(recording)
     order = ("individual", "time", "space", "keypoint")
     count, times = recording.sizes["individual"], recording["time"].values.astype(float)
@@ -30,7 +30,7 @@ def to_table(recording: xr.Dataset) -> pd.DataFrame:
         values = recording[variable].transpose(*order).isel(keypoint=0).values
         unit = str(recording[variable].attrs.get("units", ""))
         for c in range(recording.sizes["space"]):
-            header = f"{names[c]} [{unit}]" if unit and unit != "1" else names[c]
+            header = f"{names[c]} [{unit}]" if unit else names[c]
             columns[header] = values[:, :, c].reshape(-1)
     table = pd.DataFrame(columns)
     there = np.isfinite(table[[name for name in table if str(name).split()[0] in COLUMNS["position"]]]).all(axis=1)

@@ -19,9 +19,7 @@ def read_array(
     array: Any, options: Options, where: str = "array", names: list[str] | None = None, fps: float | None = None
 ) -> list[Track]:
     """Tracks of an array (frame, individual, 2 or 3); nan where an individual is not there."""
-    values = np.asarray(array)
-    if values.dtype == object or values.dtype.kind not in "fiu":
-        raise RecordingError(f"{where}: holds Python objects, which could run code when read; {PLAIN}{COMMAND}")
+    values = _numbers(array, where)
     if values.ndim == 2 and values.shape[1] in (2, 3):
         values = values[:, None, :]
     if values.ndim != 3 or values.shape[2] not in (2, 3):
@@ -44,6 +42,19 @@ def read_array(
     if not found:
         raise RecordingError(f"{where}: every position is missing")
     return found
+
+
+def _numbers(array: Any, where: str) -> Any:
+    """An array of numbers; nan where it is masked."""
+    hidden = np.ma.getmaskarray(array) if np.ma.isMaskedArray(array) else None
+    values = np.asarray(array)
+    if values.dtype.kind not in "fiuO":
+        raise RecordingError(f"{where}: holds {values.dtype}, not numbers; give positions as floats")
+    try:
+        values = values.astype(float) if values.dtype == object else values
+    except (TypeError, ValueError) as fault:
+        raise RecordingError(f"{where}: holds what is no number: {str(fault).splitlines()[0]}") from fault
+    return values if hidden is None else np.where(hidden, np.nan, values)
 
 
 def read_npy(path: Path, options: Options, findings: Findings) -> list[Track]:

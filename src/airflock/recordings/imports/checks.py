@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airflock.recordings.imports.expressions import quoted
-from airflock.recordings.imports.track import POSITION, Findings, Track
+from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Findings, Track
 
 STEPS = (1e-5, 1e5)  # s between rows: beyond, no track of an animal or a robot is meant
 LEAST = 0.2  # share of the common span below which an individual is worth a question
@@ -68,6 +68,34 @@ def check_names(tracks: list[Track], findings: Findings) -> None:
                 f"{track.source}: {track.name} is also in {known[track.name].source}; write --map id:=file, or rename"
             )
         known.setdefault(track.name, track)
+
+
+def check_columns(tracks: list[Track], findings: Findings) -> None:
+    """A column without a number says nothing, so it is none; a row without a height that others have is no place."""
+    for track in tracks:
+        for name in (*VELOCITY, *COMMAND):
+            if name in track.columns and not np.isfinite(track.columns[name]).any():
+                del track.columns[name]
+    for name in ("z", "alt"):
+        having = [track for track in tracks if name in track.columns]
+        flat = not any(np.isfinite(track.columns[name]).any() for track in having)
+        for track in having:
+            where, known = f"{track.source}: column {track.label(name)}", np.isfinite(track.columns[name])
+            if flat:
+                del track.columns[name]
+                line = f"{where} holds no height: read as in a plane"
+                findings.notes += [line] if line not in findings.notes else []
+            elif not known.any():
+                findings.fault(
+                    f"{where} holds no height of {track.name}, but of others; leave it out, "
+                    f'or put all at one height: --map "{name}:=0"'
+                )
+            elif not known.all():
+                row, count = track.rows[np.flatnonzero(~known)[0]], int((~known).sum())
+                findings.notes.append(
+                    f"{where}: {count} rows of {track.name} without a height left out, first row {row}"
+                )
+                track.keep(known)
 
 
 def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:

@@ -55,9 +55,13 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
     faults: list[str] = []
     options, notes = px4.as_logged(where, columns, options)
     found = Layout(where, notes=notes)
-    for step in (_mapped, _recognised):
-        with gathering(faults):
-            step(found, columns, options)
+    other = [column for column in columns if _commands_no_velocity(column)]
+    with gathering(faults):
+        _mapped(found, columns, options)
+    with gathering(faults):
+        _recognised(found, [column for column in columns if column not in other], options)
+    if other:
+        found.notes.append(f"{where}: {', '.join(other)}: no commanded velocity: left out")
     whole = not faults
     _frames(found, options, faults)
     if whole:
@@ -68,6 +72,12 @@ def layout(where: str, columns: Sequence[str], options: Options) -> Layout:
     for name in px4.beside(columns, options):
         found.trees[name], found.factors[name], found.labels[name] = expressions.parsed(repr(name), name), 1.0, name
     return found
+
+
+def _commands_no_velocity(column: str) -> bool:
+    """Whether a column holds a heading or an acceleration that was commanded."""
+    told = headers.meaning(column)
+    return told is not None and told.target in COMMAND and told.unit in headers.NO_SPEEDS
 
 
 def _mapped(found: Layout, columns: Sequence[str], options: Options) -> None:

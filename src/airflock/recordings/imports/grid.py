@@ -21,12 +21,18 @@ COARSE = 0.01  # m; where places are farther apart in single precision, they are
 
 
 def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: float | None) -> tuple[Any, float]:
-    """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given."""
+    """Times (s) from the first to the last row, and their distance; the tracks' own rate unless one is given.
+
+    A window that begins between two rows of the tracks' own rate begins at the later one, so that its times are theirs.
+    """
     usual = [period_of(track) for track in tracks if len(track.time) > 1]
     period = 1.0 / rate if rate else (float(np.median(usual)) if usual else 1.0)
     if not rate:
         period = _round(period)
-    first = min(track.time[0] for track in tracks) if begin is None else begin
+    first = float(min(track.time[0] for track in tracks))
+    if begin is not None:
+        early = np.floor((first - begin + _slack(period, first, begin)) / period)
+        first = begin if rate else first - float(early) * period
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
         raise RecordingError(f"no rows between {first:g} and {last:g} s")
@@ -132,7 +138,8 @@ def _fill(
     logged = track.has(VELOCITY)
     slopes = _slopes(own, rows, track.breaks, usual)
     for c, name in enumerate(VELOCITY[:axes] if logged else ()):
-        slopes[:, c] = track.columns.get(name, slopes[:, c])  # a height without a climb rate is differentiated
+        told = track.columns.get(name, slopes[:, c])
+        slopes[:, c] = np.where(np.isfinite(told), told, slopes[:, c])  # what is not logged is differentiated
     p, v = _hermite(rows, slopes, before, after, step, part)
     if logged:  # between two rows the logged velocity itself, not the slope of the curve through the positions
         v = slopes[before] + part[:, None] * (slopes[after] - slopes[before])

@@ -10,6 +10,7 @@ LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "in": 
 TIMES = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 SPEEDS = {"m/s": 1.0, "mps": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 1e-3, "km/h": 1 / 3.6, "kmh": 1 / 3.6,
           "kn": 1852.0 / 3600.0, "kt": 1852.0 / 3600.0, "ft/s": 0.3048}  # fmt: skip
+NO_SPEEDS = ("1", "m/s^2")  # units of commands that are headings or accelerations
 ANGLES = {"deg": 1.0, "°": 1.0, "degrees": 1.0}
 PIXELS = ("px", "pixel", "pixels")
 GIVE = "write --unit px --scale METRES_PER_PIXEL, or --unit mm, cm or m"  # where nothing tells the unit of a length

@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import RecordingError
+from airflock.numeric import is_number
 from airflock.recordings.imports import (
     arrays,
     checks,
@@ -92,7 +93,7 @@ def load_tracks(
         Window of time, s.
     same_clock : bool
         The clocks of several files agree.
-    accept : iterable of str
+    accept : str or iterable of str
         Kinds of faults that are meant so: absent, axes, down, duplicates, height, jumps, time.
     decimal, delimiter : str
         Of a text file: its decimal point, and what stands between columns, which is found out by default.
@@ -124,12 +125,13 @@ def load_tracks(
     {'time': 20, 'space': 2, 'keypoint': 1, 'individual': 2}
     """
     options = Options(
-        map=dict(map or {}), unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint, axes=axes,
-        decimal=decimal, delimiter=delimiter, done=done,
+        map={} if map is None else map, unit=unit, scale=scale, time_unit=time_unit, fps=fps, keypoint=keypoint,
+        axes=axes, decimal=decimal, delimiter=delimiter, done=done,
     )  # fmt: skip
     numbers = {"rate": rate, "bridge": bridge, "begin": begin, "end": end}
-    findings = Findings(frozenset(accept))
-    _sound(options, findings, numbers, precision)
+    findings = Findings()
+    _sound(options, findings, numbers, precision, accept, origin)
+    findings.accept = frozenset([accept] if isinstance(accept, str) else accept)
     tracks, comparable = read_tracks(what, options, findings, origin=origin, same_clock=same_clock)
     if begin is not None or end is not None:
         tracks = cut(tracks, begin, end)
@@ -171,6 +173,7 @@ def read_tracks(
     """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
     tracks = _read(what, options, findings)
     findings.refuse()
+    checks.check_columns(tracks, findings)
     for track in tracks:
         checks.check_time(track, findings)
     checks.check_names(tracks, findings)
@@ -235,23 +238,49 @@ def _placed(path: Path, tracks: list[Track]) -> list[Track]:
     return tracks
 
 
-def _sound(options: Options, findings: Findings, numbers: Mapping[str, float | None], precision: int) -> None:
+def _sound(
+    options: Options, findings: Findings, numbers: Mapping[str, Any], precision: Any, accept: Any, origin: Any
+) -> None:
     """Refuse options that cannot be meant, all at once."""
     faults = findings.faults
     known = {"unit": ("", *headers.LENGTHS, *headers.PIXELS), "time_unit": ("", *headers.TIMES, "frames")}
     for name, allowed in {**known, "axes": ("", "enu", "ned"), "decimal": (".", ",")}.items():
         value = getattr(options, name)
-        if value not in allowed:
+        if not isinstance(value, str) or value not in allowed:
             faults.append(f"{name} = {value!r} is none of {', '.join(text for text in allowed if text)}")
+    given = {name: getattr(options, name) for name in ("keypoint", "delimiter")}
+    faults += [f"{name} = {value!r} is no text" for name, value in given.items() if not isinstance(value, str)]
+    if not isinstance(options.map, Mapping):
+        faults.append(f'map = {options.map!r}: give targets with expressions, such as {{"t": "time_us*1e-6"}}')
+    else:
+        said = [(key, text) for key, text in options.map.items() if not isinstance(text, str)]
+        faults += [f"map: {key} = {text!r} is no text; an expression is one" for key, text in said]
     for name, number in {"scale": options.scale, "fps": options.fps, "rate": numbers["rate"]}.items():
-        if number is not None and not 0.0 < number < 1e9:
-            faults.append(f"{name} = {number:g} must be above 0")
-    if not 0.0 <= (numbers["bridge"] or 0.0) < 1e9:
-        faults.append(f"bridge = {numbers['bridge']:g} s must be 0 or more")
-    if precision not in (32, 64):
+        if number is not None and not (is_number(number) and 0.0 < number < 1e9):
+            faults.append(f"{name} = {_shown(number)} must be a number above 0")
+    if not (is_number(numbers["bridge"]) and 0.0 <= numbers["bridge"] < 1e9):
+        faults.append(f"bridge = {_shown(numbers['bridge'])} s must be a number, 0 or more")
+    for name in ("begin", "end"):
+        if numbers[name] is not None and not (is_number(numbers[name]) and np.isfinite(numbers[name])):
+            faults.append(f"{name} = {_shown(numbers[name])} is not a time in s")
+    if not is_number(precision) or precision not in (32, 64):
         faults.append(f"precision = {precision} is none of 32, 64")
-    faults += [f"accept = {kind} is none of {', '.join(ACCEPTED)}" for kind in findings.accept if kind not in ACCEPTED]
+    if origin is not None and not _is_origin(origin):
+        faults.append(f"origin = {origin!r} is not (latitude, longitude, height) in degrees, degrees and m")
+    kinds = [accept] if isinstance(accept, str) or not isinstance(accept, Iterable) else list(accept)
+    faults += [f"accept = {kind} is none of {', '.join(ACCEPTED)}" for kind in kinds if str(kind) not in ACCEPTED]
     findings.refuse()
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if is_number(value) else repr(value)
+
+
+def _is_origin(given: Any) -> bool:
+    """Whether something is a latitude, a longitude and a height."""
+    numbers = list(given) if isinstance(given, Iterable) else []
+    sound = len(numbers) == 3 and all(is_number(number) and np.isfinite(number) for number in numbers)
+    return sound and abs(numbers[0]) <= 90.0 and abs(numbers[1]) <= 360.0
 
 
 def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, findings: Findings) -> None:
@@ -303,8 +332,8 @@ def _project(track: Track, origin: tuple[float, float, float]) -> None:
     """Put local metres about an origin in the place of a track's latitude, longitude and height."""
     lat, lon = track.columns["lat"], track.columns["lon"]
     local = geodesy.enu(lat, lon, track.columns.get("alt", np.zeros(len(lat))), origin)
+    axes = 3 if "alt" in track.columns else 2
     track.columns = {k: v for k, v in track.columns.items() if k not in GEODETIC}
-    axes = 3 if "alt" in track.labels else 2
     track.columns |= {axis: local[:, c] for c, axis in enumerate(POSITION[:axes])}
     track.labels |= {"x": track.label("lon"), "y": track.label("lat"), "z": track.label("alt")}
     track.origin = origin

@@ -47,10 +47,10 @@ def read_dataset(dataset: xr.Dataset, options: Options, where: str = "dataset") 
         raise RecordingError("\n".join(faults))
     rows = np.arange(len(seconds))
     tracks = []
-    for name in found["individual"].values:
-        own = found.sel(individual=name)
+    for number, name in enumerate(found["individual"].values):
+        own = found.isel(individual=number)
         position = own["position"].transpose("time", "space").values.astype(float) * scale
-        there = np.isfinite(position).all(axis=1)
+        there = np.isfinite(position).all(axis=1) & np.isfinite(seconds)
         columns = {axis: position[there, c] for c, axis in enumerate(axes)}
         for variable, names in (("velocity", VELOCITY), ("command", COMMAND)):
             if variable in own and {"time", "space"} == set(own[variable].dims):
@@ -78,7 +78,11 @@ def _keypoint(found: xr.Dataset, options: Options, where: str) -> Any:
 
 
 def _seconds(found: xr.Dataset, options: Options, where: str) -> Any:
-    times = found["time"].values.astype(float)
+    times = found["time"].values
+    if times.dtype.kind in "mM":  # dates and durations of NumPy say themselves what they count
+        ticks = times.astype(f"{'timedelta64' if times.dtype.kind == 'm' else 'datetime64'}[us]").astype(np.int64)
+        return np.where(np.isnat(times), np.nan, ticks * 1e-6)
+    times = times.astype(float)
     unit = options.time_unit or str(found.attrs.get("time_unit", found["time"].attrs.get("units", "")))
     if unit in ("frames", "frame", ""):
         rate = options.fps or float(found.attrs.get("fps") or 0.0)

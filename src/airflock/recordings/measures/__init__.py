@@ -3,7 +3,7 @@
 delays: who leads, by delay of directions · correlation: how far fluctuations of velocity are alike · neighbours:
 nearest distances and pairs · surroundings: where neighbours are, front-back and left-right · shape: area and form ·
 milling · turning · bursts: burst and coast · contacts: with walls, obstacles and the scene. Order parameters of a
-flight, by the compiled rules, are in `scores`.
+flight, by the compiled rules, are in `scores`. Units stand in `attrs["units"]`, of a table by column.
 """
 
 from airflock.recordings.measures import (

@@ -6,7 +6,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import sound, states
 
 
 def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
@@ -16,6 +16,7 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
     A burst is a rise of speed from a minimum to the next maximum by `least` or more, with falls of less than that in
     between; its coast lasts until the next burst begins, or the individual is gone.
     """
+    sound(least=least)
     if not least > 0.0:
         raise ParameterError(f"least = {least:g} m/s must be above 0")
     found = states(recording)
@@ -29,7 +30,10 @@ def bursts(recording: xr.Dataset, least: float) -> pd.DataFrame:
                 at = found.time[begin + np.array([low, top, last])]
                 s = speed[begin + np.array([low, top]), i]
                 rows.append((name, at[0], at[1] - at[0], at[2] - at[1], s[0], s[1]))
-    return pd.DataFrame(rows, columns=["individual", "begin", "burst", "coast", "speed_before", "speed_top"])
+    units = {"begin": "s", "burst": "s", "coast": "s", "speed_before": "m/s", "speed_top": "m/s"}
+    table = pd.DataFrame(rows, columns=["individual", *units])
+    table.attrs["units"] = units
+    return table
 
 
 def _rises(speed: NDArray[np.float64], least: float) -> list[tuple[int, int, int]]:

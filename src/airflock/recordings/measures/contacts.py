@@ -5,7 +5,7 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import states
+from airflock.recordings.measures.states import sound, states
 from airflock.recordings.scores import scenario_of
 from airflock.world.place import Place, Shapes
 
@@ -21,6 +21,7 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
     """
     scenario = scenario_of(recording)
     radius = scenario.metrics.r_body if radius is None else radius
+    sound(radius=radius)
     if not 0.0 <= radius < float("inf"):
         raise ParameterError(f"radius = {radius:g} m is not a radius")
     stands = scenario.stands()
@@ -40,10 +41,8 @@ def contacts(recording: xr.Dataset, radius: float | None = None) -> pd.DataFrame
                 rows.append((name, what, found.time[first], found.time[k - 1], *at))
             for what in now - set(begun):
                 begun[what] = k
-    columns = ["individual", "what", "begin", "end", "east", "north", "up"]
-    table = pd.DataFrame(rows, columns=columns)
-    return (
-        table.sort_values(["begin", "individual"], kind="stable", ignore_index=True)
-        if len(rows)
-        else table.astype(dict.fromkeys(columns[2:], np.float64))
-    )
+    units = {"begin": "s", "end": "s", "east": "m", "north": "m", "up": "m"}
+    table = pd.DataFrame(rows, columns=["individual", "what", *units]).astype(dict.fromkeys(units, np.float64))
+    table = table.sort_values(["begin", "individual"], kind="stable", ignore_index=True)
+    table.attrs["units"] = units
+    return table

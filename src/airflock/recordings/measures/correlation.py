@@ -5,7 +5,8 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import states
+from airflock.recordings import images
+from airflock.recordings.measures.states import sound, states
 
 NOTHING = 1e-6  # of the speed: fluctuations below it are the rounding of recordings in single precision
 
@@ -18,6 +19,7 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     nan where nobody differs from the mean, to the precision of a recording: of all who move alike nothing fluctuates.
     Cavagna et al., PNAS 107, 11865 (2010), with the mean velocity of those present taken off at each instant.
     """
+    sound(width=width, **({} if farthest is None else {"farthest": farthest}))
     found = states(recording)
     if not width > 0.0:
         raise ParameterError(f"width = {width:g} m must be above 0")
@@ -31,7 +33,8 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
         u = u - u.mean(axis=1, keepdims=True)
         alone, count = alone + float((u * u).sum()), count + u.shape[1]
         i, j = np.triu_indices(u.shape[1], 1)
-        bins = np.floor(np.linalg.norm(x[:, i] - x[:, j], axis=0) / width).astype(int)
+        apart = np.linalg.norm(images.nearest(x[:, j] - x[:, i], found.box), axis=0)
+        bins = np.floor(apart / width).astype(int)
         alike = (u[:, i] * u[:, j]).sum(axis=0)
         number, total = np.bincount(bins), np.bincount(bins, alike)
         for b in np.flatnonzero(number):
@@ -42,7 +45,10 @@ def velocity_correlation(recording: xr.Dataset, width: float, farthest: float | 
     last = max(sums, default=0) if farthest is None else int(farthest / width)
     kept = [b for b in sorted(sums) if b <= last]
     index = pd.Index([(b + 0.5) * width for b in kept], name="distance")
-    return pd.Series([sums[b][0] / sums[b][1] / scale for b in kept], index=index, name="correlation", dtype=float)
+    course = [sums[b][0] / sums[b][1] / scale for b in kept]
+    series = pd.Series(course, index=index, name="correlation", dtype=float)
+    series.attrs["units"] = "1"
+    return series
 
 
 def correlation_length(recording: xr.Dataset, width: float) -> float:

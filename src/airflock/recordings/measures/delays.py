@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.errors import ParameterError
+from airflock.recordings.measures.states import headings, sound, states
 
 ALIKE = 1e-6  # correlations nearer than this are the same: headings of recordings have single precision
 
@@ -15,6 +16,9 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
     longest : largest delay, s; slowest: headings at this speed (m/s) or less do not count
     nan where two are never there together. Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
+    sound(longest=longest, slowest=slowest)
+    if not 0.0 <= longest < float("inf"):
+        raise ParameterError(f"longest = {longest:g} s must be 0 or more")
     found = states(recording)
     h = headings(found.velocity, slowest)
     shifts = np.arange(-round(longest / found.period), round(longest / found.period) + 1)
@@ -27,7 +31,8 @@ def delay_correlation(recording: xr.Dataset, longest: float = 2.0, slowest: floa
         both = there[0].T @ there[1]
         summed = np.einsum("tci,tcj->ij", np.nan_to_num(first), np.nan_to_num(later))
         table[:, :, k] = np.where(both > 0, summed / np.maximum(both, 1.0), np.nan)
-    coordinates = {"leader": found.names, "follower": found.names, "delay": shifts * found.period}
+    late = ("delay", shifts * found.period, {"units": "s"})
+    coordinates = {"leader": found.names, "follower": found.names, "delay": late}
     return xr.DataArray(table, coordinates, ("leader", "follower", "delay"), attrs={"units": "1"})
 
 
@@ -42,6 +47,7 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
     slowest : headings at this speed (m/s) or less do not count
     Nagy, Ákos, Biro & Vicsek, Nature 464, 890 (2010).
     """
+    sound(longest=longest, least=least, slowest=slowest)
     table = delay_correlation(recording, longest, slowest)
     shifts, n = table["delay"].values, table.sizes["leader"]
     best: dict[tuple[int, int], tuple[float, float]] = {}
@@ -57,4 +63,6 @@ def leadership(recording: xr.Dataset, longest: float = 2.0, least: float = 0.5, 
                 best[j, i] = 0.0 - float(shifts[k]), float(course[k])
     names = table["leader"].values
     rows = [(names[i], names[j], *best[i, j]) for i, j in sorted(best)]
-    return pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
+    told = pd.DataFrame(rows, columns=["leader", "follower", "delay", "correlation"])
+    told.attrs["units"] = {"delay": "s", "correlation": "1"}
+    return told

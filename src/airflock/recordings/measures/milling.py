@@ -4,14 +4,16 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
     """Length of the mean cross product of direction from the centre and heading, by time, 0 to 1; nan if alone.
 
     slowest : speed (m/s) at or below which one has no heading; it still counts for the centre
+    In a periodic world the centre is that of the places as they stand, as it is for the order parameters.
     """
+    sound(slowest=slowest)
     found = states(recording)
     course = np.full(len(found.time), np.nan)
     h = headings(found.velocity, slowest)
@@ -24,4 +26,6 @@ def milling(recording: xr.Dataset, slowest: float = 0.0) -> pd.Series:
         flat = np.zeros((2, 3, int(moves.sum())))
         flat[0, : len(out)], flat[1, : len(out)] = out, h[k][:, moves]
         course[k] = float(np.linalg.norm(np.cross(flat[0].T, flat[1].T).mean(axis=0)))
-    return pd.Series(course, index=pd.Index(found.time, name="time"), name="milling")
+    series = pd.Series(course, index=pd.Index(found.time, name="time"), name="milling")
+    series.attrs["units"] = "1"
+    return series

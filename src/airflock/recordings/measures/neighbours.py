@@ -5,7 +5,8 @@ import pandas as pd
 import xarray as xr
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import states
+from airflock.recordings import images
+from airflock.recordings.measures.states import sound, states
 
 
 def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
@@ -15,10 +16,10 @@ def nearest_distances(recording: xr.Dataset) -> xr.DataArray:
     for k, there in enumerate(found.placed):
         if there.sum() > 1:
             x = found.position[k][:, there]
-            apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)
+            apart = np.linalg.norm(found.offsets(x), axis=0)
             np.fill_diagonal(apart, np.inf)
             table[k, there] = apart.min(axis=1)
-    coordinates = {"time": found.time, "individual": found.names}
+    coordinates = {"time": ("time", found.time, {"units": "s"}), "individual": found.names}
     return xr.DataArray(table, coordinates, ("time", "individual"), attrs={"units": "m"})
 
 
@@ -28,6 +29,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     width    : of a bin, m; where it does not divide `farthest`, the nearest width that does: `attrs["width"]`
     farthest : end of the last bin, m; a pair exactly so far apart counts
     """
+    sound(width=width, farthest=farthest)
     if not 0.0 < width < farthest:
         raise ParameterError(f"width = {width:g} m must lie between 0 and farthest = {farthest:g} m")
     found = states(recording)
@@ -37,7 +39,7 @@ def pair_distances(recording: xr.Dataset, width: float, farthest: float) -> pd.S
     for place, there in zip(found.position, found.placed, strict=True):
         x = place[:, there]
         i, j = np.triu_indices(x.shape[1], 1)
-        counts += np.histogram(np.linalg.norm(x[:, i] - x[:, j], axis=0), edges)[0]
+        counts += np.histogram(np.linalg.norm(images.nearest(x[:, j] - x[:, i], found.box), axis=0), edges)[0]
         pairs += len(i)
     index = pd.Index(0.5 * (edges[1:] + edges[:-1]), name="distance")
     density = pd.Series(counts / (max(pairs, 1) * width), index=index, name="density")

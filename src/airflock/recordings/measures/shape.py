@@ -10,6 +10,7 @@ from airflock.recordings.measures.states import states
 def group_shape(recording: xr.Dataset) -> pd.DataFrame:
     """By time: number present, hull (m², in space m³), length and width (m), elongation (length / width).
 
+    In a periodic world the places count as they stand.
     length, width : root mean square extension along and across the mean horizontal velocity, times sqrt(12), which is
     the side of an even rectangle. nan where too few are there.
     """
@@ -35,5 +36,7 @@ def group_shape(recording: xr.Dataset) -> pd.DataFrame:
                 length = float(np.sqrt(12.0 * ((ahead @ offset) ** 2).mean()))
                 width = float(np.sqrt(12.0 * ((ahead[0] * offset[1] - ahead[1] * offset[0]) ** 2).mean()))
         rows.append((count, hull, length, width, length / width if width > 1e-9 else np.nan))
-    names = ["present", "hull", "length", "width", "elongation"]
-    return pd.DataFrame(rows, index=pd.Index(found.time, name="time"), columns=names)
+    units = {"present": "1", "hull": "m^2" if axes == 2 else "m^3", "length": "m", "width": "m", "elongation": "1"}
+    table = pd.DataFrame(rows, index=pd.Index(found.time, name="time"), columns=[*units])
+    table.attrs["units"] = units
+    return table

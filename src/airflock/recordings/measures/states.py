@@ -6,9 +6,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from airflock.errors import RecordingError
+from airflock.errors import ParameterError, RecordingError
+from airflock.numeric import is_number
+from airflock.recordings import images
+from airflock.recordings.attributes import scenario_document
 from airflock.recordings.differences import velocities
 from airflock.recordings.layout import check
+from airflock.recordings.scores import scenario_of
 
 Array = NDArray[Any]
 
@@ -17,6 +21,7 @@ class States(NamedTuple):
     """time (frame,) s, position m and velocity m/s (frame, axis, individual); placed and present (frame, individual).
 
     placed: its position is known; present: its velocity, too. What needs no motion counts all who are placed.
+    box: sides of the periodic world that a simulation flew in, m; else None.
     """
 
     time: Array
@@ -25,6 +30,11 @@ class States(NamedTuple):
     placed: Array
     present: Array
     names: list[str]
+    box: Array | None = None
+
+    def offsets(self, place: Array) -> Array:
+        """Offsets (axis, from, to), m, between all of some places (axis, individual), to the nearest images."""
+        return images.nearest(place[:, None, :] - place[:, :, None], self.box)
 
     @property
     def period(self) -> float:
@@ -56,7 +66,16 @@ def states(recording: xr.Dataset, keypoint: str | None = None) -> States:
     nowhere, unknown = ~placed[:, None, :], ~present[:, None, :]
     individuals = [str(name) for name in own["individual"].values]
     position, velocity = np.where(nowhere, np.nan, position), np.where(unknown, np.nan, velocity)
-    return States(time, position, velocity, placed, present, individuals)
+    world = scenario_of(recording).world if scenario_document(recording) is not None else None
+    box = images.sides(world, position.shape[1]) if world is not None else None
+    return States(time, position, velocity, placed, present, individuals, box)
+
+
+def sound(**given: Any) -> None:
+    """Refuse what is given as a number of a measure and is none, all at once. Raises ParameterError."""
+    faults = [f"{name} = {value!r} is not a number" for name, value in given.items() if not is_number(value)]
+    if faults:
+        raise ParameterError("\n".join(faults))
 
 
 def headings(velocity: Array, slowest: float = 0.0) -> Array:

@@ -4,7 +4,8 @@ import numpy as np
 import xarray as xr
 
 from airflock.errors import ParameterError
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings import images
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: float = 0.0) -> xr.DataArray:
@@ -13,16 +14,19 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     reach : half the side of the map, m; cells: along each side; slowest: speed (m/s) at or below which one has no front
     In space the map is horizontal: distances in height are left out.
     """
-    if not reach > 0.0 or cells < 1:
-        raise ParameterError(f"reach = {reach:g} m and cells = {cells} must be above 0")
+    sound(reach=reach, cells=cells, slowest=slowest)
+    if not reach > 0.0 or cells < 1 or cells % 1:
+        raise ParameterError(f"reach = {reach:g} m and cells = {cells}, a whole number, must be above 0")
+    cells = int(cells)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
+    box = None if found.box is None else found.box[:2]
     edges = np.linspace(-reach, reach, cells + 1)
     total, focal = np.zeros((cells, cells)), 0
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         x = place[:, there]
         for i in np.flatnonzero(there & np.isfinite(ahead).all(axis=0)):
-            offset = x - place[:, i : i + 1]
+            offset = images.nearest(x - place[:, i : i + 1], box)
             others = np.ones(offset.shape[1], bool)
             others[np.searchsorted(np.flatnonzero(there), i)] = False
             cx, cy = ahead[:, i]
@@ -35,9 +39,8 @@ def density_map(recording: xr.Dataset, reach: float, cells: int = 21, slowest: f
     middle = 0.5 * (edges[1:] + edges[:-1])
     area = (edges[1] - edges[0]) ** 2
     attributes = {"units": "1/m^2", "focal": focal}
-    return xr.DataArray(
-        total / (max(focal, 1) * area), {"left": middle, "front": middle}, ("left", "front"), attrs=attributes
-    )
+    coordinates = {axis: (axis, middle, {"units": "m"}) for axis in ("left", "front")}
+    return xr.DataArray(total / (max(focal, 1) * area), coordinates, ("left", "front"), attrs=attributes)
 
 
 def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> float:
@@ -46,19 +49,22 @@ def anisotropy(recording: xr.Dataset, reach: float, slowest: float = 0.0) -> flo
     slowest : speed (m/s) at or below which one has no front
     In space distances and angles are horizontal, as in `density_map`; nan where nobody has a neighbour within reach.
     """
+    sound(reach=reach, slowest=slowest)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
+    box = None if found.box is None else found.box[:2]
     total, count = 0.0, 0
     for place, ahead, there in zip(found.position[:, :2], h, found.placed, strict=True):
         rows = np.flatnonzero(there)
         x = place[:, rows]
-        apart = np.linalg.norm(x[:, :, None] - x[:, None, :], axis=0)
+        offset = images.nearest(x[:, None, :] - x[:, :, None], box)
+        apart = np.linalg.norm(offset, axis=0)
         np.fill_diagonal(apart, np.inf)
         for k, i in enumerate(rows):
             if len(rows) < 2 or not np.isfinite(ahead[:, i]).all():
                 continue
             j = int(apart[k].argmin())
             if apart[k, j] <= reach and apart[k, j] > 0.0:
-                along = float(ahead[:, i] @ (x[:, j] - x[:, k])) / apart[k, j]
+                along = float(ahead[:, i] @ offset[:, k, j]) / apart[k, j]
                 total, count = total + 2.0 * along * along - 1.0, count + 1
     return total / count if count else float("nan")

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from airflock.recordings.measures.states import headings, states
+from airflock.recordings.measures.states import headings, sound, states
 
 
 def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
@@ -12,6 +12,7 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
     slowest : speed (m/s) at or below which one has no heading
     A frame holds the turn between the frames on its two sides; at the ends, to the only one there is.
     """
+    sound(slowest=slowest)
     found = states(recording)
     h = headings(found.velocity[:, :2], slowest)
     sine = h[:-1, 0] * h[1:, 1] - h[:-1, 1] * h[1:, 0]
@@ -20,5 +21,5 @@ def turning_speed(recording: xr.Dataset, slowest: float = 0.0) -> xr.DataArray:
         before, after = np.vstack([rate[:1], rate]), np.vstack([rate, rate[-1:]])
     else:  # one frame has no turn
         before = after = np.full((len(h), h.shape[2]), np.nan)
-    coordinates = {"time": found.time, "individual": found.names}
+    coordinates = {"time": ("time", found.time, {"units": "s"}), "individual": found.names}
     return xr.DataArray(0.5 * (before + after), coordinates, ("time", "individual"), attrs={"units": "rad/s"})
