@@ -125,7 +125,7 @@ def test_a_law_is_checked_by_the_path_of_its_file():
 def test_other_calls_name_what_they_cannot_use(wrong):
     recording = tracks()
     calls = {
-        "v_flock = ": lambda: airflock.starting_set(wrong),
+        "Parameters.v_flock = ": lambda: airflock.starting_set(wrong),
         "body_length = ": lambda: airflock.score(recording, body_length=wrong),
         "threads = ": lambda: airflock.score(load(PAPER, SMALL), threads=wrong),
     }
