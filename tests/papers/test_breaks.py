@@ -128,6 +128,8 @@ def test_flights_of_another_processor_are_other_flights() -> None:
     new = [old[0]._replace(verdict="does not hold", processor="lake"), old[1]._replace(verdict="does not hold")]
     here, there = (row.elsewhere for row in quick.changed(old, new))
     assert (here, there) == ("zen", "")  # what the same kind of processor judges otherwise is a fault
+    gone, told = quick.changed(old, [new[0]])  # what few flights elsewhere do not have is none
+    assert (gone.id, gone.elsewhere) == ("x", "zen") and (told.found, told.elsewhere) == ("", "zen")
 
 
 def test_a_part_that_was_flown_is_not_flown_again_unless_the_texts_changed(tmp_path, monkeypatch) -> None:

@@ -123,15 +123,20 @@ def committed() -> list[Verdict]:
 
 
 def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed]:
-    """Claims whose verdicts differ, in their order."""
+    """Claims whose verdicts differ, in their order.
+
+    What few flights on another kind of processor do not have at all, such as a time that none of them came to, is not
+    judged either.
+    """
     old, new = ({(row.paper, row.id): row for row in rows} for rows in (before, after))
+    here = {row.part: row.processor for row in new.values()}
     found = []
     for key in (*old, *(key for key in new if key not in old)):
         one, other = old.get(key), new.get(key)
-        if one is None or other is None:
-            found.append(Changed(*key, one.verdict if one else "", other.verdict if other else ""))
-        elif one.verdict != other.verdict:
-            found.append(Changed(*key, one.verdict, other.verdict, one.processor * (one.processor != other.processor)))
+        verdicts = [row.verdict if row else "" for row in (one, other)]
+        if verdicts[0] != verdicts[1]:
+            flown_on = other.processor if other else here.get(one.part, "") if one else ""
+            found.append(Changed(*key, *verdicts, one.processor if one and flown_on not in ("", one.processor) else ""))
     return found
 
 
