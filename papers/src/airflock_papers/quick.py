@@ -133,10 +133,10 @@ def changed(before: Iterable[Verdict], after: Iterable[Verdict]) -> list[Changed
     found = []
     for key in (*old, *(key for key in new if key not in old)):
         one, other = old.get(key), new.get(key)
-        was, is_ = (row.verdict if row else "" for row in (one, other))
-        if was != is_:
+        was, now = (row.verdict if row else "" for row in (one, other))
+        if was != now:
             flown_on = other.processor if other else here.get(one.part, "") if one else ""
-            found.append(Changed(*key, was, is_, one.processor if one and flown_on not in ("", one.processor) else ""))
+            found.append(Changed(*key, was, now, one.processor if one and flown_on not in ("", one.processor) else ""))
     return found
 
 
