@@ -81,7 +81,7 @@ def _one(kind: type[AirflockError], line: str) -> AirflockError:
 def path_of(path: Any) -> Path:
     """The name of a file as a path. Raises RecordingError for what is no name."""
     if not isinstance(path, (str, os.PathLike)):
-        raise RecordingError(f"{bounded(repr(path), 80)} is no name of a file; give a text or a Path")
+        raise RecordingError(f"{bounded(repr(path), 80)} is not a name of a file; give a text or a Path")
     return Path(path)
 
 

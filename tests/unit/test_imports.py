@@ -511,7 +511,7 @@ def test_a_masked_place_is_missing_and_an_object_that_is_a_number_is_one():
     assert np.isnan(found[100:200, :, 0]).all() and np.isfinite(found[:, :, 1]).all()
     whole = values(airflock.load_tracks(array, fps=RATE, unit="m"))
     assert np.array_equal(values(airflock.load_tracks(array.astype(object), fps=RATE, unit="m")), whole)
-    assert "holds what is no number" in refused(np.full((5, 2, 2), "x", object), fps=1.0, unit="m")
+    assert "holds what is not a number" in refused(np.full((5, 2, 2), "x", object), fps=1.0, unit="m")
     assert "holds complex128, not numbers" in refused(array + 1j, fps=1.0, unit="m")
 
 

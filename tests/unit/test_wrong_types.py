@@ -88,7 +88,7 @@ def test_what_is_no_law_and_what_holds_no_tracks_is_told_before_anything_is_fitt
         "infer: models = 3: give a list of laws, such as ['couzin_2002']"
     ]
     assert told(lambda: airflock.infer(tracks(), [None])) == [
-        "None is no law; give a name of ours, a preset, a scenario file or a Scenario"
+        "None is not a law; give a name of ours, a preset, a scenario file or a Scenario"
     ]
     assert told(lambda: airflock.infer(tracks(), "couzin_2002")) == [
         "recording 1: 20 frames are too few to infer a law from; 120 or more"
@@ -138,7 +138,7 @@ def test_other_calls_name_what_they_cannot_use(wrong):
         assert len(told(lambda: airflock.keys(wrong))) == 1
         write = (lambda path: airflock.save(recording, path), lambda path: airflock.export(recording, path))
         for call in (airflock.load_recording, *write):
-            assert "is no name of a file; give a text or a Path" in told(lambda call=call: call(wrong))[0]
+            assert "is not a name of a file; give a text or a Path" in told(lambda call=call: call(wrong))[0]
     if not isinstance(wrong, dict):
         assert "are no keys with values" in told(lambda: airflock.score(recording, settings=wrong))[0]
         assert len(told(lambda: airflock.simulate(load(PAPER, SMALL), keep=wrong))) == 1

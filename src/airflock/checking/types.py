@@ -108,7 +108,7 @@ def check_types(files: str | Path | Sequence[str | Path], *, out: str | Path | N
     mine.py:2: "Parameters" has no attribute "sped"; maybe "speed"?
     """
     if not isinstance(files, Iterable) and not isinstance(files, Path):
-        raise RuleError(f"{files!r} is no file of rules; give its name, or a list of names")
+        raise RuleError(f"{files!r} is not a file of rules; give its name, or a list of names")
     names = [str(file) for file in ([files] if isinstance(files, (str, Path)) else files)]
     copies = _copies(names)
     if out is not None:

@@ -147,7 +147,7 @@ def _base(what: str | Scenario, settings: Mapping[str, Any], trust: bool) -> Sce
     if isinstance(what, Scenario):
         return what
     if not isinstance(what, (str, Path)):
-        raise ScenarioError([f"{what!r} is no law; give a name of ours, a preset, a scenario file or a Scenario"])
+        raise ScenarioError([f"{what!r} is not a law; give a name of ours, a preset, a scenario file or a Scenario"])
     if what in MODELS or str(what).endswith(".py"):
         open_air = {"model": {"kind": str(what)}, "world": {"arena": "none"}, "radio": {"delay": 0.0}}
         open_air["start"] = {"kind": "ball", "separation": 0.0}

@@ -27,7 +27,7 @@ FARTHEST = 1e8  # m; the limit of any range in a driver
 def sound(keep: Sequence[str], events: Sequence[Any], scenario: Scenario) -> None:
     """Refuse what cannot be kept, one line each."""
     if isinstance(keep, str) or not isinstance(keep, Iterable):
-        raise FlightError(f"keep = {keep!r} is no list; give some of {', '.join(KINDS)}, such as keep=('measured',)")
+        raise FlightError(f"keep = {keep!r} is not a list; give some of {', '.join(KINDS)}, such as keep=('measured',)")
     faults = [f"keep = {kind!r} is none of {', '.join(KINDS)}" for kind in keep if kind not in KINDS]
     if keep and events:
         faults.append("keep: a flight with events is cut by them already; keep nothing, or give no events")

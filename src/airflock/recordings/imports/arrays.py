@@ -53,7 +53,7 @@ def _numbers(array: Any, where: str) -> Any:
     try:
         values = values.astype(float) if values.dtype == object else values
     except (TypeError, ValueError) as fault:
-        raise RecordingError(f"{where}: holds what is no number: {str(fault).splitlines()[0]}") from fault
+        raise RecordingError(f"{where}: holds what is not a number: {str(fault).splitlines()[0]}") from fault
     return values if hidden is None else np.where(hidden, np.nan, values)
 
 
