@@ -67,7 +67,7 @@ def split(flyer: Flyer, counted: Count, threads: int | None = None, where: str =
             runs.append(begun([seeds[i] for i in mine], [least[i] for i in mine], target, fly, period, rng, say))
         except TimeOver:
             return _refused(target, f"time was over in repetition {number + 1} of {REPETITIONS}")
-    return _found(campaign, estimate(runs, target, least), where or campaign.scenario.name)
+    return _plain_values(campaign, estimate(runs, target, least), where or campaign.scenario.name)
 
 
 def begun(
@@ -99,8 +99,8 @@ def _topped_up(flyer: Flyer, seeds: list[int], least: list[float]) -> tuple[list
         for landed in flyer.fly(place, flights):
             flown[landed.flight.repeat] = landed.values
     more = [number for number in range(max(0, FEWEST - len(seeds))) if flown.get(number) is not None]
-    found = [float((flown[number] or {})["r_min"]) for number in more]
-    return [*seeds, *(seed(identity, SPLIT, number) for number in more)], [*least, *found]
+    distances = [float((flown[number] or {})["r_min"]) for number in more]
+    return [*seeds, *(seed(identity, SPLIT, number) for number in more)], [*least, *distances]
 
 
 class TimeOver(Exception):
@@ -127,8 +127,8 @@ class LineageFlyer:
             return lambda: falls(campaign.scenario, lineage, campaign.precision, campaign.device)
 
         alone = 1 if campaign.device != "cpu" else self.threads
-        for i, found in zip(missing, in_threads([job(lineages[i]) for i in missing], alone), strict=True):
-            values = {"falls": found, "branches": [list(b) for b in lineages[i].branches]}
+        for i, fell in zip(missing, in_threads([job(lineages[i]) for i in missing], alone), strict=True):
+            values = {"falls": fell, "branches": [list(b) for b in lineages[i].branches]}
             store.land(place, Landed(Flight(i, 0, {}, lineages[i].seed), values))
             flown[i] = values
         return [flown[i]["falls"] for i in range(len(lineages))]
@@ -157,12 +157,12 @@ def events(scenario: Scenario, lineage: Lineage) -> list[Event]:
 def least_distances(positions: NDArray[Any]) -> NDArray[np.float64]:
     """Smallest distance of two agents (time,), m, from positions (time, axis, agent)."""
     axes = np.ascontiguousarray(positions.transpose(1, 2, 0))  # long rows of time: eight times as fast
-    found = np.full(len(positions), np.inf)
+    least = np.full(len(positions), np.inf)
     for i in range(axes.shape[1] - 1):
         apart = axes[:, i + 1 :] - axes[:, i : i + 1]
         apart *= apart
-        np.minimum(found, apart.sum(axis=0).min(axis=0), out=found)
-    nearest: NDArray[np.float64] = np.sqrt(found)
+        np.minimum(least, apart.sum(axis=0).min(axis=0), out=least)
+    nearest: NDArray[np.float64] = np.sqrt(least)
     return nearest
 
 
@@ -178,30 +178,31 @@ def _refused(target: float, reason: str) -> dict[str, Any]:
     return {"target": target, "refused": reason, "statements": [f"splitting: r_min<{target:g}: no number: {reason}"]}
 
 
-def _found(campaign: Campaign, found: Estimate, where: str) -> dict[str, Any]:
-    made: dict[str, Any] = (
-        _refused(found.target, found.refused)
-        if found.refused
+def _plain_values(campaign: Campaign, result: Estimate, where: str) -> dict[str, Any]:
+    plain: dict[str, Any] = (
+        _refused(result.target, result.refused)
+        if result.refused
         else {
-            "target": found.target, "probability": found.probability, "low": found.low, "high": found.high,
-            "per_hour": per_hour(found.probability, campaign.hours), "statements": [],
+            "target": result.target, "probability": result.probability, "low": result.low, "high": result.high,
+            "per_hour": per_hour(result.probability, campaign.hours), "statements": [],
         }
     )  # fmt: skip
-    flights = sum(r.flights for r in found.repetitions)
-    made |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in found.repetitions]}
-    if not found.refused:
-        made["statements"] = [
-            f"splitting, an estimate that shows nothing: r_min<{found.target:g} in {found.probability:.2g} of flights "
-            f"({found.low:.2g} to {found.high:.2g}), {made['per_hour']:.2g} per flock hour, from {flights:,} flights"
+    flights = sum(r.flights for r in result.repetitions)
+    plain |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in result.repetitions]}
+    if not result.refused:
+        plain["statements"] = [
+            f"splitting, an estimate that shows nothing: r_min<{result.target:g} in {result.probability:.2g} of "
+            f"flights ({result.low:.2g} to {result.high:.2g}), {plain['per_hour']:.2g} per flock hour, "
+            f"from {flights:,} flights"
         ]
-    last = sorted((p for r in found.repetitions for p in r.last), key=lambda p: p.least)
+    last = sorted((p for r in result.repetitions for p in r.last), key=lambda p: p.least)
     nearest: dict[int, Particle] = {}
     for particle in last:
         nearest.setdefault(particle.lineage.seed, particle)
-    made["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
-    if made["worst"] and math.isfinite(made["worst"][0]["r_min"]):
-        made["statements"].append(f"nearest that splitting found: {made['worst'][0]['replay']}")
-    return made
+    plain["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
+    if plain["worst"] and math.isfinite(plain["worst"][0]["r_min"]):
+        plain["statements"].append(f"nearest that splitting found: {plain['worst'][0]['replay']}")
+    return plain
 
 
 def _worst(scenario: Scenario, particle: Particle, where: str) -> dict[str, Any]:

@@ -36,12 +36,12 @@ def presets(
         with from_outside(name):
             typer.echo(read_text(known.get(name) or name), nl=False)
         return
-    found = {key: str(files.load(key).document.get("title", "")) for key in known}
+    titles = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
-        tables.emit_json(found)
+        tables.emit_json(titles)
         return
-    width = max(len(key) for key in found)
-    for key, title in found.items():
+    width = max(len(key) for key in titles)
+    for key, title in titles.items():
         typer.echo(f"{key:<{width}}  {title}")
 
 
