@@ -63,11 +63,12 @@ def receive(address):
 
 def opened(name, settings, links, against=None):
     """A page that flies in a thread, with a client and a counter of frames."""
+    from airflock.studio.flights import FlightRequest
     from airflock.studio.page import Page
     from airflock.studio.player import Player
     from airflock.studio.view import View
 
-    player = Player(name, settings, 1, against=against)
+    player = Player(FlightRequest(name, settings, 1, against=against))
     player.start()
     view = View("127.0.0.1", 0, player.where)
     page = Page(player, view)

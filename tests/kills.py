@@ -142,10 +142,11 @@ def of_tracks(folder):
 
 def studio(folder):
     """What the live page writes: a tuned scenario, the flight again as a recording, its replay."""
+    from airflock.studio.flights import FlightRequest
     from airflock.studio.player import Player
 
     folder.mkdir(exist_ok=True)
-    player = Player("vasarhelyi_2018/4ms", {"agents": 4}, seed=3)
+    player = Player(FlightRequest("vasarhelyi_2018/4ms", {"agents": 4}, seed=3))
     player.fly(40)
     player.change("model.p_rep", 0.2)
     player.fly(40)

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import pytest
 from pixels import coloured, places, shot
 
+from airflock.studio.flights import FlightRequest
 from airflock.studio.page import Page
 from airflock.studio.player import Player
 from airflock.studio.view import View
@@ -18,7 +19,7 @@ PATIENCE = 120.0  # s
 @contextmanager
 def flying(where="vasarhelyi_2018/4ms", settings=None, **more):
     """A page that flies in a thread of its own."""
-    player = Player(where, {"agents": 20, **(settings or {})}, seed=1, **more)
+    player = Player(FlightRequest(where, {"agents": 20, **(settings or {})}, seed=1, **more))
     view = View("127.0.0.1", 0, player.where)
     page = Page(player, view)
     thread = threading.Thread(target=page.run)

@@ -7,6 +7,7 @@ import pytest
 
 from airflock import atomic
 from airflock.engine import Flight
+from airflock.studio.flights import FlightRequest
 from airflock.studio.opening import Opening
 from airflock.studio.panel import Panel
 from airflock.studio.player import Player
@@ -20,7 +21,7 @@ def player(monkeypatch):
     """An interpreted flight that has begun, and what is told of it."""
     plainly = lambda *given, **named: Flight(*given, **{**named, "device": "python"})  # noqa: E731
     monkeypatch.setattr("airflock.studio.side.Flight", plainly)
-    made = Player(PRESET, {"agents": 5}, seed=3)
+    made = Player(FlightRequest(PRESET, {"agents": 5}, seed=3))
     made.faults = []
     made.fault = made.faults.append
     made.fly(20)

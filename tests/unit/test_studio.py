@@ -33,6 +33,7 @@ from airflock.studio.background import Study, around, summary, varied
 from airflock.studio.collisions import BOTH, Collisions
 from airflock.studio.controls import controls_of, span
 from airflock.studio.drawing import Flock, arrival
+from airflock.studio.flights import FlightRequest
 from airflock.studio.moments import Moments
 from airflock.studio.opening import Opening
 from airflock.studio.pace import Pace
@@ -67,7 +68,7 @@ def interpreted(monkeypatch):
 
 @pytest.fixture
 def player():
-    made = Player(PRESET, FEW, seed=3)
+    made = Player(FlightRequest(PRESET, FEW, seed=3))
     made.faults = []
     made.fault = made.faults.append
     return made
@@ -176,7 +177,7 @@ def test_the_command_that_opens_a_scenario_again_is_safe_to_paste(interpreted, t
     (tmp_path / name).write_bytes(presets()[PRESET].read_bytes())
     law = tmp_path / "a law.py"
     law.write_text(LAW)
-    made = Player(name, {"agents": 3}, seed=5, law=str(law), trust=True)
+    made = Player(FlightRequest(name, {"agents": 3}, seed=5, law=str(law), trust=True))
     made.change("radio.delay", "400 ms")
     words = shlex.split(made.command)
     assert words[:2] == ["airflock", "watch"] and Path(words[2]) == Path(name) and not words[2].startswith("-")
@@ -294,7 +295,7 @@ def test_a_law_that_stops_flying_stops_the_flight_and_the_moment_before_is_there
     )
     text = "agents = 3\nduration = 10.0\n[model]\nkind = 'wild.py'\n[world]\nside = 100.0\n"
     (tmp_path / "wild.toml").write_text(text)
-    player = Player(str(tmp_path / "wild.toml"), trust=True)
+    player = Player(FlightRequest(str(tmp_path / "wild.toml"), trust=True))
     player.fly(500)
     flock = Flock(player.side, np.zeros(3))
     shown = flock.position.copy()
@@ -352,7 +353,7 @@ def test_near_pairs_of_a_periodic_world_are_those_of_the_nearest_image():
     "name", ["vasarhelyi_2018/obstacles", "kidger/city", "couzin_2002/torus", "vicsek_1995/ordered"]
 )
 def test_a_stage_holds_the_flock_and_what_stands_in_its_world(interpreted, name):
-    player = Player(name, {"agents": 5})
+    player = Player(FlightRequest(name, {"agents": 5}))
     position, _ = player.motion
     stage = stage_of(player.scenario, position)
     assert stage.span > 0.0 and math.isfinite(stage.span)
@@ -393,7 +394,7 @@ GROUPS = [{"name": "slow", "agents": [0, 3], "model": {"v_flock": 3.0}}, {"name"
 
 
 def test_agents_are_coloured_by_group_fault_cluster_and_their_own_numbers(interpreted):
-    player = Player(PRESET, {**FEW, "groups": GROUPS}, 3)
+    player = Player(FlightRequest(PRESET, {**FEW, "groups": GROUPS}, 3))
     player.flight.fault("motor", 5)
     player.fly(30)
     flock, shading = Flock(player.side, np.zeros(3)), Shading()
@@ -473,7 +474,7 @@ def test_a_recording_is_flown_again_with_its_events(player, tmp_path):
     player.fly(150)
     player.change("model.p_rep", 0.2)
     player.fly(150)
-    again = Player(str(player.save_recording(tmp_path / "tuned.nc")))
+    again = Player(FlightRequest(str(player.save_recording(tmp_path / "tuned.nc"))))
     again.fly(300)
     np.testing.assert_array_equal(again.flight.state, player.flight.state)
     assert again.seed == 3 and value_of(again.scenario, "model.p_rep") == 0.2
@@ -485,7 +486,7 @@ def test_a_flight_log_is_refused_in_one_line(tmp_path):
     log.attrs = {}
     airflock.save(log, tmp_path / "log.nc")
     with pytest.raises(airflock.AirflockError, match="airflock replay"):
-        Player(str(tmp_path / "log.nc"))
+        Player(FlightRequest(str(tmp_path / "log.nc")))
 
 
 def test_a_fork_without_a_change_flies_the_same_and_its_change_is_all_that_differs(player):
@@ -506,7 +507,7 @@ def test_a_fork_without_a_change_flies_the_same_and_its_change_is_all_that_diffe
 
 
 def test_two_parameter_sets_side_by_side_meet_the_same_noise():
-    player = Player(PRESET, FEW, 3, against={"radio.delay": 2.0})
+    player = Player(FlightRequest(PRESET, FEW, 3, against={"radio.delay": 2.0}))
     player.fly(300)
     for side, delay in zip(player.sides, (1.0, 2.0), strict=True):
         alone = airflock.open(airflock.load(PRESET, {**FEW, "radio.delay": delay}), 3).advance(steps=300)
@@ -516,7 +517,7 @@ def test_two_parameter_sets_side_by_side_meet_the_same_noise():
 
 def test_flights_of_other_dimensions_are_not_compared():
     with pytest.raises(StudioError, match="share one scene"):
-        Player(PRESET, {"agents": 3}, against="couzin_2002/torus")
+        Player(FlightRequest(PRESET, {"agents": 3}, against="couzin_2002/torus"))
 
 
 def test_going_back_twice_never_meets_a_past_that_was_given_up(player):
@@ -559,7 +560,7 @@ def test_a_gust_blows_for_its_time_and_is_an_event(interpreted, player):
 
 
 def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in(interpreted):
-    player = Player("vasarhelyi_2018/obstacles", FEW, 3)
+    player = Player(FlightRequest("vasarhelyi_2018/obstacles", FEW, 3))
     position, _ = player.motion
     with pytest.raises(StudioError, match="agent 4 is where"):
         player.throw(*map(float, position[4, :2]), 6.0)
@@ -576,13 +577,13 @@ def test_an_obstacle_stands_where_it_was_thrown_and_nobody_is_walled_in(interpre
 
 def test_a_goal_of_a_flat_world_is_moved(interpreted):
     goals = {"goals.kind": "points", "goals.points": [[40.0, 0.0, 0.0], [-60.0, 50.0, 0.0]]}
-    player = Player(PRESET, {**FEW, **goals}, 1)
+    player = Player(FlightRequest(PRESET, {**FEW, **goals}, 1))
     player.move_goal(0, [10.0, -20.0, 0.0])
     np.testing.assert_allclose(player.scenario.waypoints(), [[10.0, -20.0, 0.0], [-60.0, 50.0, 0.0]])
 
 
 def test_a_goal_is_moved_and_the_others_stay(interpreted):
-    player = Player("kidger/city", {"agents": 4}, 1)
+    player = Player(FlightRequest("kidger/city", {"agents": 4}, 1))
     before = player.scenario.waypoints()
     player.move_goal(1, [10.0, -20.0, 80.0])
     after = player.scenario.waypoints()
@@ -591,7 +592,7 @@ def test_a_goal_is_moved_and_the_others_stay(interpreted):
 
 
 def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
-    player = Player("vasarhelyi_2018/real_4ms", {**FEW, "model.r0_rep": 50.0}, 3)
+    player = Player(FlightRequest("vasarhelyi_2018/real_4ms", {**FEW, "model.r0_rep": 50.0}, 3))
     player.fly(400)
     seen = next(seen for seen in map(player.flight.look, range(12)) if len({any(term) for term in seen.terms}) == 2)
     drawn = Perceiving().of(player.side, seen.agent, 1.0, 6.0)
@@ -613,7 +614,7 @@ def test_what_an_agent_perceives_is_drawn_where_it_is(interpreted):
 
 def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(interpreted):
     """Arrows of a law whose neighbours act through one vector: Eqs 2-3, and Eqs 4-7 (Vásárhelyi et al. 2018)."""
-    player = Player(PRESET, {"agents": 30, "start.separation": 9.0}, seed=2)
+    player = Player(FlightRequest(PRESET, {"agents": 30, "start.separation": 9.0}, seed=2))
     player.fly(100)
     seen, p = player.flight.look(4), player.scenario.parameters
     push, align = np.zeros(2), np.zeros(2)
@@ -636,7 +637,7 @@ def test_repulsion_and_alignment_of_a_selected_agent_are_those_of_the_paper(inte
 
 
 def test_rays_of_a_selected_boid_end_where_the_world_begins():
-    player = Player("kidger/city", {"agents": 6}, 1)
+    player = Player(FlightRequest("kidger/city", {"agents": 6}, 1))
     player.fly(30)
     points, tones = Perceiving().of(player.side, 0, 1.0, 60.0).lines["rays"]
     length = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
@@ -780,7 +781,7 @@ def test_a_flight_begins_before_it_is_compiled_and_goes_on_as_if_it_had_been(tmp
     monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: flight.device == "python"))
     compiled, go = Flight.compile, threading.Event()
     monkeypatch.setattr("airflock.engine.Flight.compile", lambda flight, **how: go.wait() and compiled(flight, **how))
-    player = Player(PRESET, FEW, 3, at_once=True)
+    player = Player(FlightRequest(PRESET, FEW, 3, at_once=True))
     player.start()
     assert player.compiling and "compiling" in player.status and player.flight.device == "python"
     player.fly(60)
@@ -810,7 +811,7 @@ def test_what_the_compiler_refuses_stops_a_flight_that_has_begun(monkeypatch):
 
     monkeypatch.setattr("airflock.engine.Flight.ready", property(lambda flight: False))
     monkeypatch.setattr("airflock.engine.Flight.compile", refuse)
-    player = Player(PRESET, {"agents": 3}, 3, at_once=True)
+    player = Player(FlightRequest(PRESET, {"agents": 3}, 3, at_once=True))
     player.start()
     while not player.failure:
         player.tick(0.01)

@@ -1,7 +1,6 @@
 """Branches: flights of a scenario as lineages, for splitting; and what it found, with a line that flies it again."""
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -10,11 +9,12 @@ from numpy.typing import NDArray
 
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Count
+from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import COUNT, SPLIT, seed
 from airflock.certify.splitting import Estimate, Falls, Fly, Lineage, Particle, Repetition, estimate, repetition
 from airflock.errors import ScenarioError
-from airflock.evolve.store import Batch, Store
-from airflock.executors import Executor, Flight, Landed
+from airflock.evolve.store import Batch
+from airflock.executors import Flight, Landed
 from airflock.limits.bounds import per_hour
 from airflock.scenarios.events import Event
 from airflock.scenarios.scenario import Scenario
@@ -40,44 +40,34 @@ def refuse(campaign: Campaign) -> None:
         raise ScenarioError(faults)
 
 
-def split(
-    campaign: Campaign,
-    store: Store,
-    executor: Executor,
-    counted: Count,
-    budget: float,
-    threads: int | None = None,
-    note: Callable[[str], None] | None = None,
-    where: str = "",
-) -> dict[str, Any]:
+def split(flyer: Flyer, counted: Count, threads: int | None = None, where: str = "") -> dict[str, Any]:
     """Estimate how often r_min falls to the smallest limit, starting from the flights that were counted.
 
     where : file of the scenario, by which flights are flown again
     Returns plain values: target, statements, probability with its interval or why it is refused, worst flights.
     """
+    campaign = flyer.campaign
     target = min(limit.value for limit in campaign.limits if limit.score == "r_min")
-    until = time.monotonic() + budget
     own = [seed(campaign.hash, COUNT, i) for i in range(len(counted.rows))]
     values = [float(row["r_min"]) for row in counted.rows]
     try:
-        seeds, least = _topped_up(campaign, store, executor, own, values, until)
+        seeds, least = _topped_up(flyer, own, values)
     except TimeOver:
         return _refused(target, "time was over before there were flights enough to start from")
     share, runs, period = len(least) // REPETITIONS, [], sample_period(campaign.scenario)
     for number in range(REPETITIONS):
-        flyer = Flyer(campaign, store, number, threads, until)
+        fly = LineageFlyer(flyer, number, threads)
         mine = range(number * share, (number + 1) * share)
         rng = np.random.default_rng([int(campaign.hash[:12], 16), number])
 
         def say(level: float, p: float, number: int = number) -> None:
-            if note:
-                note(f"splitting {number + 1}/{REPETITIONS}: r_min<{level:.3g} at {p:.2g}")
+            flyer.say(f"splitting {number + 1}/{REPETITIONS}: r_min<{level:.3g} at {p:.2g}")
 
         try:
-            runs.append(begun([seeds[i] for i in mine], [least[i] for i in mine], target, flyer, period, rng, say))
+            runs.append(begun([seeds[i] for i in mine], [least[i] for i in mine], target, fly, period, rng, say))
         except TimeOver:
             return _refused(target, f"time was over in repetition {number + 1} of {REPETITIONS}")
-    return _found(campaign, estimate(runs, target, least), where or campaign.scenario.name)
+    return _plain_values(campaign, estimate(runs, target, least), where or campaign.scenario.name)
 
 
 def begun(
@@ -96,53 +86,50 @@ def begun(
     return repetition(start, len(seeds), target, fly, BACK / period, rng, size=SIZE, say=say)
 
 
-def _topped_up(
-    campaign: Campaign, store: Store, executor: Executor, seeds: list[int], least: list[float], until: float
-) -> tuple[list[int], list[float]]:
+def _topped_up(flyer: Flyer, seeds: list[int], least: list[float]) -> tuple[list[int], list[float]]:
     """Seeds and smallest distances of FEWEST flights at least: those that were counted, and more on other seeds."""
-    place = Batch("split-start", 0, 0)
-    flown = {number: values for (_, number), values in store.flown(place).items()}
+    place, identity = Batch("split-start", 0, 0), flyer.campaign.hash
+    flown = {number: values for (_, number), values in flyer.store.flown(place).items()}
     for first in range(0, max(0, FEWEST - len(seeds)), FEWEST // 10):
         part = range(first, min(first + FEWEST // 10, FEWEST - len(seeds)))
         missing = [number for number in part if number not in flown]
-        if missing and time.monotonic() > until:
+        if missing and flyer.time_over:
             raise TimeOver
-        flights = [Flight(0, number, {}, seed(campaign.hash, SPLIT, number)) for number in missing]
-        for landed in executor.fly(flights):
-            store.land(place, landed)
+        flights = [Flight(0, number, {}, seed(identity, SPLIT, number)) for number in missing]
+        for landed in flyer.fly(place, flights):
             flown[landed.flight.repeat] = landed.values
     more = [number for number in range(max(0, FEWEST - len(seeds))) if flown.get(number) is not None]
-    found = [float((flown[number] or {})["r_min"]) for number in more]
-    return [*seeds, *(seed(campaign.hash, SPLIT, number) for number in more)], [*least, *found]
+    distances = [float((flown[number] or {})["r_min"]) for number in more]
+    return [*seeds, *(seed(identity, SPLIT, number) for number in more)], [*least, *distances]
 
 
 class TimeOver(Exception):
     """The budget was spent while flights were to be flown."""
 
 
-class Flyer:
+class LineageFlyer:
     """Flies lineages of one repetition, and keeps how their distances fell."""
 
-    def __init__(self, campaign: Campaign, store: Store, number: int, threads: int | None, until: float):
-        self.campaign, self.store, self.number, self.threads, self.until = campaign, store, number, threads, until
+    def __init__(self, flyer: Flyer, number: int, threads: int | None):
+        self.flyer, self.number, self.threads = flyer, number, threads
 
     def __call__(self, batch: int, lineages: list[Lineage]) -> list[Falls]:
         """How the smallest distance fell in each flight; batch -1 is the start. Raises TimeOver."""
         from airflock.threads import in_threads
 
-        place = Batch("split", self.number, batch + 1)
-        flown = {i: values for (i, _), values in self.store.flown(place).items() if values is not None}
+        place, campaign, store = Batch("split", self.number, batch + 1), self.flyer.campaign, self.flyer.store
+        flown = {i: values for (i, _), values in store.flown(place).items() if values is not None}
         missing = [i for i in range(len(lineages)) if i not in flown]
-        if missing and time.monotonic() > self.until:
+        if missing and self.flyer.time_over:
             raise TimeOver
 
         def job(lineage: Lineage) -> Callable[[], Falls]:
-            return lambda: falls(self.campaign.scenario, lineage, self.campaign.precision, self.campaign.device)
+            return lambda: falls(campaign.scenario, lineage, campaign.precision, campaign.device)
 
-        alone = 1 if self.campaign.device != "cpu" else self.threads
-        for i, found in zip(missing, in_threads([job(lineages[i]) for i in missing], alone), strict=True):
-            values = {"falls": found, "branches": [list(b) for b in lineages[i].branches]}
-            self.store.land(place, Landed(Flight(i, 0, {}, lineages[i].seed), values))
+        alone = 1 if campaign.device != "cpu" else self.threads
+        for i, fell in zip(missing, in_threads([job(lineages[i]) for i in missing], alone), strict=True):
+            values = {"falls": fell, "branches": [list(b) for b in lineages[i].branches]}
+            store.land(place, Landed(Flight(i, 0, {}, lineages[i].seed), values))
             flown[i] = values
         return [flown[i]["falls"] for i in range(len(lineages))]
 
@@ -170,12 +157,12 @@ def events(scenario: Scenario, lineage: Lineage) -> list[Event]:
 def least_distances(positions: NDArray[Any]) -> NDArray[np.float64]:
     """Smallest distance of two agents (time,), m, from positions (time, axis, agent)."""
     axes = np.ascontiguousarray(positions.transpose(1, 2, 0))  # long rows of time: eight times as fast
-    found = np.full(len(positions), np.inf)
+    least = np.full(len(positions), np.inf)
     for i in range(axes.shape[1] - 1):
         apart = axes[:, i + 1 :] - axes[:, i : i + 1]
         apart *= apart
-        np.minimum(found, apart.sum(axis=0).min(axis=0), out=found)
-    nearest: NDArray[np.float64] = np.sqrt(found)
+        np.minimum(least, apart.sum(axis=0).min(axis=0), out=least)
+    nearest: NDArray[np.float64] = np.sqrt(least)
     return nearest
 
 
@@ -191,30 +178,31 @@ def _refused(target: float, reason: str) -> dict[str, Any]:
     return {"target": target, "refused": reason, "statements": [f"splitting: r_min<{target:g}: no number: {reason}"]}
 
 
-def _found(campaign: Campaign, found: Estimate, where: str) -> dict[str, Any]:
-    made: dict[str, Any] = (
-        _refused(found.target, found.refused)
-        if found.refused
+def _plain_values(campaign: Campaign, result: Estimate, where: str) -> dict[str, Any]:
+    plain: dict[str, Any] = (
+        _refused(result.target, result.refused)
+        if result.refused
         else {
-            "target": found.target, "probability": found.probability, "low": found.low, "high": found.high,
-            "per_hour": per_hour(found.probability, campaign.hours), "statements": [],
+            "target": result.target, "probability": result.probability, "low": result.low, "high": result.high,
+            "per_hour": per_hour(result.probability, campaign.hours), "statements": [],
         }
     )  # fmt: skip
-    flights = sum(r.flights for r in found.repetitions)
-    made |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in found.repetitions]}
-    if not found.refused:
-        made["statements"] = [
-            f"splitting, an estimate that shows nothing: r_min<{found.target:g} in {found.probability:.2g} of flights "
-            f"({found.low:.2g} to {found.high:.2g}), {made['per_hour']:.2g} per flock hour, from {flights:,} flights"
+    flights = sum(r.flights for r in result.repetitions)
+    plain |= {"flights": flights, "repetitions": [[list(level) for level in r.levels] for r in result.repetitions]}
+    if not result.refused:
+        plain["statements"] = [
+            f"splitting, an estimate that shows nothing: r_min<{result.target:g} in {result.probability:.2g} of "
+            f"flights ({result.low:.2g} to {result.high:.2g}), {plain['per_hour']:.2g} per flock hour, "
+            f"from {flights:,} flights"
         ]
-    last = sorted((p for r in found.repetitions for p in r.last), key=lambda p: p.least)
+    last = sorted((p for r in result.repetitions for p in r.last), key=lambda p: p.least)
     nearest: dict[int, Particle] = {}
     for particle in last:
         nearest.setdefault(particle.lineage.seed, particle)
-    made["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
-    if made["worst"] and math.isfinite(made["worst"][0]["r_min"]):
-        made["statements"].append(f"nearest that splitting found: {made['worst'][0]['replay']}")
-    return made
+    plain["worst"] = [_worst(campaign.scenario, p, where) for p in list(nearest.values())[:WORST]]
+    if plain["worst"] and math.isfinite(plain["worst"][0]["r_min"]):
+        plain["statements"].append(f"nearest that splitting found: {plain['worst'][0]['replay']}")
+    return plain
 
 
 def _worst(scenario: Scenario, particle: Particle, where: str) -> dict[str, Any]:

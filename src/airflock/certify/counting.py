@@ -8,10 +8,11 @@ from itertools import islice
 from typing import Any
 
 from airflock.certify.campaign import Campaign
+from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import COUNT, seed
 from airflock.errors import StudyError
 from airflock.evolve.store import Batch, Store
-from airflock.executors import Executor, Flight
+from airflock.executors import Flight
 from airflock.limits.bounds import Look, look, needed, schedule, share
 from airflock.limits.limit import Limit
 
@@ -94,12 +95,12 @@ class Progress:
 Watch = Callable[[Progress], None]
 
 
-def count(campaign: Campaign, store: Store, executor: Executor, budget: float, watch: Watch | None = None) -> Count:
-    """Count events over the seeds of a campaign, in their order, for at most `budget` seconds.
+def count(flyer: Flyer, watch: Watch | None = None) -> Count:
+    """Count events over the seeds of a campaign, in their order, until its time is over.
 
     Raises StudyError for a flight that fails: a certificate leaves none out.
     """
-    counting = _Counting(campaign, store, executor, budget, watch)
+    counting = _Counting(flyer, watch)
     while counting.goes_on():
         counting.fly()
     counting.told.seconds = time.monotonic() - counting.began
@@ -112,13 +113,14 @@ class _Counting:
     found : scores by number of the flight, in whatever order they landed; only a prefix without holes counts
     """
 
-    def __init__(self, campaign: Campaign, store: Store, executor: Executor, budget: float, watch: Watch | None):
-        self.campaign, self.store, self.executor, self.budget, self.watch = campaign, store, executor, budget, watch
+    def __init__(self, flyer: Flyer, watch: Watch | None):
+        self.flyer, self.watch = flyer, watch
+        self.campaign = campaign = flyer.campaign
         self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
         self.found: dict[int, Mapping[str, Any]] = {}
-        for (_, number), values in store.flown(BATCH).items():
+        for (_, number), values in flyer.store.flown(BATCH).items():
             if values is None:
-                raise StudyError(f"{store.path}: {_failure(campaign, number, _reason(store, number))}")
+                raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
             self.found[number] = values
         self.events = [0] * len(campaign.limits)
         self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
@@ -137,7 +139,7 @@ class _Counting:
         still = [verdict for verdict in verdicts if _open(self.campaign, verdict)]
         self.aims = [due[0] for verdict in still if (due := _next(self.campaign, verdict))]
         self._note()
-        left = self.budget - (time.monotonic() - self.began)
+        left = self.flyer.left
         if not still or left <= 0.0:
             return False
         if self.fresh < FIRST or math.isinf(left):
@@ -163,8 +165,7 @@ class _Counting:
             if number not in self.found:
                 own = seed(self.campaign.hash, COUNT, number)
                 flights.append(Flight(0, number, self.campaign.parameters(own), own))
-        for landed in self.executor.fly(flights):
-            self.store.land(BATCH, landed)
+        for landed in self.flyer.fly(BATCH, flights):
             if landed.values is None:
                 raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
             self.found[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1

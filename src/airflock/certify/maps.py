@@ -1,18 +1,16 @@
 """Maps: bounds over a grid of two numbers of the scenario, each cell judged as `tolerance` judges a value."""
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from airflock.certify.campaign import Campaign
+from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import MAP
 from airflock.certify.tolerance import Screen, level_of
 from airflock.errors import ScenarioError
 from airflock.evolve.space import declared
-from airflock.evolve.store import Batch, Store
-from airflock.executors import Executor
+from airflock.evolve.store import Batch
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
 
@@ -41,26 +39,18 @@ def sound_axes(scenario: Scenario, axes: Mapping[str, Sequence[float]]) -> dict[
     return {key: [float(value) for value in values] for key, values in axes.items()}
 
 
-def bounds_over(
-    campaign: Campaign,
-    store: Store,
-    executor: Executor,
-    axes: Mapping[str, Sequence[float]],
-    budget: float,
-    note: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
+def bounds_over(flyer: Flyer, axes: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Verdict and bounds of every cell, on seeds that all cells share.
 
     Returns plain values: level, keys, values, and for each cell values, verdict, low, high (per flight), flights.
     """
-    screen = Screen(campaign, store, executor, level_of(campaign), time.monotonic() + budget, MAP)
+    screen = Screen(flyer, level_of(flyer.campaign), MAP)
     cells = []
     for number, values in enumerate(product(*axes.values())):
-        if note:
-            note(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
+        flyer.say(f"map: cell {number + 1} of {math.prod(len(v) for v in axes.values())}")
         parameters = dict(zip(axes, values, strict=True))
         batch = Batch("map", 0, number)
-        store.ask(batch, [list(values)], [parameters])
+        flyer.store.ask(batch, [list(values)], [parameters])
         verdict, found = screen.judged(batch, parameters)
         cell: dict[str, Any] = {"values": list(values), "verdict": verdict, "low": 0.0, "high": 1.0, "flights": 0}
         if found is not None:

@@ -1,6 +1,5 @@
 """The public door: a scenario and limits in, a certificate out; begun or continued in a folder of flights."""
 
-import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,6 +10,7 @@ from airflock.certify.campaign import FOLDER, Campaign
 from airflock.certify.certificate import Certificate
 from airflock.certify.counting import Count, Watch, count
 from airflock.certify.executing import executor_for, folder_of, planned
+from airflock.certify.flyer import Flyer
 from airflock.certify.hazard import Hazard, hazard
 from airflock.certify.maps import bounds_over, sound_axes
 from airflock.certify.request import asked, campaign_of, check_options
@@ -158,20 +158,21 @@ def run(
         store.begin(versions())
         sweep(folder)
         write(folder / "scenario.toml", {formats.KEY: formats.FORMAT, **campaign.scenario.document})
+        flyer = Flyer(campaign, store, executor, note=note)
         try:
             part = COUNTED if keys or split or axes else 1.0
-            counted = count(campaign, store, executor, math.inf if campaign.flights else budget * part, watch)
+            counted = count(flyer if campaign.flights else flyer.with_budget(budget * part), watch)
             rare: Mapping[str, Any] = {}
             tolerances: Mapping[str, Any] = {}
             if split:
                 from airflock.certify.branches import split as splitting
 
-                rare = splitting(campaign, store, executor, counted, left(0.5 if keys else 1.0), threads, note, where)
+                rare = splitting(flyer.with_budget(left(0.5 if keys else 1.0)), counted, threads, where)
             if keys:
                 from airflock.certify.tolerance import tolerance
 
-                tolerances = tolerance(campaign, store, executor, counted, keys, left(0.5 if axes else 1.0), note)
-            cells = bounds_over(campaign, store, executor, axes, left(), note) if axes else {}
+                tolerances = tolerance(flyer.with_budget(left(0.5 if axes else 1.0)), counted, keys)
+            cells = bounds_over(flyer.with_budget(left()), axes) if axes else {}
         except KeyboardInterrupt as stop:
             done = f"interrupted: {store.count('count'):,} flights"
             if kept:

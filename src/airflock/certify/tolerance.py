@@ -6,19 +6,19 @@ exceeds it. Rare limits would need too many flights at each value: they are scre
 """
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import takewhile
 from typing import Any
 
 from airflock.certify.campaign import Campaign
 from airflock.certify.counting import Count
+from airflock.certify.flyer import Flyer
 from airflock.certify.seeds import TOLERANCE, seed
 from airflock.core.parameters import Quantity
 from airflock.errors import ScenarioError
 from airflock.evolve.space import declared
-from airflock.evolve.store import Batch, Store
-from airflock.executors import Executor, Flight
+from airflock.evolve.store import Batch
+from airflock.executors import Flight
 from airflock.limits.bounds import Look, look, needed, schedule, share
 from airflock.scenarios.scenario import Scenario
 from airflock.spelling import meant
@@ -67,30 +67,21 @@ def sound_keys(scenario: Scenario, keys: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(keys))
 
 
-def tolerance(
-    campaign: Campaign,
-    store: Store,
-    executor: Executor,
-    counted: Count,
-    keys: Sequence[str],
-    budget: float,
-    note: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
+def tolerance(flyer: Flyer, counted: Count, keys: Sequence[str]) -> dict[str, Any]:
     """Largest value of each key at which the events of all limits stay below a level, and the next that is not shown.
 
     Returns plain values: level, and for each key nominal, unit, safe, not_shown, factor (safe to nominal), flights.
     """
-    until = time.monotonic() + budget
+    campaign = flyer.campaign
     level = level_of(campaign)
-    screen = Screen(campaign, store, executor, level, until)
+    screen = Screen(flyer, level)
     events = sum(any(limit.happened(row) for limit in campaign.limits) for row in counted.rows)
     told: dict[str, Any] = {"level": level, "confidence": campaign.confidence, "axis": []}
     if not counted.rows or look(len(counted.rows), events, 1.0 - campaign.confidence, 0.0).high > level:
         told["reason"] = f"as it stands the scenario is not shown to stay below {100.0 * level:g} % per flight"
         return told
     for number, key in enumerate(keys):
-        if note:
-            note(f"tolerance of {key}")
+        flyer.say(f"tolerance of {key}")
         told["axis"].append(_axis(screen, number, key, *declared(campaign.scenario)[key]))
     return told
 
@@ -103,36 +94,34 @@ def level_of(campaign: Campaign) -> float:
 class Screen:
     """Judges one value at a time against a level per flight, on seeds that all values share."""
 
-    def __init__(
-        self, campaign: Campaign, store: Store, executor: Executor, level: float, until: float, part: int = TOLERANCE
-    ):
-        self.campaign, self.store, self.executor, self.level, self.until = campaign, store, executor, level, until
-        self.alpha, self.part = 1.0 - campaign.confidence, part
-        most = MOST * needed(level, self.alpha * share(1))
-        self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, self.alpha)))
+    def __init__(self, flyer: Flyer, level: float, part: int = TOLERANCE):
+        self.flyer, self.level, self.part = flyer, level, part
+        alpha = 1.0 - flyer.campaign.confidence
+        most = MOST * needed(level, alpha * share(1))
+        self.looks = list(takewhile(lambda due: due[0] <= most, schedule(level, alpha)))
 
     def judged(self, batch: Batch, parameters: Mapping[str, float]) -> tuple[str, Look | None]:
         """safe, unsafe, open, or a reason why it cannot be flown; and the last look."""
-        flown = {number: values for (_, number), values in self.store.flown(batch).items()}
+        campaign = self.flyer.campaign
+        flown = {number: values for (_, number), values in self.flyer.store.flown(batch).items()}
         events, done, last = 0, 0, None
         for size, above, below in self.looks:
             missing = [number for number in range(done, size) if number not in flown]
-            if missing and time.monotonic() > self.until:
+            if missing and self.flyer.time_over:
                 return TIME_OVER, last
-            seeds = [seed(self.campaign.hash, self.part, number) for number in missing]
+            seeds = [seed(campaign.hash, self.part, number) for number in missing]
             flights = [
-                Flight(0, number, {**self.campaign.parameters(own), **parameters}, own)
+                Flight(0, number, {**campaign.parameters(own), **parameters}, own)
                 for number, own in zip(missing, seeds, strict=True)
             ]
-            for landed in self.executor.fly(flights):
-                self.store.land(batch, landed)
+            for landed in self.flyer.fly(batch, flights):
                 flown[landed.flight.repeat] = landed.values
                 if landed.values is None:
                     return f"cannot be flown: {landed.reason}", last
             rows = [flown[number] for number in range(done, size)]
             if any(row is None for row in rows):
                 return "cannot be flown", last
-            events += sum(any(limit.happened(row or {}) for limit in self.campaign.limits) for row in rows)
+            events += sum(any(limit.happened(row or {}) for limit in campaign.limits) for row in rows)
             done, last = size, look(size, events, above, below)
             if last.high < self.level:
                 return "safe", last
@@ -154,7 +143,7 @@ class Trials:
     def safe(self, value: float) -> bool | None:
         """Whether a value is safe; None where time was over before that was known."""
         batch, parameters = Batch("tolerance", self._number, self._tried), {self._key: value}
-        self._screen.store.ask(batch, [[value]], [parameters])
+        self._screen.flyer.store.ask(batch, [[value]], [parameters])
         self.verdict, last = self._screen.judged(batch, parameters)
         self._tried, self.flights = self._tried + 1, self.flights + (last.flights if last else 0)
         return None if self.verdict == TIME_OVER else self.verdict == "safe"

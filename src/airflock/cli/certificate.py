@@ -5,7 +5,7 @@ from typing import Any
 from airflock.cli import tables
 
 
-def show(made: Any) -> None:
+def show(certificate: Any) -> None:
     """Print all that it says, and what it does not say."""
     from rich.console import Console
 
@@ -16,43 +16,44 @@ def show(made: Any) -> None:
     def line(text: str, **how: Any) -> None:
         console.print(text, highlight=False, markup=False, soft_wrap=True, **how)
 
-    _verdicts(console, made)
-    for text in made.statements:
+    _verdicts(console, certificate)
+    for text in certificate.statements:
         line(text)
-    for i, found in made.hazards.items():
-        if found.events:
-            early = f"{found.early} of {found.events} first events in the first half of flights"
-            line(f"{made.campaign.limits[i].event}: {early}, {100.0 * found.expected:.0f} % if even: {found.verdict}")
-    _worst(console, made)
-    _tolerances(console, made.tolerance)
-    _map(console, made.over)
-    for text in made.splitting.get("statements", ()):
+    for i, hazard in certificate.hazards.items():
+        if hazard.events:
+            early = f"{hazard.early} of {hazard.events} first events in the first half of flights"
+            even = f"{100.0 * hazard.expected:.0f} % if even: {hazard.verdict}"
+            line(f"{certificate.campaign.limits[i].event}: {early}, {even}")
+    _worst(console, certificate)
+    _tolerances(console, certificate.tolerance)
+    _map(console, certificate.over)
+    for text in certificate.splitting.get("statements", ()):
         line(text)
     line(f"Not said: {'; '.join(NOT_SAID)}.", style="dim")
 
 
-def _verdicts(console: Any, made: Any) -> None:
+def _verdicts(console: Any, certificate: Any) -> None:
     """One row a limit."""
     from rich import box
     from rich.table import Table
 
     from airflock.certify.certificate import bound
 
-    campaign = made.campaign
+    campaign = certificate.campaign
     sure = f"{100.0 * campaign.confidence:g} %"
-    title = f"{campaign.scenario.name}: {len(made.rows):,} flights of {campaign.scenario.flight.duration:g} s"
+    title = f"{campaign.scenario.name}: {len(certificate.rows):,} flights of {campaign.scenario.flight.duration:g} s"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("limit", "events", "flights", f"at most ({sure})", "verdict"):
         table.add_column(name, justify="right" if name in ("events", "flights") else "left")
-    for verdict in made.verdicts:
+    for verdict in certificate.verdicts:
         said = "shown" if verdict.shown else "refuted" if verdict.refuted else "not shown"
         table.add_row(verdict.limit.text, f"{verdict.events:,}", f"{verdict.flights:,}", bound(campaign, verdict), said)
     console.print(table)
 
 
-def _worst(console: Any, made: Any) -> None:
+def _worst(console: Any, certificate: Any) -> None:
     shown: set[str] = set()
-    for entry in made.worst:
+    for entry in certificate.worst:
         if entry["limit"] in shown:
             continue
         shown.add(entry["limit"])
@@ -61,22 +62,21 @@ def _worst(console: Any, made: Any) -> None:
         console.print(f"{line}{moment}; {entry['replay']}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _tolerances(console: Any, found: Any) -> None:
-    if not found:
+def _tolerances(console: Any, tolerance: Any) -> None:
+    if not tolerance:
         return
     from rich import box
     from rich.table import Table
 
-    if "reason" in found:
-        console.print(f"tolerance: {found['reason']}", highlight=False, markup=False, soft_wrap=True)
+    if "reason" in tolerance:
+        console.print(f"tolerance: {tolerance['reason']}", highlight=False, markup=False, soft_wrap=True)
         return
-    title = (
-        f"safe: fewer than {100.0 * found['level']:g} % of flights with an event ({100.0 * found['confidence']:g} %)"
-    )
+    level, confidence = (100.0 * tolerance[name] for name in ("level", "confidence"))
+    title = f"safe: fewer than {level:g} % of flights with an event ({confidence:g} %)"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "nominal", "safe to", "factor", "not shown at", "flights", ""):
         table.add_column(name, justify="left" if name in ("number", "") else "right")
-    for axis in found["axis"]:
+    for axis in tolerance["axis"]:
         bad = tables.number(axis["not_shown"]) if "not_shown" in axis else ""
         table.add_row(
             axis["key"], tables.number(axis["nominal"]), tables.number(axis["safe"]), f"{axis['factor']:.3g}", bad,
@@ -85,22 +85,22 @@ def _tolerances(console: Any, found: Any) -> None:
     console.print(table)
 
 
-def _map(console: Any, found: Any) -> None:
+def _map(console: Any, bounds: Any) -> None:
     """Upper bounds in percent of flights, first key downwards, second across."""
-    if not found:
+    if not bounds:
         return
     from rich import box
     from rich.table import Table
 
-    (down, across), (rows, columns) = found["keys"], found["axes"]
-    title = f"at most so many % of flights with an event; * safe, below {100.0 * found['level']:g} %"
+    (down, across), (rows, columns) = bounds["keys"], bounds["axes"]
+    title = f"at most so many % of flights with an event; * safe, below {100.0 * bounds['level']:g} %"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column(f"{down} / {across}", style="bold")
     for value in columns:
         table.add_column(f"{value:g}", justify="right")
-    cells = iter(found["cell"])
+    cells = iter(bounds["cell"])
     for value in rows:
         row = [next(cells) for _ in columns]
-        told = [f"{100.0 * cell['high']:.3g}{'*' if cell['verdict'] == 'safe' else ''}" for cell in row]
-        table.add_row(f"{value:g}", *told)
+        texts = [f"{100.0 * cell['high']:.3g}{'*' if cell['verdict'] == 'safe' else ''}" for cell in row]
+        table.add_row(f"{value:g}", *texts)
     console.print(table)

@@ -113,9 +113,9 @@ def certify(
     with gathering(faults):
         seconds = options.time_of(budget)
     with gathering(faults):
-        found = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
+        loaded = load(scenario, options.settings(changes, agents, duration), law, trust=trust)
         how: dict[str, Any] = {"uncertain": uncertain, "precision": precision, "device": device}
-        campaign = campaign_of(found, limit or [], confidence, flights, **how)
+        campaign = campaign_of(loaded, limit or [], confidence, flights, **how)
         also = {"keys": asked(campaign, tolerance_of or tolerance, split), "split": split}
         also["axes"] = sound_axes(campaign.scenario, dict(axis(text) for text in over)) if over else {}
     with gathering(faults):
@@ -158,24 +158,24 @@ def _flown(
             executor.close()
 
 
-def _end(made: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
+def _end(result: Any, out: Path | None, plot: Path | None, as_json: bool) -> None:
     """Write, print, and leave with status 1 where something is not shown."""
     if out is not None:
-        made.save(out)
+        result.save(out)
         tables.say(f"saved {out}")
     if plot is not None:
         from airflock.plots.certificate import certificate
         from airflock.plots.save import save_figure
 
-        save_figure(certificate(made), plot)
+        save_figure(certificate(result), plot)
         tables.say(f"saved {plot}")
     if as_json:
-        tables.emit_json({**made.document(), "seconds": made.seconds})
+        tables.emit_json({**result.document(), "seconds": result.seconds})
     else:
         from airflock.cli.certificate import show
 
-        show(made)
-    if not made.shown:
+        show(result)
+    if not result.shown:
         raise typer.Exit(1)
 
 
@@ -212,14 +212,14 @@ def _check(path: str, threads: int | None, trust: bool, as_json: bool) -> None:
     from airflock.certify.check import check
 
     with options.progress(f"{path}: flights again", 0, quiet=as_json) as done:
-        found = check(path, threads=threads, trust=trust, done=done)
+        result = check(path, threads=threads, trust=trust, done=done)
     if as_json:
-        tables.emit_json({"same": found.same, **vars(found)})
+        tables.emit_json({"same": result.same, **vars(result)})
     else:
-        tables.say_notes(found.notes)
-        for fault in found.faults:
+        tables.say_notes(result.notes)
+        for fault in result.faults:
             tables.say(f"airflock: {path}: {fault}")
-        said = "same bits, bounds computed again" if found.same else "does not hold"
-        typer.echo(f"{path}: {found.flown} of {found.total:,} flights flown again: {said}")
-    if not found.same:
+        said = "same bits, bounds computed again" if result.same else "does not hold"
+        typer.echo(f"{path}: {result.flown} of {result.total:,} flights flown again: {said}")
+    if not result.same:
         raise typer.Exit(1)

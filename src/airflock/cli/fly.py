@@ -238,11 +238,11 @@ def order(
         faults.append("--point LAT,LON,ALT belongs to goto, and goto needs it")
     where = _site("--point", point, faults) if point else (0.0, 0.0, 0.0)
     with gathering(faults):
-        found = read_card(card_file)
-        if target and target not in found.members:
-            faults.append(f"--target {target}: the card's members are {', '.join(map(str, found.members))}")
+        card = read_card(card_file)
+        if target and target not in card.members:
+            faults.append(f"--target {target}: the card's members are {', '.join(map(str, card.members))}")
         if point and not faults:
-            options.refuse(_beyond(found, where, point))
+            options.refuse(_beyond(card, where, point))
     with gathering(faults):
         key, private = read_key(card_file.with_suffix(".key")), read_key(card_file.with_suffix(".operator"))
     options.refuse(faults)
@@ -251,16 +251,16 @@ def order(
     try:
         utc = time.time_ns() // 1000
         place = (round(where[0] * 1e7), round(where[1] * 1e7), round(where[2] * 1e3))
-        made = orders.Order(what, target, found.mission, utc, utc + round(delay * 1e6), place)
-        message, sign = orders.message(made, private), Signer(key, orders.OPERATOR)
+        command = orders.Order(what, target, card.mission, utc, utc + round(delay * 1e6), place)
+        message, sign = orders.message(command, private), Signer(key, orders.OPERATOR)
         for _ in range(5):
             if not port.write(sign(message, time.time_ns() // 1000)):
                 raise CardError([f"{radio}: cannot send; does the port name where to (>HOST:PORT)?"])
             time.sleep(0.1)
     finally:
         port.close()
-    told = KILL if what is orders.Do.KILL else ""
-    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}{told}")
+    effect = KILL if what is orders.Do.KILL else ""
+    tables.say(f"sent {what.name} to {f'drone {target}' if target else 'all'}{effect}")
 
 
 @app.command("replay", cls=Verb)
@@ -277,9 +277,9 @@ def replay(
     from airflock.onboard.card import read_card
     from airflock.onboard.log import read_log
 
-    found, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
+    card, key = read_card(card_file), read_key(card_file.with_suffix(".key"))
     ticks, different, notes = 0, [], []
-    for tick in read_log(log, found, key):
+    for tick in read_log(log, card, key):
         ticks += 1
         notes += [(tick.time, note) for note in tick.out.notes]
         if not tick.same:
@@ -320,12 +320,12 @@ def _site(option: str, text: str, faults: list[str]) -> tuple[float, float, floa
 
 
 def _members(text: str, faults: list[str]) -> list[int]:
-    found: list[int] = []
+    members: list[int] = []
     for part in text.split(","):
         first, dash, last = part.partition("-")
         last = last if dash else first
         if not (first.isdigit() and last.isdigit() and 0 <= int(last) - int(first) <= 250):
             faults.append(f"--members {text}: write 1-10 or 1,2,5")
             return [1]
-        found += range(int(first), int(last) + 1)
-    return found
+        members += range(int(first), int(last) + 1)
+    return members

@@ -58,10 +58,10 @@ def harden(
     from airflock.evolve.harden import document
 
     faults: list[str] = []
-    found: list[Any] = []
+    optima: list[Any] = []
     with gathering(faults):
-        found = _optima(scenario, options.settings(changes, None, duration), trust)
-    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(found) + 1))]
+        optima = _optima(scenario, options.settings(changes, None, duration), trust)
+    places = [out, *(out.with_stem(f"{out.stem}_{i}") for i in range(2, len(optima) + 1))]
     for place in places:
         with gathering(faults):
             options.writable((place, SCENARIOS), reads=[scenario])
@@ -69,28 +69,28 @@ def harden(
     for name, factor in (("--r-coll", r_coll), ("--delay", delay)):
         if factor is not None and not 1.0 <= factor <= 100.0:
             faults.append(f"{name} {factor:g} lies outside [1, 100]")
-    if again and len(found) > 1:
-        faults.append(f"{scenario}: is a study of {len(found)} scenarios; --r-coll and --delay take one")
+    if again and len(optima) > 1:
+        faults.append(f"{scenario}: is a study of {len(optima)} scenarios; --r-coll and --delay take one")
     if again and limit:
         faults.append("--limit is for the recipe; leave it out with --r-coll and --delay")
     options.refuse(faults)
-    tables.say_notes(note for each in found for note in each.notes)
+    tables.say_notes(note for each in optima for note in each.notes)
     numbers = range(first_seed, first_seed + seeds)
     if again:
         stricter = (r_coll or 1.0, delay or 1.0)
-        steps = _evolved_again(scenario, found[0], stricter, generations, out, numbers, threads, as_json)
+        steps = _evolved_again(scenario, optima[0], stricter, generations, out, numbers, threads, as_json)
     else:
         from airflock.evolve.harden import MOST, harden
 
-        with options.progress(f"{scenario}: flights", MOST * seeds * len(found), quiet=as_json) as done:
-            steps = harden(found, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
-    for each, place in zip(found, places, strict=True):
+        with options.progress(f"{scenario}: flights", MOST * seeds * len(optima), quiet=as_json) as done:
+            steps = harden(optima, numbers, cost=cost, limit=limit or (), threads=threads, done=done)
+    for each, place in zip(optima, places, strict=True):
         write(place, document(each, steps[-1]), "Hardened; see airflock harden --help.")
     if as_json:
-        told = [step.as_dict() for step in steps]
-        tables.emit_json({"scenario": found[0].name, "seeds": seeds, "out": str(out), "steps": told})
+        rows = [step.as_dict() for step in steps]
+        tables.emit_json({"scenario": optima[0].name, "seeds": seeds, "out": str(out), "steps": rows})
     else:
-        _print(found[0].name, steps, seeds)
+        _print(optima[0].name, steps, seeds)
         tables.say(f"saved {', '.join(map(str, places))}")
     if not steps[-1].kept:
         raise typer.Exit(1)
@@ -107,17 +107,17 @@ def _optima(where: str, settings: dict[str, Any], trust: bool) -> list[Any]:
 
 
 def _evolved_again(
-    where: str, found: Any, factors: tuple[float, float], generations: int, out: Path, numbers: range,
+    where: str, optimum: Any, factors: tuple[float, float], generations: int, out: Path, numbers: range,
     threads: int | None, quiet: bool,
 ) -> list[Any]:  # fmt: skip
     """Workaround (i): the optimum, and what is evolved with a larger radius of collision and a longer delay."""
     from airflock.evolve.again import cautious, evolved_again, stricter
 
-    settings = cautious(found, *factors)
-    study = stricter(found, _space(where, found), settings, {"generations": generations})
+    settings = cautious(optimum, *factors)
+    study = stricter(optimum, _space(where, optimum), settings, {"generations": generations})
     folder = out.parent / f"{out.stem}_study"
     with options.searching(study, quiet=quiet) as (watch, note):
-        return evolved_again(found, study, settings, folder, numbers, threads, watch, note)
+        return evolved_again(optimum, study, settings, folder, numbers, threads, watch, note)
 
 
 def _space(where: str, scenario: Any) -> Any:

@@ -73,33 +73,33 @@ def identify(
         reading = Options(
             map=how, unit=unit, time_unit=time_unit, axes=axes, decimal=decimal, delimiter=delimiter, done=done
         )
-        found = find(
+        result = find(
             files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading, accept=accept or ()
         )
-    if out is not None and not found.settings():
-        raise AirflockError("\n".join([f"{out}: not written: these logs tell no number", *_reasons(found)]))
-    check = _checked(found, flights, as_json)
+    if out is not None and not result.settings():
+        raise AirflockError("\n".join([f"{out}: not written: these logs tell no number", *_reasons(result)]))
+    check = _checked(result, flights, as_json)
     if out is not None:
         from airflock.evolve.folder import write
 
-        write(out, found.document(conservative, uncertain=uncertain))
+        write(out, result.document(conservative, uncertain=uncertain))
         tables.say(f"saved {out}")
     if plot is not None:
         from airflock.plots.identified import identified
         from airflock.plots.save import save_figure
 
-        save_figure(identified(found, check), plot)
+        save_figure(identified(result, check), plot)
         tables.say(f"saved {plot}")
     if as_json:
-        tables.emit_json(_plain(found, check))
+        tables.emit_json(_plain(result, check))
         return
-    for note in found.notes:
+    for note in result.notes:
         tables.say(f"note: {note}")
-    _table(found)
+    _table(result)
     if check is not None:
-        _verdicts(check, found, flights)
+        _verdicts(check, result, flights)
     if plan:
-        _card(found)
+        _card(result)
 
 
 def _span(text: str) -> tuple[float, float] | None:
@@ -115,43 +115,43 @@ def _span(text: str) -> tuple[float, float] | None:
     return span
 
 
-def _checked(found: Any, flights: int, quiet: bool) -> Any:
+def _checked(result: Any, flights: int, quiet: bool) -> Any:
     """Posterior check, if there is something to check."""
     from airflock.identify.check import posterior
 
-    if not flights or not found.settings():
+    if not flights or not result.settings():
         return None
     with options.progress("check: flights", flights, quiet=quiet) as done:
-        return posterior(found.scenario(), found.logs, flights, done, comparable=found.comparable)
+        return posterior(result.scenario(), result.logs, flights, done, comparable=result.comparable)
 
 
-def _table(found: Any) -> None:
+def _table(result: Any) -> None:
     from rich.console import Console
 
     from airflock.identify.run import NEVER
 
     console = Console()
-    if found.settings():
-        console.print(_told(found))
+    if result.settings():
+        console.print(_numbers_table(result))
         console.print("not identified, kept from --like:")
     else:
-        console.print(f"{found.logs.drones} drones: these logs tell no number; all are kept from --like:")
-    for line in _reasons(found):
+        console.print(f"{result.logs.drones} drones: these logs tell no number; all are kept from --like:")
+    for line in _reasons(result):
         console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
     for key, reason in NEVER.items():
         console.print(f"  {key}: {reason}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _reasons(found: Any) -> list[str]:
+def _reasons(result: Any) -> list[str]:
     """Why numbers are not told, a line each reason."""
     keys: dict[str, list[str]] = {}
-    for key, number in found.numbers.items():
+    for key, number in result.numbers.items():
         if not number.told:
             keys.setdefault(number.reason, []).append(key)
     return [f"{', '.join(own)}: {reason}" for reason, own in keys.items()]
 
 
-def _told(found: Any) -> Any:
+def _numbers_table(result: Any) -> Any:
     """Numbers that the logs tell, as a table."""
     from rich import box
     from rich.table import Table
@@ -159,13 +159,13 @@ def _told(found: Any) -> Any:
     from airflock.identify.run import UNITS
 
     table = Table(
-        title=f"{found.logs.drones} drones, like {found.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
+        title=f"{result.logs.drones} drones, like {result.like.name}", box=box.SIMPLE_HEAD, title_justify="left"
     )
     columns = (("number", "left"), ("value", "right"), ("95 %", "right"), ("unit", "left"), ("like", "right"))
     for name, justify in columns:
         table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     table.add_column("from")
-    for key, number in found.numbers.items():
+    for key, number in result.numbers.items():
         if number.told:
             like = "" if number.like is None else tables.number(number.like)
             span = f"{number.low:.3g} to {number.high:.3g}"
@@ -174,7 +174,7 @@ def _told(found: Any) -> Any:
     return table
 
 
-def _verdicts(check: Any, found: Any, flights: int) -> None:
+def _verdicts(check: Any, result: Any, flights: int) -> None:
     from rich.console import Console
 
     console = Console()
@@ -183,33 +183,33 @@ def _verdicts(check: Any, found: Any, flights: int) -> None:
         verdict = "ok" if low <= own <= high else "OUTSIDE: not explained"
         line = f"  {name} {tables.number(own)} in [{low:.4g}, {high:.4g}] {verdict}"
         console.print(line, highlight=False, markup=False)
-    if not found.comparable:
+    if not result.comparable:
         console.print("  distances are left out: nothing says that the clocks agree (--same-clock)")
 
 
-def _card(found: Any) -> None:
+def _card(result: Any) -> None:
     from rich.console import Console
 
     from airflock.identify.plan import flight_card
 
     console = Console()
-    card = flight_card(found.like)
+    card = flight_card(result.like)
     console.print(f"test flights, {sum(part.seconds for part in card) / 60.0:.0f} min:")
     for number, part in enumerate(card, 1):
-        lacking = [key for key in part.keys if key not in found.numbers or not found.numbers[key].told]
+        lacking = [key for key in part.keys if key not in result.numbers or not result.numbers[key].told]
         need = f"for {', '.join(lacking)}" if lacking else "all told already"
         console.print(f"{number}. {part.title}, {part.seconds:.0f} s ({need})", highlight=False, markup=False)
         console.print(f"   {part.how}", highlight=False, markup=False)
 
 
-def _plain(found: Any, check: Any) -> dict[str, Any]:
+def _plain(result: Any, check: Any) -> dict[str, Any]:
     from airflock.identify.plan import flight_card
 
     numbers = {
         key: {"like": n.like, "from": n.origin, "reason": n.reason}
         | {name: getattr(n, name) if n.told else None for name in ("value", "low", "high")}
-        for key, n in found.numbers.items()
+        for key, n in result.numbers.items()
     }  # fmt: skip
-    told = {} if check is None else {k: {"log": o, "low": lo, "high": hi} for k, (o, lo, hi) in check.found.items()}
-    card = [part._asdict() for part in flight_card(found.like)]
-    return {"like": found.like.name, "numbers": numbers, "check": told, "plan": card, "notes": found.notes}
+    checks = {} if check is None else {k: {"log": o, "low": lo, "high": hi} for k, (o, lo, hi) in check.found.items()}
+    card = [part._asdict() for part in flight_card(result.like)]
+    return {"like": result.like.name, "numbers": numbers, "check": checks, "plan": card, "notes": result.notes}

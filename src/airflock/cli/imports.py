@@ -39,18 +39,18 @@ Delimiter = Annotated[str, typer.Option(help="Between columns of a text file.", 
 
 def mapped(pairs: list[str] | None) -> dict[str, str]:
     """Targets and expressions of --map; := and = are the same."""
-    found: dict[str, str] = {}
+    columns: dict[str, str] = {}
     faults = []
     for pair in pairs or []:
         target, sign, text = pair.partition(":=") if ":=" in pair else pair.partition("=")
         if not sign or not target.strip() or not text.strip():
             faults.append(f"--map {pair}: write TARGET:=COLUMNS, for instance --map x:=pos_e")
-        elif target.strip() in found:
+        elif target.strip() in columns:
             faults.append(f"--map {pair}: {target.strip()} is mapped twice")
-        found[target.strip()] = text.strip()
+        columns[target.strip()] = text.strip()
     if faults:
         raise RecordingError("\n".join(faults))
-    return found
+    return columns
 
 
 def import_tracks(

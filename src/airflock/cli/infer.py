@@ -62,27 +62,27 @@ def infer(
     faults += [f"{path}: no such file" for path in tracks if not path.exists()]
     options.refuse(faults)
     with _telling(as_json) as done:
-        found = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
+        result = find(tracks, laws, settings=settings, check=flights, seed=seed, trust=trust, done=done)
     if plot is not None:
         from airflock.plots.inferred import inferred
         from airflock.plots.save import save_figure
 
-        save_figure(inferred(found), plot)
+        save_figure(inferred(result), plot)
         tables.say(f"saved {plot}")
-    if out is not None and found.best is not None:
+    if out is not None and result.best is not None:
         from airflock.evolve.folder import write
 
-        write(out, found.document())
+        write(out, result.document())
         tables.say(f"saved {out}")
     if as_json:
-        tables.emit_json(_plain(found))
+        tables.emit_json(_plain(result))
         return
-    _table(found)
-    if found.best is not None:
-        _numbers(found)
-        _check(found)
-    if out is not None and found.best is None:
-        raise AirflockError(f"{out}: not written: {found.verdict}")
+    _table(result)
+    if result.best is not None:
+        _numbers(result)
+        _check(result)
+    if out is not None and result.best is None:
+        raise AirflockError(f"{out}: not written: {result.verdict}")
 
 
 @contextmanager
@@ -98,24 +98,24 @@ def _telling(quiet: bool) -> Iterator[Any]:
     with Console(stderr=True).status("reading") as status:
         steps: dict[str, int] = {}
 
-        def told(name: str) -> None:
+        def show_step(name: str) -> None:
             steps[name] = steps.get(name, 0) + 1
             status.update(f"{name}: step {steps[name]}")
 
-        yield told
+        yield show_step
 
 
-def _table(found: Any) -> None:
+def _table(result: Any) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    fitted, every = found.fitted
-    title = f"{found.individuals} individuals, {found.steps} steps; fitted on {fitted} of {every} frames"
+    fitted, every = result.fitted
+    title = f"{result.individuals} individuals, {result.steps} steps; fitted on {fitted} of {every} frames"
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("law", "gain", "ahead", "AIC", "in 95 %", "left over", "numbers"):
         table.add_column(name, justify="left" if name == "law" else "right", no_wrap=True)
-    for law in found.laws:
+    for law in result.laws:
         table.add_row(
             law.name, f"{law.gain:.0f} ± {law.error:.0f}", f"{law.ahead:.0%}", f"{law.criterion:.0f}",
             f"{law.inside:.1%}", f"{law.missed:.1%}", str(len(law.numbers)),
@@ -125,64 +125,64 @@ def _table(found: Any) -> None:
     console.print(
         "gain: log-likelihood of held-out steps above going straight on; AIC: of the fit, below it", highlight=False
     )
-    console.print(found.verdict, style="bold", highlight=False, markup=False)
+    console.print(result.verdict, style="bold", highlight=False, markup=False)
 
 
-def _numbers(found: Any) -> None:
+def _numbers(result: Any) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
     from airflock.infer.result import between
 
-    table = Table(title=f"numbers of {found.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
+    table = Table(title=f"numbers of {result.best.name}", box=box.SIMPLE_HEAD, title_justify="left")
     for name in ("number", "value", "unit", "95 % for it alone", "95 % for all together"):
         table.add_column(name, justify="right" if name == "value" else "left", no_wrap=True)
-    for key, number in found.best.numbers.items():
+    for key, number in result.best.numbers.items():
         table.add_row(
             key, f"{number.value:.4g}", "" if number.unit == "1" else number.unit, between(number.low, number.high),
             between(number.least, number.most),
         )  # fmt: skip
     console = Console()
     console.print(table)
-    console.print(f"noise of the tracks {found.noise.seen:.3g} m", highlight=False)
+    console.print(f"noise of the tracks {result.noise.seen:.3g} m", highlight=False)
 
 
-def _check(found: Any) -> None:
+def _check(result: Any) -> None:
     from rich.console import Console
 
-    if found.check is None:
+    if result.check is None:
         return
     console = Console()
     console.print("check: flocks of this law, flown freely from the first frame, against the tracks")
-    for name, (own, low, high) in found.check.found.items():
+    for name, (own, low, high) in result.check.found.items():
         verdict = "ok" if low <= own <= high else "OUTSIDE: not explained"
         console.print(f"  {name} {own:.4g} in [{low:.4g}, {high:.4g}] {verdict}", highlight=False, markup=False)
 
 
-def _plain(found: Any) -> dict[str, Any]:
+def _plain(result: Any) -> dict[str, Any]:
     """What was found as plain values."""
     laws = [
         {name: getattr(law, name) for name in ("name", "gain", "error", "ahead", "criterion", "inside", "missed")}
         | {"numbers": {key: number.value for key, number in law.numbers.items()}}
-        for law in found.laws
+        for law in result.laws
     ]
     best = None
-    if found.best is not None:
+    if result.best is not None:
         numbers = {
             key: {name: getattr(number, name) for name in ("value", "low", "high", "least", "most", "unit")}
-            for key, number in found.best.numbers.items()
+            for key, number in result.best.numbers.items()
         }
-        best = {"name": found.best.name, "numbers": numbers, "noise_of_tracks": found.noise.seen}
-    check = {} if found.check is None else {
-        name: {"tracks": own, "low": low, "high": high} for name, (own, low, high) in found.check.found.items()
+        best = {"name": result.best.name, "numbers": numbers, "noise_of_tracks": result.noise.seen}
+    check = {} if result.check is None else {
+        name: {"tracks": own, "low": low, "high": high} for name, (own, low, high) in result.check.found.items()
     }  # fmt: skip
-    frames = {"fitted": found.fitted[0], "all": found.fitted[1]}
+    frames = {"fitted": result.fitted[0], "all": result.fitted[1]}
     return {
-        "verdict": found.verdict,
+        "verdict": result.verdict,
         "best": best,
         "laws": laws,
         "check": check,
         "frames": frames,
-        "steps": found.steps,
+        "steps": result.steps,
     }

@@ -38,12 +38,12 @@ def presets(
             text = read_text(known.get(name) or name)
         _show(text, as_json and bool(files.load(name)))  # a file that is none is refused as any other
         return
-    found = {key: str(files.load(key).document.get("title", "")) for key in known}
+    titles = {key: str(files.load(key).document.get("title", "")) for key in known}
     if as_json:
-        tables.emit_json(found)
+        tables.emit_json(titles)
         return
-    width = max(len(key) for key in found)
-    for key, title in found.items():
+    width = max(len(key) for key in titles)
+    for key, title in titles.items():
         typer.echo(f"{key:<{width}}  {title}")
 
 

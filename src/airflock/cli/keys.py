@@ -27,9 +27,9 @@ def keys(
     """
     from airflock.scenarios import keys as known
 
-    found = known.keys(section)
+    listed_keys = known.keys(section)
     if as_json:
-        tables.emit_json([{**key._asdict(), "options": list(key.options)} for key in found])
+        tables.emit_json([{**key._asdict(), "options": list(key.options)} for key in listed_keys])
         return
     if section is None:
         width = max(map(len, known.sections()))
@@ -37,18 +37,18 @@ def keys(
             count = len(listed.keys)
             typer.echo(f"{name:<{width}}  {count:>2} key{'s' if count != 1 else ' '}  {listed.about}")
         return
-    _print(found)
+    _print(listed_keys)
 
 
-def _print(found: "list[Key]") -> None:
+def _print(listed_keys: "list[Key]") -> None:
     from rich.console import Console
     from rich.padding import Padding
     from rich.text import Text
 
     console = Console()
-    width = max(len(key.name) for key in found)
-    for key in found:
-        owner = f"   ({key.of})" if len({key.of for key in found}) > 1 and key.of else ""
+    width = max(len(key.name) for key in listed_keys)
+    for key in listed_keys:
+        owner = f"   ({key.of})" if len({key.of for key in listed_keys}) > 1 and key.of else ""
         line = Text.assemble((f"{key.name:<{width}}", "bold"), f"   {key.standard}   [{key.allowed}]", (owner, "cyan"))
         source = f" ({key.source})" if key.source else ""
         console.print(line)

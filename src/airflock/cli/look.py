@@ -157,6 +157,6 @@ def replay(
             check_colour(scenario, colour)
             recording = flight_of(scenario, seed)
     with named(what):
-        made = make_replay(recording, rate=rate, colour=colour)
-    made.save(page)
-    tables.say(f"saved {page} ({len(made.text) / 1e6:.1f} MB)")
+        replay_page = make_replay(recording, rate=rate, colour=colour)
+    replay_page.save(page)
+    tables.say(f"saved {page} ({len(replay_page.text) / 1e6:.1f} MB)")

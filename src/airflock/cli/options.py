@@ -51,7 +51,7 @@ def settings(
     pairs: list[str] | None, agents: int | None = None, duration: str | None = None, option: str = "--set"
 ) -> dict[str, Any]:
     """Keys and values from --set (or another option) and its short forms; values are read as TOML, or else as text."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     faults = []
     for pair in pairs or []:
         key, equals, text = pair.partition("=")
@@ -59,7 +59,7 @@ def settings(
             faults.append(f"{option} {pair}: write KEY=VALUE, for instance {option} model.p_rep=0.14")
             continue
         with gathering(faults):
-            found[key.strip()] = value(text, f"{option} {key.strip()}")
+            values[key.strip()] = value(text, f"{option} {key.strip()}")
     short: dict[str, tuple[str, float]] = {}
     if agents is not None:
         short["agents"] = (str(agents), agents)
@@ -68,7 +68,7 @@ def settings(
             short["duration"] = (duration, time_of(duration, "--duration"))
     faults += _outside(short)
     refuse(faults)
-    return found | {key: number for key, (_, number) in short.items()}
+    return values | {key: number for key, (_, number) in short.items()}
 
 
 def _outside(short: Mapping[str, tuple[str, float]]) -> list[str]:
@@ -88,10 +88,10 @@ def _outside(short: Mapping[str, tuple[str, float]]) -> list[str]:
 
 def time_of(text: str, option: str = "--budget") -> float:
     """Seconds of a time such as 90s, 10min or 2h; ScenarioError for anything else."""
-    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
-    if found is None or not 0.0 < float(found[1]) < math.inf:
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+    if match is None or not 0.0 < float(match[1]) < math.inf:
         raise ScenarioError([f"{option} {text}: write a time above 0 such as 90s, 10min or 2h"])
-    return float(found[1]) * SECONDS[found[2] or "s"]
+    return float(match[1]) * SECONDS[match[2] or "s"]
 
 
 def value(text: str, where: str) -> Any:

@@ -60,7 +60,7 @@ def run(
         _record(found, numbers, precision, device, save, plot)
 
 
-def _tell(found: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: Scores, as_json: bool) -> None:
+def _tell(scenario: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: Scores, as_json: bool) -> None:
     """Print what flights came to, beside the paper's figures; changed : keys that are not as in the file."""
     from airflock.metrics.registry import reports
     from airflock.recordings.rare import remarks, upper_bound
@@ -72,26 +72,26 @@ def _tell(found: Any, numbers: Sequence[int], rows: Sequence[Scores], changed: S
         runs = [{"seed": seed, **row} for seed, row in zip(numbers, rows, strict=True)]
         bound = upper_bound(sum(row.get("n_coll", 0.0) > 0.0 for row in rows), seeds)
         bounds = {"collision_bound": bound} if seeds > 1 and "n_coll" in rows[0] else {}
-        result = {"scenario": {"name": found.name, **plain(found.document)}, "seeds": seeds, "runs": runs}
+        result = {"scenario": {"name": scenario.name, **plain(scenario.document)}, "seeds": seeds, "runs": runs}
         tables.emit_json({**result, **tables.statistics(rows), **bounds})
         return
     count = f"{seeds} flights" if seeds > 1 else f"seed {numbers[0]}"
-    title = f"{found.name}: {found.agents} agents, {found.flight.duration:g} s, {count}"
-    published = {} if changed else found.published
-    tables.score_table(title, rows, published, reports(found.measures))
+    title = f"{scenario.name}: {scenario.agents} agents, {scenario.flight.duration:g} s, {count}"
+    published = {} if changed else scenario.published
+    tables.score_table(title, rows, published, reports(scenario.measures))
     for remark in remarks(rows, numbers):
         tables.say(remark)
 
 
 def _record(
-    found: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
+    scenario: Any, numbers: Sequence[int], precision: int, device: str, save: Path | None, plot: Path | None
 ) -> None:
     """Fly again with the trajectories kept (the same bits), and write what was asked for."""
     from airflock.recordings.files import save as save_recording
     from airflock.recordings.flights import simulate
 
     for seed in numbers if save else numbers[:1]:
-        recording = simulate(found, seed, precision=precision, device=device)
+        recording = simulate(scenario, seed, precision=precision, device=device)
         if save:
             many = len(numbers) > 1
             path = save.with_name(f"{save.stem}-seed{seed}{save.suffix}") if many else save

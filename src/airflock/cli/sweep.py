@@ -159,10 +159,10 @@ def axis(text: str) -> tuple[str, list[Any]]:
         return key, [low + step * i for i in range(count)]
     if not equals or not values or len(parts) == 2:
         raise ScenarioError([f"--over {text}: write KEY=a,b,c or KEY=low:high:count"])
-    found = [options.value(part, f"--over {key}") for part in values.split(",")]
-    if any(isinstance(value, (dict, list)) for value in found):
+    numbers = [options.value(part, f"--over {key}") for part in values.split(",")]
+    if any(isinstance(value, (dict, list)) for value in numbers):
         raise ScenarioError([f"--over {text}: a table or a list cannot be swept; give numbers or choices"])
-    return key, found
+    return key, numbers
 
 
 def _print(tidy: Any, keys: list[str], show: str) -> None:

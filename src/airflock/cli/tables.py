@@ -12,16 +12,16 @@ def statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
 
     A value that is nan (a time of what never happened) is left out; where all are, the statistics are nan.
     """
-    found: dict[str, dict[str, Any]] = {"mean": {}, "std": {}, "median": {}}
+    summary: dict[str, dict[str, Any]] = {"mean": {}, "std": {}, "median": {}}
     for key, first in rows[0].items():
         if isinstance(first, (list, tuple)):
             places = [_moments([row[key][c] for row in rows]) for c in range(len(first))]
             moments: Any = [list(column) for column in zip(*places, strict=True)] or [[], [], []]
         else:
             moments = _moments([row[key] for row in rows])
-        for name, value in zip(found, moments, strict=True):
-            found[name][key] = value
-    return found
+        for name, value in zip(summary, moments, strict=True):
+            summary[name][key] = value
+    return summary
 
 
 def _moments(given: Sequence[Any]) -> tuple[float, float, float]:
@@ -55,7 +55,7 @@ def score_table(
     from rich.console import Console
     from rich.table import Table
 
-    found = statistics(rows)
+    summary = statistics(rows)
     table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column("order parameter", style="bold")
     table.add_column("mean ± sd" if len(rows) > 1 else "value", justify="right")
@@ -65,15 +65,15 @@ def score_table(
         table.add_column("published", justify="right", style="cyan")
     table.add_column("unit")
     table.add_column("meaning", style="dim")
-    untold = [key for key, mean in found["mean"].items() if _untold(key, mean) and key not in published]
-    for key in [key for key in found["mean"] if key not in untold]:
+    untold = [key for key, mean in summary["mean"].items() if _untold(key, mean) and key not in published]
+    for key in [key for key in summary["mean"] if key not in untold]:
         unit, meaning = about.get(key, ("", ""))
         missing = "never" if key.startswith("time_to_") else "nan"  # only an event can never happen
-        mean = number(found["mean"][key], missing)
-        spread = found["std"][key]
+        mean = number(summary["mean"][key], missing)
+        spread = summary["std"][key]
         single = len(rows) == 1 or isinstance(spread, list) or spread != spread
         cells = [key, mean if single else f"{mean} ± {spread:.2g}"]
-        cells += [number(found["median"][key], missing)] if len(rows) > 1 else []
+        cells += [number(summary["median"][key], missing)] if len(rows) > 1 else []
         if published:
             entry = published.get(key)
             spread = "" if entry is None or entry[1] is None else f" ± {entry[1]:.2g}"

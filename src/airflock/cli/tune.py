@@ -59,7 +59,7 @@ def tune(
     from airflock.tune.run import tune
 
     faults: list[str] = []
-    seconds, found = 1.0, None
+    seconds, base = 1.0, None
     with gathering(faults):
         seconds = options.time_of(budget)
     if like is None and (len(scenario) > 1 or heard is not None):
@@ -68,29 +68,29 @@ def tune(
         faults.append(f"{scenario[0]}: is not a scenario file (.toml); of logs, give --like PRESET")
     else:
         with gathering(faults):
-            found = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
+            base = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)
     options.refuse(faults)
-    assert found is not None
-    tables.say_notes(found.notes)
-    options.compile_aloud(found, 32, "cpu")
-    what: Any = found if like is None else scenario
+    assert base is not None
+    tables.say_notes(base.notes)
+    options.compile_aloud(base, 32, "cpu")
+    what: Any = base if like is None else scenario
     how: dict[str, Any] = {"confidence": confidence, "warm": warm, "resume": resume, "threads": threads, "trust": trust}
     if like is not None:
-        how |= {"like": found, "heard": heard}
-    told_already: list[str] = []
+        how |= {"like": base, "heard": heard}
+    shown: list[str] = []
     with _stages(as_json) as (watch, note):
 
         def tell(text: str) -> None:
-            told_already.append(text)
+            shown.append(text)
             if note is not None:
                 note(text)
 
-        made = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=tell, **how)
+        tuning = tune(what, out, budget=seconds, limit=limit or (), watch=watch, note=tell, **how)
     if as_json:
-        tables.emit_json(made.document())
+        tables.emit_json(tuning.document())
     else:
-        _print(made, told_already)
-    if not made.shown:
+        _print(tuning, shown)
+    if not tuning.shown:
         raise typer.Exit(1)
 
 
@@ -129,7 +129,7 @@ def _stages(quiet: bool) -> Iterator[tuple[Any, Callable[[str], None] | None]]:
         yield watch, note
 
 
-def _print(made: Any, told_already: list[str]) -> None:
+def _print(tuning: Any, shown: list[str]) -> None:
     """What was found, and those notes that were not told while it was sought."""
     from rich.console import Console
 
@@ -140,14 +140,14 @@ def _print(made: Any, told_already: list[str]) -> None:
     def line(text: str) -> None:
         console.print(text, highlight=False, markup=False, soft_wrap=True)
 
-    for note in made.notes:
-        if note not in told_already:
+    for note in tuning.notes:
+        if note not in shown:
             line(f"start: {note}")
-    r = made.result
+    r = tuning.result
     line(f"evolved: fitness {r.fitness:.4f} ({r.low:.4f} to {r.high:.4f}) on {r.seeds} fresh seeds")
     for entry in r.limits:
         line(f"evolved: {told(entry)}")
-    line(f"hardened: {made.steps[-1].verdict}" if made.steps else f"not hardened: {made.why}")
-    for text in made.certificate.statements:
+    line(f"hardened: {tuning.steps[-1].verdict}" if tuning.steps else f"not hardened: {tuning.why}")
+    for text in tuning.certificate.statements:
         line(text)
-    line(f"saved {made.folder}: tuned.toml, certificate.toml, report.html, figures.pdf")
+    line(f"saved {tuning.folder}: tuned.toml, certificate.toml, report.html, figures.pdf")

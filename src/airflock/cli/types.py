@@ -28,13 +28,13 @@ def types(
     """
     from airflock.checking.types import check_types
 
-    found = check_types(files, out=out)
+    report = check_types(files, out=out)
     if as_json:
-        tables.emit_json({"rules": found.rules, "faults": [fault._asdict() for fault in found.faults]})
+        tables.emit_json({"rules": report.rules, "faults": [fault._asdict() for fault in report.faults]})
     else:
-        for name, rules in found.rules.items():
-            count = sum(fault.file == name for fault in found.faults)
-            told = f"{count} fault{'s' if count > 1 else ''}" if count else "no fault"
-            typer.echo(f"{name}: {told} in {', '.join(rules)}")
-    if found.faults:
-        raise AirflockError("\n".join(map(str, found.faults)))
+        for name, rules in report.rules.items():
+            count = sum(fault.file == name for fault in report.faults)
+            faults = f"{count} fault{'s' if count > 1 else ''}" if count else "no fault"
+            typer.echo(f"{name}: {faults} in {', '.join(rules)}")
+    if report.faults:
+        raise AirflockError("\n".join(map(str, report.faults)))

@@ -78,8 +78,8 @@ def _near(name: str, known: Sequence[str], context: Any, cutoff: float = 0.5) ->
 def _example(context: Any) -> str:
     """The example of a verb's help."""
     text = getattr(getattr(context, "command", None), "help", None) or ""
-    found = re.search(r"Example: (.+)", text)
-    return f"; for instance: {found[1].strip()}" if found else ""
+    match = re.search(r"Example: (.+)", text)
+    return f"; for instance: {match[1].strip()}" if match else ""
 
 
 def _name(parameter: Any) -> str:
@@ -111,12 +111,12 @@ def _refused(parameter: Any, words: Sequence[str], message: str) -> str:
 
 def _given(parameter: Any, words: Sequence[str]) -> str | None:
     """The last value that a command line gives to an option; None if that cannot be told."""
-    found = None
+    last = None
     for word, after in zip(words, [*words[1:], None], strict=True):
         name, equals, value = word.partition("=")
         if name in parameter.opts:
-            found = value if equals else after
-    return found
+            last = value if equals else after
+    return last
 
 
 def _ends(parameter: Any) -> tuple[float | None, float | None]:

@@ -64,8 +64,8 @@ class Number:
         """The end of the interval at which flying is harder, for a confidence level of both ends."""
         end = self.high if HARDER[self.key] else self.low
         ratio = max(end, 1e-12) / self.value
-        found = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
-        return min(found, 1.0) if UNITS[self.key] == "1" else found
+        value = float(self.value * ratio ** (norm.ppf(0.5 + 0.5 * level) / norm.ppf(0.975)))
+        return min(value, 1.0) if UNITS[self.key] == "1" else value
 
 
 class Numbers:
@@ -128,9 +128,9 @@ class Identified:
 
     def document(self, level: float | None = None, *, uncertain: bool = False) -> dict[str, Any]:
         """A scenario file's content: each number with unit and source, on request with its interval."""
-        found = _copied(self.like.document)
-        found.pop("published", None)
-        found["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
+        document = _copied(self.like.document)
+        document.pop("published", None)
+        document["title"] = f"{self.like.name} with the numbers of {len(self.sources) or self.logs.drones} logs"
         today = datetime.date.today().isoformat()
         for key, value in self.settings(level).items():
             section, _, name = key.partition(".")
@@ -143,8 +143,8 @@ class Identified:
             entry["source"] = how + (f"; pessimistic end at {level:g}" if level is not None else "")
             if uncertain:
                 entry["interval"] = [_short(max(number.low, 0.0)), _short(number.high)]
-            found.setdefault(section, {})[name] = entry
-        return found
+            document.setdefault(section, {})[name] = entry
+        return document
 
 
 def identify(
@@ -215,8 +215,10 @@ def identify(
     for name in ("noise", "damping", "scale"):
         origin = f"{still.seconds:.0f} s of standing"
         numbers.add(f"sensors.{name}", still.value[name], still.interval[name], origin, still.refused.get(name, ""))
-    told = {n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")}
-    moving = body.fit_body(logs, scenario.flight.dt, told["noise"] * told["damping"])
+    sensor_numbers = {
+        n: still.value[n] if n not in still.refused else getattr(scenario.sensors, n) for n in ("noise", "damping")
+    }
+    moving = body.fit_body(logs, scenario.flight.dt, sensor_numbers["noise"] * sensor_numbers["damping"])
     rows = f"{moving.rows} rows, {moving.saturated} limited"
     for name in ("tau", "a_max", "noise"):
         numbers.add(f"body.{name}", moving.value[name], moving.interval[name], rows, moving.refused.get(name, ""))

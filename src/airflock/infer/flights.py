@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT, ENTERS, Tracks, restated
-from airflock.infer.walk import Walk
+from airflock.infer.walk import Gains, Walk
 
 Array = NDArray[np.float64]
 FREE = 1e-9  # m²: least variance
@@ -41,44 +41,80 @@ class Noise:
         return replace(self, law=law, speed=speed, seen=seen)
 
 
-def flown(walk: Walk, place: tuple, kept: Array, noise: Noise, spans: Sequence[int], seed: int) -> Tracks:  # type: ignore[type-arg]
+class NoisyFlight:
+    """A flight of a fitted law with its noise, period by period of the tracks.
+
+    place : numbers by column, gains, usual speed (`Model.split`)
+    """
+
+    def __init__(self, walk: Walk, place: tuple[dict[int, float], Gains, float], noise: Noise, seed: int):
+        numbers, self.gains, self.usual = place
+        self.walk, self.noise, self.generator = walk, noise, np.random.default_rng(seed)
+        self.columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
+        self.shape = walk.axes, walk.tracks.individuals
+        self.own_speed = walk.law is not None and walk.law.heading
+        self.error: Array | None = None  # of everybody's position as it is perceived, m
+
+    def begin(self, world: int) -> None:
+        """Forget the flight before. world : which random numbers the law draws."""
+        if self.noise.column == BLURRED:
+            self.error = self.generator.normal(0.0, self.noise.law, self.shape)
+        self.walk.begin(self.columns, world=world)
+
+    def step(self, speed: Array | None = None) -> Array | None:
+        """Fly for one period. Returns own speeds (individual,) after it, m/s, where they are the individuals' own.
+
+        speed : own speeds before it, by default those of the velocities
+        """
+        walk, axes = self.walk, self.walk.axes
+        was = walk.now().copy()
+        if self.noise.column == PUSHED:
+            walk.now()[axes:] += self.generator.normal(0.0, self.noise.law, self.shape)
+        if self.error is None:
+            walk.fly(self.usual)
+        else:  # everybody decides by displaced positions, and moves from the true one
+            lasts = float(np.exp(-walk.tracks.period / LASTING))
+            draws = self.generator.normal(0.0, self.noise.law, self.shape)
+            self.error = lasts * self.error + np.sqrt(1.0 - lasts**2) * draws
+            walk.now()[:axes] += self.error
+            walk.fly(self.usual)
+            walk.now()[:axes] -= self.error
+        if not self.own_speed:
+            return None
+        speed = np.linalg.norm(was[axes:], axis=0) if speed is None else speed
+        speed = next_speed(speed, self.gains.keep, self.usual, self.noise.speed, self.generator)
+        stretch(walk, was, speed / self.usual)
+        return speed
+
+
+def flown(
+    walk: Walk,
+    place: tuple[dict[int, float], Gains, float],
+    kept: Array,
+    noise: Noise,
+    spans: Sequence[int],
+    seed: int,
+) -> Tracks:
     """Tracks of the law flown again from the beginning of each span.
 
     place : numbers by column, gains, usual speed (`Model.split`); kept : where individuals were (`Walk.errors`)
     """
-    numbers, gains, usual = place
     tracks, axes = walk.tracks, walk.axes
-    generator = np.random.default_rng(seed)
+    flight = NoisyFlight(walk, place, noise, seed)
     seen = np.full_like(tracks.seen, np.nan)
-    own_speed = walk.law is not None and walk.law.heading
-    columns = {**numbers, **({noise.column: noise.law} if noise.column >= 0 else {})}
-    lasts = float(np.exp(-tracks.period / LASTING))
     for s in spans:
         begin, end = tracks.spans[s]
-        blur = generator.normal(0.0, noise.law, (axes, tracks.individuals)) if noise.column == BLURRED else None
-        walk.begin(columns, world=(seed * 1009 + s + 1) % 2**31)
+        flight.begin((seed * 1009 + s + 1) % 2**31)
         for k in range(begin, end):
             state = tracks.state[k]
             if k > begin:
-                was = walk.now().copy()
-                if noise.column == PUSHED:
-                    walk.rows[axes : 2 * axes, : len(state)] += generator.normal(0.0, noise.law, (axes, len(state)))
-                if blur is None:
-                    walk.fly(usual)
-                else:  # everybody decides by displaced positions, and moves from the true one
-                    blur = lasts * blur + np.sqrt(1.0 - lasts**2) * generator.normal(0.0, noise.law, blur.shape)
-                    walk.now()[:axes] += blur
-                    walk.fly(usual)
-                    walk.now()[:axes] -= blur
-                if own_speed:
-                    speed = np.linalg.norm(was[axes:], axis=0)
-                    stretch(walk, was, next_speed(speed, gains.keep, usual, noise.speed, generator) / usual)
+                flight.step()
             enters = (state == ENTERS) | (state == ABSENT)
             walk.now()[:, enters] = kept[k][:, enters]
             if k == begin:
                 walk.settle(walk.now().copy())
             there = state > 1
-            noisy = walk.now()[:axes] + generator.normal(0.0, noise.seen, (axes, len(state)))
+            noisy = walk.now()[:axes] + flight.generator.normal(0.0, noise.seen, flight.shape)
             seen[k][:, there] = noisy[:, there]
     return restated(tracks, seen)
 

@@ -1,12 +1,12 @@
 """The posterior check: flocks of the fitted law, flown freely from where the tracks begin, against the tracks."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.flights import Noise, next_speed, stretch
+from airflock.infer.flights import BLURRED, PUSHED, Noise, NoisyFlight
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT
 
@@ -71,27 +71,20 @@ def posterior(model: Model, place: Array, noise: Noise, flights: int, say: Calla
     frames = min(len(kept) - begin, round(LONGEST / tracks.period))
     stride = max(1, round(0.5 / tracks.period))
     own = measured(kept[begin : begin + frames : stride], there[begin : begin + frames : stride], tracks.nearest)
-    own_speed = model.own_speed
-    if noise.column >= 0:
-        numbers = {**numbers, noise.column: noise.law}
+    if noise.column == BLURRED:  # these flights have no errors of perceived positions, but pushes of their size
+        noise = replace(noise, column=PUSHED)
     rows = []
     for number in range(flights):
-        generator = np.random.default_rng(1_000_000 + number)
-        walk.begin(numbers, world=1_000_000 + number)
+        flight = NoisyFlight(walk, (numbers, gains, usual), noise, 1_000_000 + number)
+        flight.begin(1_000_000 + number)
         walk.settle(kept[begin])
-        speed = np.linalg.norm(kept[begin, axes:], axis=0)
+        speed: Array | None = np.linalg.norm(kept[begin, axes:], axis=0)
         flown = np.zeros((-(-frames // stride), 2 * axes, tracks.individuals))
         for k in range(frames):
             if k % stride == 0:
                 flown[k // stride] = walk.now()
-            was = walk.now().copy()
-            if noise.column < 0:
-                walk.now()[axes:] += generator.normal(0.0, noise.law, (axes, tracks.individuals))
-            walk.fly(usual)
-            if own_speed:
-                speed = next_speed(speed, gains.keep, usual, noise.speed, generator)
-                stretch(walk, was, speed / usual)
-        rows.append(measured(flown, np.broadcast_to(there[begin], (len(flown), len(speed))), tracks.nearest))
+            speed = flight.step(speed)
+        rows.append(measured(flown, np.broadcast_to(there[begin], (len(flown), flown.shape[2])), tracks.nearest))
         say()
     found = {}
     for name, value in own.items():

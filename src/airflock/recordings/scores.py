@@ -125,10 +125,10 @@ def score(
     if any(asked.values()):
         names = ", ".join(name for name, given in asked.items() if given)
         raise RecordingError(f"{names}: needs a recording, such as airflock.simulate(scenario) gives")
-    scenario, found = variant(what, settings, trust=trust), sound_seeds(seeds)
+    scenario, numbers = variant(what, settings, trust=trust), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
-    rows = scores([scenario] * len(found), found, scheduler=scheduler, **options)
-    return _about(pd.DataFrame(rows, index=pd.Index(found, name="seed")), scenario)
+    rows = scores([scenario] * len(numbers), numbers, scheduler=scheduler, **options)
+    return _about(pd.DataFrame(rows, index=pd.Index(numbers, name="seed")), scenario)
 
 
 def not_told(

@@ -32,12 +32,12 @@ class Acting(Room):
             self.towards = panel.menu("towards", tuple(TOWARDS), "east", lambda _: None)
             panel.row({"Gust": self.ask(self.gust), "Throw an obstacle in": self.ask(self._aim)})
             self.dragging = False
-            self.drags = panel.checkbox("drag goals", False, told=lambda on: self.player.ask(lambda: self._drag(on)))
+            self.drags = panel.checkbox("drag goals", False, action=lambda on: self.player.ask(lambda: self._drag(on)))
             self.said = panel.text()
         self.drawing.handles = self._handles
         self._handles(self.drawing)
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Goals can be dragged where there are any."""
         self.drags.visible = has_goals(self.player.sides)
         self.drags.value = self.dragging = self.dragging and self.drags.visible
@@ -50,7 +50,7 @@ class Acting(Room):
 
     def _drag(self, on: bool) -> None:
         self.dragging = on
-        self.drawing.restand(always=True)
+        self.drawing.rebuild_worlds()
 
     def _aim(self) -> None:
         self.aiming = not self.aiming
@@ -68,7 +68,7 @@ class Acting(Room):
         flock = self.drawing.flocks[int(np.argmin(away))]
         x, y = (float(c) for c in (place - flock.offset)[:2])
         self.player.throw(round(x, 3), round(y, 3), round(WIDTH * self.drawing.size, 3))
-        self.drawing.restand()
+        self.drawing.rebuild_if_changed()
 
     def _handles(self, drawing: Drawing) -> None:
         """A handle on each goal of each side, while goals may be dragged."""
@@ -84,11 +84,11 @@ class Acting(Room):
                 )  # fmt: skip
 
     def _dragged(self, number: int, offset: NDArray[Any]) -> Any:
-        def told(place: NDArray[Any]) -> None:
+        def moved(place: NDArray[Any]) -> None:
             spot = [round(float(c), 3) for c in place - offset]
             self.player.ask(lambda: self.player.move_goal(number, spot))
 
-        return told
+        return moved
 
 
 def has_goals(sides: Sequence[Side]) -> bool:

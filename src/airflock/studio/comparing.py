@@ -31,22 +31,22 @@ class Comparing(Room):
         self.player.fork()
         collisions.join(hand)
         collisions.fork()
-        self.page.stand()
+        self.page.rebuild()
 
     def _join(self) -> None:
         hand = self.player.hand
         self.player.join()
         self.drawing.collisions.join(hand)
-        self.page.stand()
+        self.page.rebuild()
 
     def _take(self, name: str) -> None:
         self.player.ask(lambda: self._taken(NAMES.index(name)))
 
     def _taken(self, hand: int) -> None:
         self.player.hand = min(hand, len(self.player.sides) - 1)
-        self.page.tuning.stand()
+        self.page.tuning.rebuild()
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """A menu of which side is in hand, where there are two."""
         if self._menu is not None:
             self._menu.remove()
@@ -55,7 +55,7 @@ class Comparing(Room):
             with self.tab:
                 self._menu = self.panel.menu("controls act on", tuple(NAMES), NAMES[self.player.hand], self._take)
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """One table of what differs: parameters and order parameters."""
         sides = self.player.sides
         if len(sides) < 2:

@@ -82,11 +82,11 @@ class Drawing:
         self.trails = Trails(view)
         self.collisions = Collisions()
         self.handles: Any = None  # is asked for goals that can be dragged: (player, drawing) → None
-        self.stand()
+        self.rebuild()
 
     # ----------------------------------------------------------------------------------------------- what stands
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Draw the worlds of all sides anew, with their agents as they are."""
         view, sides = self.view, self.player.sides
         self.stages = [self._stage(side) for side in sides]
@@ -111,7 +111,7 @@ class Drawing:
         view.look_at(middle + 0.5 * step * (len(sides) - 1) + beside, share * wide, self.flat)
         self.trails.restart()
         self._alert = np.zeros(count, int)
-        self._shown = list(sides)
+        self._drawn = list(sides)
 
     def _stage(self, side: Side) -> Stage:
         stage = stage_of(side.scenario, side.motion[0][side.flight.present])
@@ -136,18 +136,25 @@ class Drawing:
         if self.handles is not None:
             self.handles(self)
 
-    def restand(self, always: bool = False) -> None:
+    def rebuild_if_changed(self) -> None:
         """Draw what stands anew where it has changed: an obstacle was thrown in, a goal moved, a fork begun."""
-        sides = self.player.sides
-        if len(sides) != len(self._shown) or any(a is not b for a, b in zip(sides, self._shown, strict=True)):
-            self.stand()
+        if self._sides_changed() or [_world(side) for side in self.player.sides] != self._worlds:
+            self.rebuild_worlds()
+
+    def rebuild_worlds(self) -> None:
+        """Draw what stands anew, with the camera and the flocks as they are; of other sides than before, everything."""
+        if self._sides_changed():
+            self.rebuild()
             return
-        if always or [_world(side) for side in sides] != self._worlds:
-            self.stages = [self._stage(side)._replace(span=old.span, centre=old.centre)
-                           for side, old in zip(sides, self.stages, strict=True)]  # fmt: skip
-            with self.view.atomic():
-                self.view.clear(moving=False)
-                self._build()
+        self.stages = [self._stage(side)._replace(span=old.span, centre=old.centre)
+                       for side, old in zip(self.player.sides, self.stages, strict=True)]  # fmt: skip
+        with self.view.atomic():
+            self.view.clear(moving=False)
+            self._build()
+
+    def _sides_changed(self) -> bool:
+        sides, drawn = self.player.sides, self._drawn
+        return len(sides) != len(drawn) or any(a is not b for a, b in zip(sides, drawn, strict=True))
 
     def forget(self) -> None:
         """Forget trails, and collisions that lie ahead: the flight went elsewhere."""

@@ -37,7 +37,7 @@ class Evolving(Room):
                 {"Start": self.ask(self.start), "Stop": self.ask(self.stop), "Take the best": self.ask(self.take)}
             )
             self.said = panel.text(note("searches from half of each number of the law to twice it"))
-            self.chart_of = panel.chart("course of the search", ("best so far", "mean"), across="generation")
+            self.course = panel.chart("course of the search", ("best so far", "mean"), across="generation")
 
     def start(self) -> None:
         """Begin a study around the present scenario. Raises StudioError where one runs or none can."""
@@ -73,7 +73,7 @@ class Evolving(Room):
         self.player.side.change(self.found.parameters)
         self.page.tuning.put(self.found.parameters)
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """Look at the study now and then."""
         if self.study is None or time.monotonic() - self._looked < EVERY:
             return
@@ -81,10 +81,10 @@ class Evolving(Room):
         self.found = self.study.progress()
         if self.found.generations:
             course = np.array(self.found.generations)
-            self.chart_of.data = np.arange(1.0, len(course) + 1.0), course[:, 0].copy(), course[:, 1].copy()
-        self.said.content = note(self._told(self.study))
+            self.course.data = np.arange(1.0, len(course) + 1.0), course[:, 0].copy(), course[:, 1].copy()
+        self.said.content = note(self._status(self.study))
 
-    def _told(self, study: Study) -> str:
+    def _status(self, study: Study) -> str:
         state = "searching" if study.running else "ended"
         if study.fault:
             return f"<span style='color:#b00020'>{html.escape(study.fault)}</span>"

@@ -45,7 +45,7 @@ class FleetPage:
                 "links", LINKS, LINKS[0], lambda kind: setattr(drawing, "links", kind),
                 "packets that arrive: known of fleets in software; pale where they arrive one way only",
             )  # fmt: skip
-            panel.checkbox("trails", True, told=lambda on: self.ask(lambda: self.drawing.trails.show(on)))
+            panel.checkbox("trails", True, action=lambda on: self.ask(lambda: self.drawing.trails.show(on)))
             panel.menu("follow", FOLLOWED, FOLLOWED[0], lambda whom: setattr(drawing, "follow", whom))
             with panel.folder("Selected drone"):
                 self.about = panel.text()
@@ -77,26 +77,26 @@ class FleetPage:
 
     def run(self) -> None:
         """Listen and draw in real time until the page is stopped."""
-        drawn = charted = self._clock()
+        drawn = refreshed = self._clock()
         while self._running:
             now = self._clock()
             for datagram in self._listen():
                 self.observer.take(datagram, now)
-            chart = now - charted >= 1.0 / CHARTS
-            charted = now if chart else charted
-            self.frame(chart)
+            refresh = now - refreshed >= 1.0 / CHARTS
+            refreshed = now if refresh else refreshed
+            self.frame(refresh)
             drawn = max(drawn + 1.0 / FRAMES, now)
             self._asked.rung(max(drawn - self._clock(), 0.001))
             self._asked.answer(lambda action: action())
 
-    def frame(self, chart: bool) -> None:
-        """Draw the present moment, with charts and tables if `chart`."""
+    def frame(self, refresh: bool) -> None:
+        """Draw the present moment, with charts, tables and words if `refresh`."""
         now = self._clock()
         with self.view.atomic():
             self.drawing.frame(now, self.chosen)
-            if chart:
+            if refresh:
                 self.observer.look(now)
-                self._tell(now)
+                self._show_status(now)
                 self._measure(now)
 
     # -------------------------------------------------------------------------------------------------- selecting
@@ -119,7 +119,7 @@ class FleetPage:
 
     # ---------------------------------------------------------------------------------------------------- telling
 
-    def _tell(self, now: float) -> None:
+    def _show_status(self, now: float) -> None:
         card, observer = self.observer.card, self.observer
         heard, count = len(observer.heard(now)), len(card.members)
         self.title.content = (

@@ -1,7 +1,7 @@
 """Flights: what a page flies, one flight or two side by side; what a hand does to them and what is saved of them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,9 @@ from airflock.studio.saving import flown_again, toml_of
 from airflock.studio.side import Origin, Side
 
 
-class Flights:
-    """One flight of a scenario, or two side by side. They know no clock: `Player` flies them.
+@dataclass(frozen=True)
+class FlightRequest:
+    """What a page is to fly.
 
     where    : preset, scenario file or recording, which is flown again with its events
     settings : keys changed from outside
@@ -27,32 +28,38 @@ class Flights:
     law      : a law that flies instead of the file's; trust : whether code that the file names may run
     against  : what is flown beside it, with the same seed and noise: another preset or file, or keys of this one
     at_once  : fly interpreted until the driver is compiled
+    """
+
+    where: str
+    settings: Mapping[str, Any] | None = None
+    seed: int = 0
+    law: Any = None
+    trust: bool = False
+    against: str | Mapping[str, Any] | None = None
+    at_once: bool = False
+
+    def origins(self) -> list[Origin]:
+        """Where the flights come from, one or two; raises RecordingError for a recording that cannot be flown again."""
+        first = Origin.of(self.where, self.settings, self.law, trust=self.trust)
+        if isinstance(self.against, str):
+            return [first, Origin.of(self.against, self.settings, trust=self.trust)]
+        return [first, replace(first, settings={**first.settings, **self.against})] if self.against else [first]
+
+
+class Flights:
+    """One flight of a scenario, or two side by side. They know no clock: `Player` flies them.
 
     Attributes: origins, where they come from; sides, as they fly; hand, which of them the controls act on; note, what
     was done last, for the page; fault, called with everything that was refused.
     """
 
-    def __init__(
-        self,
-        where: str,
-        settings: Mapping[str, Any] | None = None,
-        seed: int = 0,
-        *,
-        law: Any = None,
-        trust: bool = False,
-        against: str | Mapping[str, Any] | None = None,
-        at_once: bool = False,
-    ):
-        first = Origin.of(where, settings, law, trust=trust)
-        self.origins = [first]
-        if isinstance(against, str):
-            self.origins.append(Origin.of(against, settings, trust=trust))
-        elif against:
-            self.origins.append(replace(first, settings={**first.settings, **against}))
-        self.seed = seed if first.recording is None else int(first.recording.attrs["airflock_seed"])
+    def __init__(self, request: FlightRequest):
+        self.origins = request.origins()
+        recording = self.origins[0].recording
+        self.seed = request.seed if recording is None else int(recording.attrs["airflock_seed"])
         self.hand, self.note = 0, ""
         self.fault: Callable[[str], None] = lambda line: None
-        self._at_once = at_once
+        self._at_once = request.at_once
         self._open()
 
     def _open(self, start: bool = False) -> None:

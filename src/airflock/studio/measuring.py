@@ -23,12 +23,12 @@ class Measuring(Room):
     def __init__(self, page: "Page", tab: Any):
         super().__init__(page)
         self.tab = tab
-        self._made: list[Any] = []
+        self._charts: list[Any] = []
         self._names: list[str] = []
         self.scores: list[dict[str, Any]] = []
         self.name = ""  # of the order parameter that is drawn
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Begin anew, for as many sides as there are."""
         player = self.player
         scores = player.sides[0].flight.scores()
@@ -42,18 +42,18 @@ class Measuring(Room):
             far = min(far, 4.0 * float(np.median(apart))) if len(apart) else far
             self.sides.append(measures.Measures(self.drawing.top, max(far, 1e-6)))
             self.sides[-1].name = self.name
-        self._make()
+        self._make_charts()
 
-    def _make(self) -> None:
-        """Make the charts."""
+    def _make_charts(self) -> None:
+        """Make menu, charts and table anew."""
         panel, player = self.panel, self.player
-        for made in self._made:
-            made.remove()
+        for chart in self._charts:
+            chart.remove()
         two, names = len(player.sides) > 1, self._names
         banded = self.name in player.sides[0].scenario.published
         tags = [f" {name}" for name in NAMES] if two else [""]
         with self.tab:
-            self.menu = panel.menu("order parameter", names, self.name, lambda n: player.ask(lambda: self._name(n)))
+            self.menu = panel.menu("order parameter", names, self.name, lambda n: player.ask(lambda: self._choose(n)))
             self.course = panel.chart(
                 "since the last change", [*(f"value{t}" for t in tags), *(BAND if banded else ())], band=banded
             )
@@ -63,24 +63,24 @@ class Measuring(Room):
             self.speed_shares = panel.chart("speeds since the last change", [f"share{t}" for t in tags], across="m/s")
             self.distance_shares = panel.chart("distance to the nearest", [f"share{t}" for t in tags], across="m")
             self.table = panel.text()
-        self._made = [
+        self._charts = [
             self.menu, self.course, self.speeds, self.nearest, self.speed_shares, self.distance_shares, self.table,
         ]  # fmt: skip
 
-    def _name(self, name: str) -> None:
+    def _choose(self, name: str) -> None:
         """Draw another order parameter, from here on; with a band only where the paper tells its value."""
         self.name = name
         for side in self.sides:
             side.name = name
             side.course.clear()
-        self._make()
+        self._make_charts()
 
     def clear(self) -> None:
         """Forget the charts: the flight went elsewhere."""
         for side in self.sides:
             side.clear()
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """Add the present moment and draw everything."""
         flocks, two = self.drawing.flocks, len(self.sides) > 1
         for side in self.sides:

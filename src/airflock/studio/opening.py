@@ -52,10 +52,10 @@ class Opening(Room):
     def _opened(self, where: str) -> None:
         self.player.open(where)
         self.drawing.collisions.clear()
-        self.page.stand()
+        self.page.rebuild()
         self.said.content = note("")
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """The menu names what flies, where that is a preset."""
         where = self.player.side.origin.where
         self.menu.value = where if where in presets() else CHOOSE

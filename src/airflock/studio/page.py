@@ -50,7 +50,7 @@ class Page:
             self.evolving,
         ]  # fmt: skip
         for room in self.rooms:
-            room.stand()
+            room.rebuild()
         self.frame(True)
         view.on_click(lambda origin, way: player.ask(lambda: self._clicked(origin, way)))
 
@@ -60,15 +60,15 @@ class Page:
 
     def run(self) -> None:
         """Fly and draw in real time until the page is stopped."""
-        now = drawn = charted = time.perf_counter()
+        now = drawn = refreshed = time.perf_counter()
         acted = False
         while self._running:
             last, now = now, time.perf_counter()
             moved = self.player.tick(now - last)
-            chart = now - charted >= 1.0 / CHARTS
-            if moved or acted or chart:
-                self.frame(chart)
-            charted = now if chart else charted
+            refresh = now - refreshed >= 1.0 / CHARTS
+            if moved or acted or refresh:
+                self.frame(refresh)
+            refreshed = now if refresh else refreshed
             drawn = max(drawn + 1.0 / FRAMES, now)
             acted = self._answer_until(drawn)
 
@@ -79,32 +79,32 @@ class Page:
             acted = self.player.wait(left) or acted
         return acted
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Draw and list everything again, for other flights than before."""
-        self.drawing.stand()
+        self.drawing.rebuild()
         for room in self.rooms:
-            room.stand()
+            room.rebuild()
         self.frame(True)
 
-    def elsewhere(self) -> None:
+    def show_other_time(self) -> None:
         """Forget trails, charts, and collisions that lie ahead: the flights are at another time."""
         self.drawing.forget()
         if len(self.player.sides) != len(self.drawing.flocks):
-            self.stand()
+            self.rebuild()
         self.measuring.clear()
-        self.tuning.refresh()
+        self.tuning.show_values()
 
-    def frame(self, chart: bool) -> None:
-        """Draw the present moment, with charts and tables if `chart`."""
+    def frame(self, refresh: bool) -> None:
+        """Draw the present moment, with charts, tables and words if `refresh`."""
         chosen = self.selecting.chosen
         with self.view.atomic():
-            if chart:
-                self.drawing.restand()
+            if refresh:
+                self.drawing.rebuild_if_changed()
             self.drawing.frame(chosen)
-            if chart:
+            if refresh:
                 for room in self.rooms:
-                    room.chart()
-                self._told()
+                    room.refresh()
+                self._show_status()
 
     def _clicked(self, origin: NDArray[Any], way: NDArray[Any]) -> None:
         if self.acting.aiming:
@@ -116,7 +116,7 @@ class Page:
         """Go back to the last moment that was kept before the flight failed."""
         self.playing.back(self.player.time)
 
-    def _told(self) -> None:
+    def _show_status(self) -> None:
         """Say where the flight is, what is wrong, and what has happened."""
         player = self.player
         state = "paused" if player.paused else "stopped" if player.failure or player.over else "flying"

@@ -36,68 +36,70 @@ class Panel:
         """HTML that can be rewritten: `.content`."""
         return self.server.gui.add_html(content)
 
-    def button(self, label: str, told: Callable[[], None], hint: str = "") -> Any:
+    def button(self, label: str, action: Callable[[], None], hint: str = "") -> Any:
         """A button; `.label` can be rewritten."""
-        made = self.server.gui.add_button(label, hint=hint or None)
-        made.on_click(lambda _: told())
-        return made
+        handle = self.server.gui.add_button(label, hint=hint or None)
+        handle.on_click(lambda _: action())
+        return handle
 
     def row(self, actions: dict[str, Callable[[], None]]) -> None:
         """Small buttons side by side."""
         self.server.gui.add_button_group("", tuple(actions)).on_click(lambda event: actions[event.target.value]())
 
-    def command(self, label: str, key: Any, told: Callable[[], None]) -> None:
+    def command(self, label: str, key: Any, action: Callable[[], None]) -> None:
         """A key that does something."""
-        self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: told())
+        self.server.gui.add_command(label, hotkey=key).on_trigger(lambda _: action())
 
-    def checkbox(self, label: str, value: bool, told: Callable[[bool], None], hint: str = "") -> Any:
+    def checkbox(self, label: str, value: bool, action: Callable[[bool], None], hint: str = "") -> Any:
         """A switch; its state is `.value`."""
-        made = self.server.gui.add_checkbox(label, value, hint=hint or None)
-        made.on_update(lambda event: told(bool(event.target.value)) if event.client is not None else None)
-        return made
+        handle = self.server.gui.add_checkbox(label, value, hint=hint or None)
+        handle.on_update(lambda event: action(bool(event.target.value)) if event.client is not None else None)
+        return handle
 
-    def menu(self, label: str, options: Sequence[str], value: str, told: Callable[[str], None], hint: str = "") -> Any:
+    def menu(
+        self, label: str, options: Sequence[str], value: str, action: Callable[[str], None], hint: str = ""
+    ) -> Any:
         """A menu; what is chosen is `.value`."""
-        made = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
-        made.on_update(lambda event: told(event.target.value) if event.client is not None else None)
-        return made
+        handle = self.server.gui.add_dropdown(label, tuple(options), initial_value=value, hint=hint or None)
+        handle.on_update(lambda event: action(event.target.value) if event.client is not None else None)
+        return handle
 
-    def number(self, label: str, value: int, low: int, high: int, told: Callable[[int], None], hint: str = "") -> Any:
+    def number(self, label: str, value: int, low: int, high: int, action: Callable[[int], None], hint: str = "") -> Any:
         """A field for a whole number; beyond its ends it is ignored until the field is left, then set to the end."""
-        made = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
+        handle = self.server.gui.add_number(label, value, min=low, max=high, step=1, hint=hint or None)
 
-        @made.on_update
+        @handle.on_update
         def _(event: Any) -> None:
             if event.client is not None and low <= event.target.value <= high:
-                told(int(event.target.value))
+                action(int(event.target.value))
 
-        return made
+        return handle
 
     def field(self, label: str, hint: str = "") -> Any:
         """A field for a line of text: `.value`."""
         return self.server.gui.add_text(label, "", hint=hint or None)
 
-    def upload(self, label: str, ending: str, told: Callable[[str, bytes], None], hint: str = "") -> Any:
-        """A button that takes a file from the reader's machine; `told` hears its name and content."""
-        made = self.server.gui.add_upload_button(label, mime_type=ending, hint=hint or None)
-        made.on_upload(lambda event: told(event.target.value.name, event.target.value.content))
-        return made
+    def upload(self, label: str, ending: str, action: Callable[[str, bytes], None], hint: str = "") -> Any:
+        """A button that takes a file from the reader's machine; `action` is called with its name and content."""
+        handle = self.server.gui.add_upload_button(label, mime_type=ending, hint=hint or None)
+        handle.on_upload(lambda event: action(event.target.value.name, event.target.value.content))
+        return handle
 
     def slide(
-        self, label: str, low: float, high: float, step: float, value: float, told: Callable[[float], None],
+        self, label: str, low: float, high: float, step: float, value: float, action: Callable[[float], None],
         hint: str = "",
     ) -> Any:  # fmt: skip
-        """A slider; `told` hears of a hand on it, not of a value that is set from here."""
-        made = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
-        made.on_update(lambda event: told(float(event.target.value)) if event.client is not None else None)
-        return made
+        """A slider; `action` is called for a hand on it, not of a value that is set from here."""
+        handle = self.server.gui.add_slider(label, low, high, step, value, hint=hint or None)
+        handle.on_update(lambda event: action(float(event.target.value)) if event.client is not None else None)
+        return handle
 
-    def control(self, given: Control, told: Callable[[str, Any], None]) -> Any:
+    def control(self, given: Control, action: Callable[[str, Any], None]) -> Any:
         """A slider or a menu for a parameter."""
         if given.is_choice:
-            return self.menu(given.label, given.options, given.value, lambda v: told(given.key, v), given.hint)
+            return self.menu(given.label, given.options, given.value, lambda v: action(given.key, v), given.hint)
         return self.slide(
-            given.label, given.low, given.high, given.step, given.value, lambda v: told(given.key, v), given.hint
+            given.label, given.low, given.high, given.step, given.value, lambda v: action(given.key, v), given.hint
         )
 
     def chart(self, title: str, names: Sequence[str], band: bool = False, across: str = "t (s)") -> Chart:

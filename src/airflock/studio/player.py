@@ -1,13 +1,12 @@
 """Player: flights on one clock, played, stopped and taken back; it knows no page."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from time import perf_counter
-from typing import Any
 
 from airflock.engine import Snapshot
 from airflock.errors import AirflockError, reason
 from airflock.spelling import raised
-from airflock.studio.flights import Flights
+from airflock.studio.flights import FlightRequest, Flights
 from airflock.studio.moments import Moments
 from airflock.studio.pace import Pace
 from airflock.studio.requests import Asked
@@ -23,21 +22,11 @@ class Player(Flights):
     Attributes: pace, how fast they fly; moments, to go back to; paused; failure, why they stopped, or nothing.
     """
 
-    def __init__(
-        self,
-        where: str,
-        settings: Mapping[str, Any] | None = None,
-        seed: int = 0,
-        *,
-        law: Any = None,
-        trust: bool = False,
-        against: str | Mapping[str, Any] | None = None,
-        at_once: bool = False,
-    ):
+    def __init__(self, request: FlightRequest):
         self.pace, self.paused, self.failure = Pace(1.0), False, ""
         self._rate = 1e4  # motion steps per second, as measured
         self._asked = Asked()
-        super().__init__(where, settings, seed, law=law, trust=trust, against=against, at_once=at_once)
+        super().__init__(request)
 
     def _open(self, start: bool = False) -> None:
         super()._open(start)

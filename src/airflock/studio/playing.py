@@ -39,7 +39,7 @@ class Playing(Room):
             "colour by", ways(drawing.flocks), drawing.shading.way, lambda way: setattr(drawing.shading, "way", way)
         )
         self.key = panel.text()
-        panel.checkbox("trails", True, told=lambda on: player.ask(lambda: drawing.trails.show(on)))
+        panel.checkbox("trails", True, action=lambda on: player.ask(lambda: drawing.trails.show(on)))
         panel.menu(
             "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
             "to the three nearest, or to all in radio range, paler where packets are lost",
@@ -47,20 +47,20 @@ class Playing(Room):
         self.follow = panel.menu("follow", FOLLOWED, FOLLOWED[0], self._follow)
         self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes to one second before it")
         self.listed = panel.text()
-        self._told: list[Collision] = []
-        self._known = ""  # which scenario the camera is set for
+        self._in_menu: list[Collision] = []
+        self._camera_of = ""  # which scenario the camera is set for
         for key, label, action in (
             ("P", "Pause or fly", player.toggle), ("N", "Step", player.step), ("R", "Reset", self.reset),
             ("B", "Back", self.back),
         ):  # fmt: skip
             panel.command(label, key, self.ask(action))
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """What may colour the agents of these flights; whom the camera follows in a scenario that is new here."""
         player = self.player
-        self._shown()
-        if self._known != player.side.origin.where:
-            self._known = player.side.origin.where
+        self._show_seed_and_agents()
+        if self._camera_of != player.side.origin.where:
+            self._camera_of = player.side.origin.where
             free = player.scenario.world.arena == "none" and not self.drawing.stages[0].solids
             self.follow.value = self.drawing.follow = FOLLOWED[1 if free else 0]
         known = ways(self.drawing.flocks)
@@ -69,7 +69,7 @@ class Playing(Room):
             self.drawing.shading.way = self.drawing.shading.way if self.drawing.shading.way in known else known[0]
             self.way.value = self.drawing.shading.way
 
-    def _shown(self) -> None:
+    def _show_seed_and_agents(self) -> None:
         """Show seed and number of agents of what flies."""
         self.seed.value, self.agents.value = self.player.seed, self.player.flight.agents
 
@@ -94,20 +94,20 @@ class Playing(Room):
     def back(self, time: float | None = None) -> None:
         """Go back to a time, s, or by ten seconds."""
         self.player.back(self.player.time - SOON if time is None else time)
-        self.page.elsewhere()
+        self.page.show_other_time()
 
     def reset(self, seed: int | None = None, agents: int | None = None) -> None:
         """Begin another flight; where that is refused, the fields show what flies."""
         try:
             self.player.reset(seed, {} if agents is None else {"agents": agents})
         except AirflockError:
-            self._shown()
+            self._show_seed_and_agents()
             raise
         self.drawing.collisions.clear()
-        self.page.stand()
+        self.page.rebuild()
 
     def _jump(self, chosen: str) -> None:
-        when = next((c.time for c in self._told if self._name(c) == chosen), None)
+        when = next((c.time for c in self._in_menu if self._name(c) == chosen), None)
         if when is not None:
             self.player.ask(lambda: self.back(max(when - BEFORE, 0.0)))
 
@@ -115,7 +115,7 @@ class Playing(Room):
         side = f", {NAMES[c.side]}" if len(self.player.sides) > 1 and c.side != BOTH else ""
         return f"t = {c.time:.1f} s: {c.first} and {c.second}{side}"
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """The button's words, the key to the colours, and the list of collisions."""
         label = "Fly" if self.player.paused else "Pause"
         if self.pause.label != label:
@@ -124,10 +124,10 @@ class Playing(Room):
         self.key.content = drawing.shading.shown.key
         if self.way.value != drawing.shading.way:
             self.way.value = drawing.shading.way
-        found = drawing.collisions.listed
-        if found != self._told:
-            self._told = found
-            self.jump.options = (JUMP, *dict.fromkeys(map(self._name, found)))
+        collisions = drawing.collisions.listed
+        if collisions != self._in_menu:
+            self._in_menu = collisions
+            self.jump.options = (JUMP, *dict.fromkeys(map(self._name, collisions)))
             self.jump.value = JUMP
-            few = "<br>".join(self._name(c) for c in found[:8])
-            self.listed.content = note(f"<b>Nearer than a collision</b><br>{few}") if found else ""
+            few = "<br>".join(self._name(c) for c in collisions[:8])
+            self.listed.content = note(f"<b>Nearer than a collision</b><br>{few}") if collisions else ""

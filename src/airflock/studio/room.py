@@ -17,10 +17,10 @@ class Room:
         self.page, self.player, self.view = page, page.player, page.view
         self.panel, self.drawing = page.view.panel, page.drawing
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Show other flights than before: another one began, or a second one joined or left."""
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """Show the present moment; a few times a second."""
 
     def ask(self, action: Callable[[], Any]) -> Callable[[], None]:

@@ -39,7 +39,7 @@ class Selecting(Room):
             self.panel.row({"Let it fail": self.ask(self.fail)})
         self.panel.command("Next agent", "S", self.ask(lambda: self.by(1)))
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Nobody is selected in another flight."""
         self.chosen, self.eyes = None, Perceiving()
 
@@ -67,7 +67,7 @@ class Selecting(Room):
             side, agent = self.drawing.whose(self.chosen)
             self.player.push(agent, 2.0 * self.drawing.top / 1.5, side)
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """What the selected agent perceives and commands."""
         if self.chosen is None:
             self.about.content = NOBODY

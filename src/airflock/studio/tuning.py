@@ -32,8 +32,8 @@ class Tuning(Room):
         super().__init__(page)
         self.tab = tab
         self._handles: dict[str, tuple[Any, Control]] = {}
-        self._made: list[Any] = []
-        self._filled: Any = None
+        self._folders: list[Any] = []
+        self._made_for: Any = None
         panel, player = self.panel, self.player
         panel.row(
             {
@@ -52,25 +52,25 @@ class Tuning(Room):
         self.typed = panel.field("any key", f"for instance {EXAMPLE}")
         panel.row({"Set": self.ask(self._set)})
 
-    def stand(self) -> None:
+    def rebuild(self) -> None:
         """Make the controls of the side in hand; again only where another law or side is in hand."""
         preset, two = self.player.preset, len(self.player.sides) > 1
-        filled = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
-        if filled != self._filled:
-            for made in self._made:
-                made.remove()
-            self._made, self._handles, self._filled = [], {}, filled
+        made_for = preset.model, preset.records.keys(), self.player.side.origin.where, self.player.hand if two else None
+        if made_for != self._made_for:
+            for folder in self._folders:
+                folder.remove()
+            self._folders, self._handles, self._made_for = [], {}, made_for
             with self.tab:
                 for section, controls in controls_of(preset, studied(preset)).items():
                     name = f"{NAMES[self.player.hand]}: {section}" if two else section
                     folder = self.panel.folder(name, section.startswith("model"))
-                    self._made.append(folder)
+                    self._folders.append(folder)
                     with folder:
                         for control in controls:
                             self._handles[control.key] = self.panel.control(control, self._change), control
-        self.refresh()
+        self.show_values()
 
-    def refresh(self) -> None:
+    def show_values(self) -> None:
         """Show the values in force."""
         values = {key: value_of(self.player.scenario, key) for key in self._handles}
         self.put({key: value for key, value in values.items() if value != self._handles[key][0].value})
@@ -96,7 +96,7 @@ class Tuning(Room):
         key, value = pair(self.typed.value, self.player.scenario)
         self.player.change(key, value)
         self.typed.value = ""
-        self.refresh()
+        self.show_values()
 
     def _save_toml(self) -> None:
         self._saved(self.player.save_toml(free(Path(f"{stem(self.player)}_tuned.toml"))))
@@ -112,7 +112,7 @@ class Tuning(Room):
         self.player.fault(self.player.note)
         self.panel.say("Saved", str(path.absolute()))
 
-    def chart(self) -> None:
+    def refresh(self) -> None:
         """The command that opens this scenario again, with a button that copies it."""
         command = html.escape(self.player.command, quote=True)
         self.command.content = note(f"<code>{command}</code><br>{copying(command)}")

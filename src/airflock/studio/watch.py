@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from airflock.errors import StudioError
+from airflock.studio.flights import FlightRequest
 from airflock.studio.player import Player
 
 
@@ -63,7 +64,8 @@ def watch(
         return
     _refuse(f"{scenario}: is flown here", {"radios": radios, "key": key}, "the flight card of a fleet (.json)")
     rival = against if against is None or isinstance(against, Mapping) else str(against)
-    player = Player(str(scenario), dict(settings or {}), seed, law=law, trust=trust, against=rival, at_once=True)
+    request = FlightRequest(str(scenario), dict(settings or {}), seed, law, trust, rival, at_once=True)
+    player = Player(request)
     for note in dict.fromkeys(note for side in player.sides for note in side.scenario.notes):
         say(f"note: {note}")
     from airflock.studio.page import Page
