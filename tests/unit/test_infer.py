@@ -1,6 +1,7 @@
 """Infer: the law that made the tracks is found, walks at random are nobody's law, and bad input is one line."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import xarray as xr
 
 import airflock
 from airflock.errors import AirflockError, RecordingError
-from airflock.infer import bootstrap, candidates, flights, noise, ridges, search, select
+from airflock.infer import bootstrap, candidates, flights, noise, predictive, ridges, search, select
 from airflock.infer.result import Inferred, Law, verdict_of
 from airflock.infer.tracks import ABSENT, COUNTED, ENTERS, SEEN, UNSEEN, scale_of, tracks_of
 from airflock.infer.walk import Gains, Walk
@@ -124,6 +125,22 @@ def test_errors_of_perception_alone_move_nobody():
 
     assert apart(2.0 * SIDE, 0.1) < 1e-9
     assert apart(RADIUS, 0.1) > 1e-3 and apart(RADIUS, 0.0) == 0.0
+
+
+def test_flights_of_the_posterior_check_perceive_with_errors_and_are_not_pushed_by_them():
+    """Metres were flown as metres per second: a flock that turns to the mean of all came apart."""
+    tracks = tracks_of(vicsek(eta=0.0, noise=0.0, missing=0.0, frames=130), box=(0.5 * SIDE, 0.5 * SIDE, 0.0))
+    (own,), _ = candidates.scenarios_of(["vicsek_1995"], BOX)
+    law = candidates.candidate(own, scale_of([tracks]), 2)
+    numbers = {n.column: (NUMBERS | {"model.r": 2.0 * SIDE})[n.key] for n in law.numbers if n.key in NUMBERS}
+    walk, place = Walk(law, tracks), (numbers, Gains((1.0, 1.0), (1.0, 1.0), 0.0), SPEED)
+    model = SimpleNamespace(walks=[walk], split=lambda _: place)
+    quiet, blurred = (
+        predictive.posterior(model, None, flights.Noise(flights.BLURRED, sd, 0.0, 0.0), 3, lambda: None).found
+        for sd in (0.0, 0.3)
+    )
+    for name, values in quiet.items():
+        assert blurred[name] == pytest.approx(values, rel=1e-6), name
 
 
 NUMBERS = {"model.r": RADIUS, "body.speed": SPEED, "body.turn": 60.0}

@@ -1,12 +1,12 @@
 """The posterior check: flocks of the fitted law, flown freely from where the tracks begin, against the tracks."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airflock.infer.flights import BLURRED, PUSHED, Noise, NoisyFlight
+from airflock.infer.flights import Noise, NoisyFlight
 from airflock.infer.likelihood import Model
 from airflock.infer.tracks import ABSENT
 
@@ -71,8 +71,6 @@ def posterior(model: Model, place: Array, noise: Noise, flights: int, say: Calla
     frames = min(len(kept) - begin, round(LONGEST / tracks.period))
     stride = max(1, round(0.5 / tracks.period))
     own = measured(kept[begin : begin + frames : stride], there[begin : begin + frames : stride], tracks.nearest)
-    if noise.column == BLURRED:  # these flights have no errors of perceived positions, but pushes of their size
-        noise = replace(noise, column=PUSHED)
     rows = []
     for number in range(flights):
         flight = NoisyFlight(walk, (numbers, gains, usual), noise, 1_000_000 + number)
