@@ -57,7 +57,7 @@ def tune(
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
     confidence : float
-        Of the certificate.
+        Confidence of the certificate.
     like : Scenario, str or path, optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
@@ -65,7 +65,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue what is in the folder.
+        Continue the work in the folder.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
