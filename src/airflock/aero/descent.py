@@ -29,7 +29,7 @@ class Parameters(Record):
     )  # fmt: skip
     v_max: float = quantity(
         2.0, "m/s", low=0.0, high=1e4, source="our choice: less than the models that it is added to command",
-        meaning="largest demand of this rule",
+        meaning="largest velocity that this rule demands",
     )  # fmt: skip
     gradient: str = choice(
         "frozen", ("frozen", "analytic", "cells_frozen", "cells"),

@@ -24,7 +24,7 @@ class Parameters(Packets):
     airtime: float = quantity(0.002, "s", low=0.0, high=1.0, source=OURS, meaning="how long one packet is in the air")
     vulnerable: float = quantity(
         2.0, "1", low=0.0, high=10.0, source=ABRAMSON,
-        meaning="time in which another packet would destroy it, in airtimes: 2 of free senders, 1 in time slots",
+        meaning="time in which another packet would destroy it, in airtimes: 2 for free senders, 1 with time slots",
     )  # fmt: skip
 
 

@@ -26,17 +26,17 @@ class Timing(Record):
     """When a fault begins and ends, and how many it hits; beside the numbers of its kind."""
 
     at: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it begins")
-    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends, and no other begins")
-    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; without it, to the end")
+    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends; after that no new one begins")
+    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; by default until the end")
     per_hour: float | None = quantity(
-        None, "1", low=0.0, high=1e6, meaning="how often it hits the flock in an hour, at random, instead of at"
+        None, "1", low=0.0, high=1e6, meaning="how often per hour it hits the flock, at random times; give this or at"
     )
     number: float | None = quantity(
         None,
         "1",
         low=1.0,
         high=1e7,
-        meaning="how many it hits at once, drawn; by default all, with per_hour one",
+        meaning="how many agents it hits at once, drawn at random; by default all, or one with per_hour",
     )
 
 
