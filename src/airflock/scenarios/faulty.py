@@ -168,7 +168,7 @@ def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) 
     if (when.at is None) == (when.per_hour is None):
         faults.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
     if when.until is not None and when.lasts is not None and when.at is not None:
-        faults.append(f"{where} says when it ends twice; give until or lasts")
+        faults.append(f"{where} says twice when it ends; give until or lasts")
     if when.at is not None and when.until is not None and when.until <= when.at:
         faults.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
     if when.number is not None and (when.number != int(when.number) or when.number > may):
@@ -176,5 +176,7 @@ def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) 
     if kind.leaves is not None and (when.lasts is not None or (when.at is not None and when.until is not None)):
         given = {"f": kind.record(*(getattr(numbers, name) for name in kind.fields))}
         if kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))) <= 0.0:
-            faults.append(f"{where}: {kind.name} does not end, as who drops out stays out; leave out until and lasts")
+            faults.append(
+                f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
+            )
     return faults

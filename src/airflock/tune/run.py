@@ -142,11 +142,13 @@ def _mine(
     paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
     if like is None:
         if len(paths) != 1 or heard is not None:
-            raise ScenarioError(["tune takes one scenario; of logs, give --like PRESET: whose law, field and speed"])
+            raise ScenarioError(
+                ["tune takes one scenario; for logs, give --like PRESET, the scenario with their law, field and speed"]
+            )
         return variant(paths[0], settings, trust=trust), None
     files = [path for path in paths if not isinstance(path, Scenario)]
     if not files or len(files) != len(paths):
-        raise ScenarioError(["like is given, so log files are to be tuned, and no scenario"])
+        raise ScenarioError(["like is given, so give log files, not a scenario"])
     found = identified(folder, files, variant(like, settings, trust=trust), heard)
     return found.scenario, found
 
