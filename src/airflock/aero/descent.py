@@ -21,7 +21,7 @@ COMMAND = "velocity"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """The section [aero]; a scenario that has none flies without this rule."""
+    """The section [aero]; without it, a scenario flies without this rule."""
 
     k_d: float = quantity(
         0.1, "m^2/(N s)", low=0.0, high=1e3, meaning="gain of drag descent",

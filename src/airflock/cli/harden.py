@@ -52,8 +52,8 @@ def harden(
 ) -> None:
     """Make an optimum safer: try the steps of Table S4, and keep those that help, cost little and break nothing.
 
-    A step towards a limit that is not kept yet may cost more. Of a study of several scenarios a step must keep what
-    held in each; further files end in _2 and so on. Exit status 1 where no step could be kept.
+    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a step must keep what
+    held in each; further files end in _2 and so on. Exit status 1 if no step was kept.
 
     Example: airflock harden study --out flyable.toml
     """

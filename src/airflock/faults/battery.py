@@ -1,4 +1,4 @@
-"""Battery: the agent grows weaker, and lands when the battery is empty: from then on it is absent."""
+"""Battery: the agent grows weaker, and lands when the battery is empty; from then on it is absent."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""GNSS spoofed: a stranger's signal makes the agent believe a track of its own, which it sends to the others."""
+"""GNSS spoofed: a false signal makes the agent believe another track, which it also sends to the others."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Pretender: the agent knows where it is and tells the others another place."""
+"""Pretender: the agent knows where it is, but sends the others another position."""
 
 from dataclasses import dataclass
 

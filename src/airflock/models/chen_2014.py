@@ -30,7 +30,7 @@ OURS = "our choice"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Role, and strengths of what drives prey and predators."""
+    """The role of an agent, and the strengths of the forces on prey and predators."""
 
     role: str = choice("prey", ("prey", "predator"), source=PAPER, meaning="whether an agent is hunted or hunts")
     k_rep: float = quantity(1.0, "m^2/s", low=0.0, high=1e6, source=f"{PAPER}: 1", meaning="repulsion between prey")

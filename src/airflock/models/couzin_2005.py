@@ -31,7 +31,7 @@ PAPER = "Couzin et al. 2005, as commonly told"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Radii of avoidance and of company, what an informed animal prefers and how much, and the error."""
+    """Radii of avoidance and attraction, the preferred direction of informed animals and its weight, and the error."""
 
     alpha: float = quantity(
         1.0, "m", low=0.0, high=1e4, source=PAPER, meaning="distance below which a neighbour is avoided"

@@ -24,7 +24,7 @@ OURS = "our choice, for drones that stand 3 m apart"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Gains of the way to the own point, and of what keeps drones apart."""
+    """Gains for flying to a point, and for keeping drones apart."""
 
     v_max: float = quantity(6.0, "m/s", low=0.1, high=100.0, source=OURS, meaning="largest commanded speed")
     p_goal: float = quantity(1.0, "1/s", low=0.01, high=10.0, source=OURS, meaning="gain of the braking curve")

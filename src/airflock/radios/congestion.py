@@ -18,7 +18,7 @@ RATES = ("rate",)
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Packets):
-    """A channel that all agents share. All within `range` of a receiver disturb it, and so does whoever is heard."""
+    """A channel that all agents share. All within `range` of a receiver disturb it, including the one it hears."""
 
     rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=OURS, meaning="packets that each agent sends")
     airtime: float = quantity(0.002, "s", low=0.0, high=1.0, source=OURS, meaning="how long one packet is in the air")

@@ -15,7 +15,7 @@ OURS = "our choice: a house"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Packets):
-    """One link whose reception depends on the distance and on what stands between, as both agents truly are."""
+    """One link whose reception depends on the true distance of both agents and on what stands between them."""
 
     near: float = quantity(
         20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"

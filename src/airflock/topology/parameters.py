@@ -10,7 +10,7 @@ STARLINGS = "Ballerini et al. 2008: 6.5 ± 0.9 in flocks of starlings"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Which of those whom an agent hears it meets: all, the nearest, those beside it, those it sees, the strongest."""
+    """Which of the agents it hears an agent meets: all, the nearest, adjacent ones, visible ones, the strongest."""
 
     kind: str = choice(
         "range",
