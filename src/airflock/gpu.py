@@ -25,7 +25,7 @@ def trouble() -> str | None:
         missing = isinstance(fault, ModuleNotFoundError) and fault.name == "numba_cuda"
         return f"numba-cuda is not installed; {INSTALL}" if missing else f"numba-cuda: {_first_line(fault)}"
     if simulating():
-        return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it only serves tests"
+        return "the CUDA simulator is on (NUMBA_ENABLE_CUDASIM); it is only for tests"
     try:
         if not cuda.is_available():
             return f"no GPU can be used: {_driver_fault()}"

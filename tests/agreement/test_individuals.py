@@ -490,7 +490,7 @@ def test_a_group_may_be_a_share_of_any_flock(agents, few):
         ([{"agents": [1, 2]}, {"agents": [2]}], "agent 2 is in another group already"),
         ([{"agents": [100]}], "there is no agent 100"),
         ([{"agents": 60}, {"agents": 60}], "up to 40, as many as are left of 100"),
-        ([{"name": "a"}, {"name": "b"}], "one group may take those who are left"),
+        ([{"name": "a"}, {"name": "b"}], "only one group may take the agents that are left"),
         ([{"model": {"p_rep": -1.0}}], r"groups\[0\].model.p_rep = -1 1/s lies outside"),
         ([{"model": {"p_rep": {"spread": -0.1}}}], "is not a standard deviation"),
         (

@@ -456,7 +456,7 @@ CITY = {"agents": 3, "scene.kind": "boxes", "scene.boxes": [[-5, -5, 0, 5, 5, 50
         ({"agents": 3}, lambda f: f.place([0, 1], [[5.0, 5.0]]), "1 rows for 2 agents"),
         ({"agents": 3}, lambda f: f.push([0, 3], [5.0, 5.0]), "agent = 3: this flight has the agents 0 to 2"),
         ({"agents": 3}, lambda f: f.push([0, 0], [5.0, 5.0]), r"agent = \[0, 0\]: 0 is named twice"),
-        ({"agents": 3}, lambda f: f.push([], [5.0, 5.0]), "names nobody"),
+        ({"agents": 3}, lambda f: f.push([], [5.0, 5.0]), "names no agent"),
         ({"agents": 3}, lambda f: f.push("01", [5.0, 5.0]), "agent = '01': this flight has the agents"),
         ({"agents": 3}, lambda f: f.push(0, [5.0, 1e9]), r"velocity = \[5.0, 1000000000.0\] m/s lies outside"),
         (

@@ -218,7 +218,7 @@ def test_a_law_that_stops_flying_says_so_and_the_moment_before_is_a_button(brows
         until(lambda: player.time > 5.0, "it does not fly")
         player.ask(lambda: player.change("model.pull", 3e38))
         until(lambda: player.failure, "it does not fail")
-        button = tab.get_by_text("Back to the moment before", exact=True)
+        button = tab.get_by_text("Go back one moment", exact=True)
         until(lambda: "agent" in tab.inner_text("body") and button.is_visible(), "the page does not tell")
         assert any(line.startswith("stopped:") and "agent" in line for line in lines)
         failed = player.time

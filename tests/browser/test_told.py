@@ -18,7 +18,7 @@ def test_collisions_ahead_are_forgotten_when_the_flight_goes_back_and_listed_whe
         opened(tab, view)
 
         def told():
-            words = tab.inner_text("body").partition("Nearer than a collision")[2]
+            words = tab.inner_text("body").partition("Pairs that collided")[2]
             return [float(time) for time in re.findall(r"t = ([\d.]+) s: \d+ and \d+", words)]
 
         player.ask(lambda: setattr(player.pace, "speed", 5.0))

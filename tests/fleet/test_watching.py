@@ -104,7 +104,7 @@ def test_another_key_is_told():
     f, observer = watched(key=bytes(32))
     assert trouble_of(observer, f.now) == ""
     listen(f, observer, 3.0)
-    assert "signed with another key" in trouble_of(observer, f.now) and not observer.accepted
+    assert "signed with a different key" in trouble_of(observer, f.now) and not observer.accepted
 
 
 def test_who_falls_silent_is_told_once_and_told_again_when_heard():

@@ -68,7 +68,7 @@ def test_a_contact_that_outlasts_a_gap_is_one_collision():
 
 
 def test_nobody_at_any_time_is_one_line(recording):
-    with pytest.raises(RecordingError, match="nobody is there at any instant"):
+    with pytest.raises(RecordingError, match="no individual is present at any instant"):
         measure(without(recording, np.ones((len(recording.time), 8), bool)))
 
 

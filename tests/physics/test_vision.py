@@ -120,7 +120,7 @@ def test_what_an_agent_tells_does_not_matter_to_those_who_see_it(fault, seed):
     assert np.array_equal(
         fly(ill, seed, record=True, device="python").frames, fly(plain, seed, record=True, device="python").frames
     )
-    assert any(note.endswith(f"change nothing: {fault}") for note in ill.notes)
+    assert any(note.endswith(f"have no effect: {fault}") for note in ill.notes)
 
 
 def test_a_neighbour_out_of_view_is_believed_in_for_so_long_and_then_forgotten():

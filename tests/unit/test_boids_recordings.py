@@ -34,7 +34,7 @@ def test_an_empty_recording_is_refused(settings):
 
 
 def test_a_recording_of_nobody_is_refused():
-    with pytest.raises(RecordingError, match="nobody is there at any instant"):
+    with pytest.raises(RecordingError, match="no individual is present at any instant"):
         measure(recording(agents=4, fill=np.nan), BY)
     holed = recording(agents=4)
     holed["position"][2, 1, 0, 3] = np.inf

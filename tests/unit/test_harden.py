@@ -53,7 +53,7 @@ def test_steps_are_measured_against_the_optimum_on_the_same_seeds(monkeypatch):
     assert steps[1].cost == pytest.approx((-0.035,) * 3) and steps[1].gain == pytest.approx((0.07,) * 3)
     assert [step.kept for step in steps] == [True, True, False, False, True]  # c_frict again would be the same
     assert (
-        steps[-1].verdict == "kept: p_rep up" and steps[2].verdict == "undone: gains neither distance nor room at walls"
+        steps[-1].verdict == "kept: p_rep up" and steps[2].verdict == "undone: gains no distance and no room at walls"
     )
     found = make(harden.document(load("vasarhelyi_2018/6ms"), steps[-1]), "hardened")
     assert found.parameters.p_rep == pytest.approx(0.105) and found.published == {}
@@ -139,7 +139,7 @@ def test_what_was_kept_by_luck_is_undone_on_fresh_seeds(monkeypatch):
     flown_by(monkeypatch, score)
     steps = harden.harden(load("vasarhelyi_2018/6ms"), range(20))
     assert steps[1].kept and not steps[-1].kept
-    assert steps[-1].parameters == steps[0].parameters and "nothing was kept" in steps[-1].verdict
+    assert steps[-1].parameters == steps[0].parameters and "no step was kept" in steps[-1].verdict
 
 
 def test_a_contact_in_a_few_flights_is_found_on_further_fresh_seeds(monkeypatch):
@@ -157,12 +157,12 @@ def test_a_contact_in_a_few_flights_is_found_on_further_fresh_seeds(monkeypatch)
     flown_by(monkeypatch, score)
     steps = harden.harden(load("vasarhelyi_2018/6ms"), range(60))
     assert steps[1].kept and steps[1].contacts == 0.0
-    assert not steps[-1].kept and "nothing was kept" in steps[-1].verdict
+    assert not steps[-1].kept and "no step was kept" in steps[-1].verdict
 
 
 def test_what_does_not_fly_is_not_hardened(monkeypatch):
     flown_by(monkeypatch, lambda p, chance: {"fitness": 0.0, "r_min": 5.0, "n_coll": 0.0, "f_wall": 0.0})
-    with pytest.raises(ScenarioError, match="does not fly, so there is nothing to harden: f_wall is zero in 100 %"):
+    with pytest.raises(ScenarioError, match="does not fly, so it cannot be hardened: f_wall is zero in 100 %"):
         harden.harden(load("vasarhelyi_2018/6ms"), range(5))
 
 
@@ -211,7 +211,7 @@ def test_a_narrow_terminal_is_told_every_number(monkeypatch, capsys):
             name, "", {}, 0.7123, 33.75, 0.125, (0.01234, -0.005, 0.0295), (1.625, 1.125, 2.125), {"f_wall": 0.987},
             1.0, -12.3, False, verdict,
         )
-        for name, verdict in (("optimum", ""), (named, "undone: gains neither distance nor room at walls"))
+        for name, verdict in (("optimum", ""), (named, "undone: gains no distance and no room at walls"))
     ]  # fmt: skip
     monkeypatch.setenv("COLUMNS", "80")
     cli_harden._print("mine.toml", steps, 60)
@@ -219,4 +219,4 @@ def test_a_narrow_terminal_is_told_every_number(monkeypatch, capsys):
     assert "…" not in told
     for text in ("0.7123", "33.8", "0.125", "0.987", "100 %", "-12.3", "0.0123 (-0.005 to 0.0295)", "1.62 m (1.12 to"):
         assert text in told, text
-    assert f"{named}: undone: gains neither distance nor room at walls; cost" in told
+    assert f"{named}: undone: gains no distance and no room at walls; cost" in told

@@ -376,7 +376,7 @@ def test_logs_without_commands_say_so_and_write_nothing(tmp_path):
     out = tmp_path / "mine.toml"
     done = called("identify", tmp_path / "log.csv", "--like", "vasarhelyi_2018/real_6ms", "--out", out)
     lines = done.stderr.splitlines()
-    assert done.returncode == 2 and not out.exists() and "tell no number" in done.stderr
+    assert done.returncode == 2 and not out.exists() and "no number can be identified" in done.stderr
     assert len({line.partition(": ")[2].partition(": ")[2] for line in lines}) == len(lines)  # each reason once
     body = [line for line in lines if "body.tau, body.a_max, body.noise: " in line]
     assert len(body) == 1 and "--map cx:=COLUMN" in body[0]

@@ -136,7 +136,7 @@ def test_arrays_and_movement_of_both_generations_agree(tmp_path):
     assert "counts frames" in both and "--scale" in both
     fish = pd.DataFrame({"frame": [0, 1, 2], "fish": 0, "x": [500.0, 504.0, 508.0], "y": [80.0, 80.0, 80.0]})
     both = refused(fish)
-    assert "counts frames" in both and "has no unit, and frame tells of a camera; write --unit px" in both
+    assert "counts frames" in both and "has no unit, and frame comes from a camera; write --unit px" in both
     assert values(airflock.load_tracks(fish, fps=25.0, unit="px", scale=0.001))[-1, 0, 0] == pytest.approx(0.508)
     assert "without a unit" not in str(airflock.load_tracks(fish, fps=25.0, unit="m").attrs)
     two = xr.concat([given, given.assign_coords(keypoints=["nose"])], "keypoints")

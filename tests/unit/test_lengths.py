@@ -84,5 +84,5 @@ def test_a_rotation_is_told_where_its_centre_is(tmp_path, seed):
     about = [{"metrics.centre_x": place, "metrics.centre_y": place} for place in (26.0, 526.0)]
     laps = [airflock.score(one, settings=at)["phi_lap"][0] for one, at in zip((recording, moved), about, strict=True)]
     assert laps[0] == pytest.approx(laps[1], abs=1e-3)
-    with pytest.raises(RecordingError, match="mine: has no phi_lap, as tracks do not say"):
+    with pytest.raises(RecordingError, match="mine: has no phi_lap, because tracks do not say"):
         airflock.plots.rotations({"mine": recording})

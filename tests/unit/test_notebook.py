@@ -81,8 +81,8 @@ def test_the_largest_seed_flies_and_is_kept_in_a_file(short, tmp_path):
 @pytest.mark.parametrize(
     ("seeds", "said"),
     [
-        (0, "seeds = 0: nothing would be flown"),
-        ([], "seeds = ..: nothing"),
+        (0, "seeds = 0: no flight would be flown"),
+        ([], "seeds = ..: no flight"),
         (-2, "give at least 1"),
         (1.5, "neither a whole number"),
     ],

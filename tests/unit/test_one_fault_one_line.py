@@ -59,8 +59,8 @@ def test_a_wrong_key_of_a_fault_names_the_right_ones(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "note"),
     [
-        ({"topology.k": 7}, "topology.kind = 'range' does not read topology.k: agents meet all whom they hear"),
-        ({"topology.kind": "nearest", "topology.k": 99}, "topology.k = 99: each of 100 agents meets all whom it hears"),
+        ({"topology.k": 7}, "topology.kind = 'range' does not read topology.k: agents meet all that they hear"),
+        ({"topology.kind": "nearest", "topology.k": 99}, "topology.k = 99: each of 100 agents meets all that it hears"),
         ({"topology.kind": "nearest", "topology.k": 98}, ""),
         ({"topology.kind": "voronoi", "topology.k": 500}, ""),
         ({}, ""),

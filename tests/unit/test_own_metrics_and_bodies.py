@@ -194,7 +194,7 @@ def test_a_recording_of_ones_own_metrics_and_body_says_what_flies_and_scores_it_
     assert airflock.validate("mine.nc", given, trust=True).verdict == "flown again with the same bits"
     with pytest.raises(AirflockError, match="half.py: would run the code|would run the code in .*half.py"):
         airflock.validate("mine.nc", given)
-    with pytest.raises(AirflockError, match="radio.delay: it is flown again as it was flown"):
+    with pytest.raises(AirflockError, match="radio.delay: it can only be flown again as it was"):
         airflock.validate("mine.nc", given | {"radio.delay": 2.0}, trust=True)
     x = flown.position.sel(space="x").values[:, 0]
     spread = np.abs(x - x.mean(axis=1, keepdims=True)).mean()

@@ -115,7 +115,7 @@ def test_the_end_of_the_longest_flight_is_told(player, monkeypatch):
     player.fly(100)
     then = player.flight.step
     assert player.tick(1.0) is False and player.flight.step == then
-    assert player.over and player.status == "no page flies longer than 1 s; Reset begins anew"
+    assert player.over and player.status == "a page flies at most 1 s; Reset starts again"
     player.back(0.5)
     assert not player.over and player.time == pytest.approx(0.5)
 

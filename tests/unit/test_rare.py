@@ -23,6 +23,6 @@ def test_no_event_is_the_rule_of_three_and_every_flight_says_nothing():
 def test_remarks_name_the_bound_and_the_worst_seed():
     rows = [{"n_coll": 0.0, "fitness": 0.9}, {"n_coll": 2.0, "fitness": 0.1}, {"n_coll": 0.0, "fitness": 0.8}]
     first, second = remarks(rows, [4, 5, 6])
-    assert first.startswith("collisions in 1 of 3 flights: with 95 % confidence at most 86 %")
+    assert first.startswith("collisions in 1 of 3 flights: with 95 % confidence, at most 86 %")
     assert second.startswith("worst flight: seed 5, fitness 0.1")
     assert remarks(rows[:1], [4]) == [] and remarks([{"quality": 1.0}] * 2, [0, 1]) == []

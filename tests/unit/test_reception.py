@@ -74,7 +74,9 @@ def test_the_picture_shows_the_table_and_what_knows_no_packets_is_refused():
     line = next(line for line in upper.lines if line.get_label() == "median")
     table = reception(recording)
     np.testing.assert_allclose(line.get_ydata(), table.loc[table["count"] >= 10, "median"])
-    with pytest.raises(RecordingError, match="holds no age of what was heard; plot the scenario itself, fly it with"):
+    with pytest.raises(
+        RecordingError, match="does not hold the age of received data; plot the scenario itself, fly it with"
+    ):
         airflock.plot(recording.drop_vars("age"), "reception")
     with pytest.raises(RecordingError, match="no column stamp"):
         reception(pd.DataFrame({"receiver": [1], "sender": [2], "t": [0.0], "distance": [1.0], "got": [1]}))

@@ -73,7 +73,7 @@ def test_a_start_inside_an_obstacle_is_refused():
 
 def test_a_start_region_full_of_obstacles_is_noted():
     found = airflock.load("kidger/city", {"scene.street": 2.5, "world.dimensions": "2", "goals.kind": "none"})
-    assert any("agents start in the rest" in note for note in found.notes)
+    assert any("agents start only in the rest" in note for note in found.notes)
 
 
 def test_a_goal_inside_a_closed_mesh_is_refused(hall):

@@ -51,7 +51,7 @@ def test_paths_through_a_scene_show_what_stands_there(name):
         assert len(axes.collections[0].get_paths()) == len(shown)  # a ground plan of each building
         named = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
         assert named == ["at the end", "goal"]
-        assert [axes.get_ylabel() for axes in figure.axes[1:]] == ["height of what stands (m)", "speed (m/s)"]
+        assert [axes.get_ylabel() for axes in figure.axes[1:]] == ["height of the scene (m)", "speed (m/s)"]
         assert len(trajectories(made).axes[0].collections[0].get_paths()) == len(shown)  # so does run --plot
     if name == "kidger/final_2d":
         with pytest.raises(RecordingError, match="flown in a plane"):

@@ -86,7 +86,7 @@ def test_what_does_not_fly_is_never_called_best(tmp_path):
         return {**still(parameters, seed), "fitness": 0.3 if seed == lucky else 0.0}
 
     found = run(study, score, tmp_path)
-    assert "nothing flies, so nothing is best: f_speed is zero in 100 % of flights" in found.dead
+    assert "no candidate flies, so there is no best one: f_speed is zero in 100 % of flights" in found.dead
     assert not (tmp_path / "best.toml").exists()
 
 

@@ -69,7 +69,7 @@ def test_another_kind_of_law_keeps_none_of_the_other_law_s_keys(tmp_path):
     [
         ('extends = "vasarhelyi_2018/real_6m"', "did you mean vasarhelyi_2018/real_6ms?"),
         ("extends = 4", "extends = 4 is not a name"),
-        ('extends = "mine.toml"', "comes back to itself"),
+        ('extends = "mine.toml"', "leads back to itself"),
         (f'extends = "{NAME}"\n[radio]\ndelai = 1.0', "radio.delai: unknown key; did you mean radio.delay?"),
     ],
 )
@@ -132,11 +132,11 @@ def test_notes_tell_what_is_hardly_meant_and_presets_have_none_of_them(tmp_path)
     }
     beside = load("vasarhelyi_2018/4ms", {**field, "agents": 12})
     assert any(
-        note.startswith("phi_lap tells the rotation about (0, 0) m, which does not lie") for note in beside.notes
+        note.startswith("phi_lap measures the rotation about (0, 0) m, which does not lie") for note in beside.notes
     )
     about = load("vasarhelyi_2018/4ms", {**field, "agents": 12, "metrics.centre_x": 75.0, "metrics.centre_y": 75.0})
     assert not any("phi_lap" in note for note in about.notes)
-    words = ("no rule for walls", "hardly meant", "are its set", "phi_lap")
+    words = ("no rule for walls", "probably wrong", "are its set", "phi_lap")
     for name in presets():
         assert not any(word in note for note in load(name).notes for word in words), name
 

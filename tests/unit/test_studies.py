@@ -272,7 +272,7 @@ def test_kills_at_random_moments_change_nothing(tmp_path, seed, request):
 
 def test_a_study_that_is_made_takes_no_keys_beside_itself(tmp_path):
     made = load_study("vasarhelyi_2018/6ms")
-    with pytest.raises(StudyError, match=r"^settings, limit, population: a Study that is made says this itself"):
+    with pytest.raises(StudyError, match=r"^settings, limit, population: a Study object sets this itself"):
         airflock.evolve(made, tmp_path / "s", settings={"agents": 4}, limit="r_min<3 at 1%", population=8)
     assert not (tmp_path / "s").exists()
 

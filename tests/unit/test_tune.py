@@ -231,9 +231,9 @@ def test_search_hardening_and_certificate_hold_to_the_same_limits_on_seeds_that_
 
 def test_logs_without_a_law_and_laws_without_logs_are_one_line(logs, tmp_path):
     for what, more, words in (
-        ([logs, logs], {}, "tune takes one scenario; of logs, give --like"),
-        ([logs], {"heard": logs}, "of logs, give --like"),
-        (make(MINE, "mine"), {"like": make(MINE, "mine")}, "log files are to be tuned, and no scenario"),
+        ([logs, logs], {}, "tune takes one scenario; for logs, give --like"),
+        ([logs], {"heard": logs}, "logs, give --like"),
+        (make(MINE, "mine"), {"like": make(MINE, "mine")}, "give log files, not a scenario"),
     ):
         with pytest.raises(ScenarioError, match=words):
             tune(what, tmp_path / "a", **more)

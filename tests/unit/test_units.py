@@ -75,7 +75,7 @@ def test_units_in_files_are_converted_and_what_is_flown_is_in_si(tmp_path):
     assert scenario.world.obstacles == (((0.0, 0.0), (9.144, 0.0), (0.0, 9.144)),)
     assert scenario.document["radio"]["delay"] == {"value": 0.4, "unit": "s", "source": "measured"}
     assert {"duration = 10 min is 600 s", "radio.range = 300 ft is 91.44 m"} <= set(scenario.notes)
-    assert "world.obstacles is converted from yd to m" in scenario.notes
+    assert "world.obstacles was converted from yd to m" in scenario.notes
 
 
 def test_a_converted_value_is_checked_against_the_declared_range():

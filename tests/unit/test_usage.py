@@ -158,7 +158,10 @@ def test_no_command_writes_over_the_file_that_it_reads(words, file, tmp_path, mo
     monkeypatch.setattr("sys.argv", ["airflock", *words.split()])
     with pytest.raises(SystemExit) as ended:
         main()
-    assert ended.value.code == 2 and f"{file}: is read here, and would be lost; give another" in capsys.readouterr().err
+    assert (
+        ended.value.code == 2
+        and f"{file}: is an input and would be overwritten; give another" in capsys.readouterr().err
+    )
     assert Path(file).read_text() == "duration = 5.0\n"
 
 

@@ -21,7 +21,7 @@ COMMAND = "velocity"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """The section [aero]; a scenario that has none flies without this rule."""
+    """The section [aero]; without it, a scenario flies without this rule."""
 
     k_d: float = quantity(
         0.1, "m^2/(N s)", low=0.0, high=1e3, meaning="gain of drag descent",
@@ -29,7 +29,7 @@ class Parameters(Record):
     )  # fmt: skip
     v_max: float = quantity(
         2.0, "m/s", low=0.0, high=1e4, source="our choice: less than the models that it is added to command",
-        meaning="largest demand of this rule",
+        meaning="largest velocity that this rule demands",
     )  # fmt: skip
     gradient: str = choice(
         "frozen", ("frozen", "analytic", "cells_frozen", "cells"),

@@ -29,7 +29,7 @@ def battery_end() -> Any:
     """Parameter `weak`."""
     return quantity(
         0.7, "1", low=0.0, high=1.0, source="our choice: cells of 3.5 V of 4.2 V, squared",
-        meaning="share of the largest thrust that is left just before the battery is empty",
+        meaning="share of the largest thrust left just before the battery is empty",
     )  # fmt: skip
 
 

@@ -50,12 +50,24 @@ class Parameters(Record):
     tau_thrust: float = quantity(0.3, "s", low=0.01, high=10.0, source=OURS, meaning="time constant of the thrust")
     n_max: float = quantity(3.0, "1", low=1.0, high=15.0, source=OURS, meaning="largest load factor")
     dive_max: float = quantity(0.35, "rad", low=0.01, high=1.4, source=OURS, meaning="steepest descent")
-    margin: float = quantity(1.1, "1", low=1.0, high=3.0, source=OURS, meaning="least airspeed asked / stall speed")
-    v_max: float = quantity(30.0, "m/s", low=1.0, high=300.0, source=OURS, meaning="largest airspeed asked")
+    margin: float = quantity(
+        1.1,
+        "1",
+        low=1.0,
+        high=3.0,
+        source=OURS,
+        meaning="smallest commanded airspeed, as a multiple of the stall speed",
+    )
+    v_max: float = quantity(30.0, "m/s", low=1.0, high=300.0, source=OURS, meaning="largest commanded airspeed")
     thrust_max: float = quantity(0.4, "1", low=0.0, high=5.0, source=OURS, meaning="largest thrust over weight")
     power_max: float = quantity(400.0, "W", low=0.0, high=1e7, source=OURS, meaning="largest thrust times airspeed")
     use: float = quantity(
-        0.5, "1", low=0.01, high=1.0, source="our choice: propeller and motor", meaning="share of energy that is thrust"
+        0.5,
+        "1",
+        low=0.01,
+        high=1.0,
+        source="our choice: propeller and motor",
+        meaning="share of the energy that becomes thrust",
     )
     gravity: float = quantity(9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight / mass")
     battery: str = battery_kind()

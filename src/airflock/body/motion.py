@@ -27,7 +27,7 @@ class Parameters(Record):
         low=0.0,
         high=5.0,
         source="our choice, because a multirotor of 1 m/s² drag at 10 m/s is usual",
-        meaning="push of the wind per its speed",
+        meaning="acceleration caused by the wind, per wind speed",
     )
 
 

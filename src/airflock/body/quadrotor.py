@@ -47,9 +47,9 @@ class Parameters(Record):
         low=0.1,
         high=100.0,
         source="Vásárhelyi et al. 2018, Table S5",
-        meaning="largest acceleration asked",
+        meaning="largest commanded acceleration",
     )
-    tilt_max: float = quantity(0.55, "rad", low=0.01, high=1.4, source=OURS, meaning="largest tilt asked")
+    tilt_max: float = quantity(0.55, "rad", low=0.01, high=1.4, source=OURS, meaning="largest commanded tilt")
     stiffness: float = quantity(150.0, "1/s^2", low=1.0, high=1e4, source=OURS, meaning="attitude: proportional gain")
     damping: float = quantity(22.0, "1/s", low=0.1, high=500.0, source=OURS, meaning="attitude: damping of its rate")
     alpha: float = quantity(
@@ -69,7 +69,12 @@ class Parameters(Record):
     )
     rho: float = quantity(1.225, "kg/m^3", low=0.1, high=5.0, source=SEA_LEVEL, meaning="density of the air")
     rho_0: float = quantity(
-        1.225, "kg/m^3", low=0.1, high=5.0, source=SEA_LEVEL, meaning="density at which thrust_max and drags are meant"
+        1.225,
+        "kg/m^3",
+        low=0.1,
+        high=5.0,
+        source=SEA_LEVEL,
+        meaning="air density to which thrust_max and the drags refer",
     )
     gravity: float = quantity(
         9.80665, "m/s^2", low=0.1, high=30.0, source="standard gravity", meaning="weight per mass"

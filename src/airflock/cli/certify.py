@@ -24,43 +24,49 @@ Limits = Annotated[
 ]  # fmt: skip
 Budget = Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 90s, 10min or 2h.")]
 Flights = Annotated[
-    int | None, typer.Option(help="Fly so many and look once, whatever the time.", show_default="by the limit")
+    int | None,
+    typer.Option(help="Fly this many flights and look once, however long it takes.", show_default="from the limit"),
 ]
 Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", "-o", metavar="FILE.toml", help="Certificate; its flights are kept in FILE_flights beside it."
+        "--out", "-o", metavar="FILE.toml", help="Certificate to write; its flights are kept beside it in FILE_flights."
     ),
 ]
-Tolerance = Annotated[bool, typer.Option("--tolerance", help="Also find how far delay, noise, lag, ... may move.")]
+Tolerance = Annotated[
+    bool, typer.Option("--tolerance", help="Also find how far delay, noise, lag and so on may change.")
+]
 ToleranceOf = Annotated[
     list[str] | None,
-    typer.Option("--tolerance-of", metavar="KEY", help="Only of these keys, such as radio.delay; repeatable."),
+    typer.Option("--tolerance-of", metavar="KEY", help="Only for this key, such as radio.delay; repeatable."),
 ]
 Split = Annotated[
-    bool, typer.Option("--split", help="Also estimate r_min limits by splitting: finds and ranks, shows nothing.")
+    bool,
+    typer.Option("--split", help="Also estimate r_min limits by splitting; this ranks flights but proves nothing."),
 ]
 Map = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="KEY=VALUES", help="Twice: also bounds over a grid, such as radio.delay=0.5:1.5:5."),
+    typer.Option(
+        "--map", metavar="KEY=VALUES", help="Give it twice: also bounds over a grid, such as radio.delay=0.5:1.5:5."
+    ),
 ]
 Uncertain = Annotated[
     bool, typer.Option("--uncertain", help="Draw each flight's numbers from the intervals in the file.")
 ]
 Check = Annotated[
-    bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again, compare the bits.")
+    bool, typer.Option("--check", help="Check a certificate: fly one flight in a hundred again and compare the bits.")
 ]
-Plot = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Bounds, distances and tolerances.")]
+Plot = Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw bounds, distances and tolerances.")]
 Timeout = Annotated[
-    float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
+    float | None, typer.Option(help="Longest time for one flight on a worker, s.", show_default="no limit")
 ]
-Device = Annotated[str, typer.Option(help="cpu, or python (no compiler, for debuggers).")]
+Device = Annotated[str, typer.Option(help="cpu, or python (not compiled, for debugging).")]
 
 
 def certify(
     scenario: Where,
     limit: Limits = None,
-    confidence: Annotated[float, typer.Option(help="Of all limits together.")] = 0.95,
+    confidence: Annotated[float, typer.Option(help="Confidence that all limits hold together.")] = 0.95,
     budget: Budget = "10min",
     flights: Flights = None,
     out: Out = None,
@@ -84,9 +90,9 @@ def certify(
     device: Device = "cpu",
     as_json: options.Json = False,
 ) -> None:
-    """Show that an event is rare: exact bounds, seeds fixed beforehand, every look paid for.
+    """Show that an event is rare: exact bounds, seeds fixed in advance, every interim look accounted for.
 
-    Exit status 0: all limits are shown (or the check holds); 1: they are not; 2: bad input.
+    Exit status 0: every limit is shown to hold (or the check passes); 1: not; 2: bad input.
 
     Example: airflock certify vasarhelyi_2018/real_6ms --limit "r_min<1 at 0.1/h" --budget 10min --out certificate.toml
     """

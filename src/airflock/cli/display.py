@@ -13,22 +13,22 @@ from airflock.suffixes import PICTURES, RECORDINGS
 def display(
     shapes: Annotated[
         list[str],
-        typer.Argument(metavar="SHAPE...", help="Images, meshes (stl, obj, glb) or texts, one after another."),
+        typer.Argument(metavar="SHAPE...", help="Images, meshes (stl, obj, glb) or texts, shown one after another."),
     ],
     drones: Annotated[int, typer.Option(min=2, max=2000, help="Number of drones.")] = 200,
     failing: Annotated[float, typer.Option(help="Share of the drones that fail on the way, 0 to 0.9.")] = 0.0,
     failure: Annotated[
-        str, typer.Option(help="What a drone that fails does: fall, hover or both (in turns).")
+        str, typer.Option(help="What a failing drone does: fall, hover, or both (taking turns).")
     ] = "both",
-    points: Annotated[int | None, typer.Option(min=2, help="Points of a shape.", show_default="one per drone")] = None,
-    spacing: Annotated[float, typer.Option(min=2.5, max=100.0, help="Least distance of two points, m.")] = 3.0,
+    points: Annotated[int | None, typer.Option(min=2, help="Points per shape.", show_default="one per drone")] = None,
+    spacing: Annotated[float, typer.Option(min=2.5, max=100.0, help="Smallest distance between two points, m.")] = 3.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of failures and noise.")] = 0,
     changes: options.Set = None,
     as_json: options.Json = False,
     save: options.SaveFile = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw every shape as it stood.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw every shape as it was formed.")] = None,
 ) -> None:
-    """Fly a drone display: points assigned to drones, again when some fail; print how well each shape stood.
+    """Fly a drone display: assign points to drones, again when some fail, and print how well each shape was formed.
 
     Example: airflock display AIR FLOCK heart.png --failing 0.1 --plot show.png
     """

@@ -13,10 +13,10 @@ def evolve(
     scenario: Annotated[str, typer.Argument(metavar="PRESET|FILE", help="A preset, a scenario file, or a study file.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the study.", show_default=False)],
     algorithm: Annotated[str | None, typer.Option(help="cmaes, ga, nsga2 or nsga3.", show_default="cmaes")] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates of a generation.", show_default="100")] = None,
-    generations: Annotated[int | None, typer.Option(help="Generations of a run.", show_default="150")] = None,
-    seeds: Annotated[int | None, typer.Option(help="Flights of a candidate.", show_default="1")] = None,
-    seed: Annotated[int | None, typer.Option(help="Decides all chance of the study.", show_default="0")] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default="100")] = None,
+    generations: Annotated[int | None, typer.Option(help="Generations per run.", show_default="150")] = None,
+    seeds: Annotated[int | None, typer.Option(help="Flights per candidate.", show_default="1")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of everything random in the study.", show_default="0")] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(
@@ -24,51 +24,62 @@ def evolve(
             "-l",
             metavar="LIMIT",
             show_default=False,
-            help="What candidates are to keep before fitness counts, such as 'r_min<3 at 0.01/h', as in certify; "
+            help="A limit that candidates must keep before fitness counts, such as 'r_min<3 at 0.01/h', as in certify; "
             "--seeds is then 2 by default. Repeatable.",
         ),
     ] = None,
-    restarts: Annotated[int | None, typer.Option(help="Independent further runs.", show_default="0")] = None,
+    restarts: Annotated[int | None, typer.Option(help="Further independent runs.", show_default="0")] = None,
     flights: Annotated[
         str | None,
-        typer.Option(help="whole, or growing: from an eighth of a flight up to whole ones.", show_default="whole"),
+        typer.Option(
+            help="whole, or growing: flights start at an eighth of the duration and grow to all of it.",
+            show_default="whole",
+        ),
     ] = None,
     racing: Annotated[
         bool,
-        typer.Option("--racing", help="Of several --seeds: who cannot reach the better half does not fly on."),
+        typer.Option(
+            "--racing", help="With several --seeds: stop flying a candidate once it cannot reach the better half."
+        ),
     ] = False,
     start: Annotated[
         str | None,
-        typer.Option(help="Where CMA-ES starts: middle of all ranges, or scenario (warm).", show_default="middle"),
+        typer.Option(
+            help="Where CMA-ES starts: middle (of all ranges), or scenario (its own values).", show_default="middle"
+        ),
     ] = None,
     averages: Annotated[
         int | None,
-        typer.Option(help="Averages of the last means that also fly in the final.", show_default="0"),
+        typer.Option(help="Number of averages of the last means that also join the final.", show_default="0"),
     ] = None,
     fast: Annotated[
         bool,
-        typer.Option("--fast", help="A third of the flights: 24 candidates, each with one flight first and nine last."),
+        typer.Option(
+            "--fast",
+            help="Use a third of the flights: 24 candidates, each with one flight at first and nine at the end.",
+        ),
     ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
     scheduler: options.Scheduler = None,
     timeout: Annotated[
-        float | None, typer.Option(help="Time that a flight may take on a worker, s.", show_default="no limit")
+        float | None, typer.Option(help="Longest time for one flight on a worker, s.", show_default="no limit")
     ] = None,
     sensitivity: Annotated[
-        str, typer.Option(metavar="METHOD", help="Also which parameters matter: sobol or morris.", show_default=False)
+        str,
+        typer.Option(metavar="METHOD", help="Also find which parameters matter: sobol or morris.", show_default=False),
     ] = "",
-    device: Annotated[str, typer.Option(metavar="D", help="Where flights fly: cpu, cuda or auto.")] = "cpu",
+    device: Annotated[str, typer.Option(metavar="D", help="Device for the flights: cpu, cuda or auto.")] = "cpu",
     changes: options.Set = None,
     trust: options.Trust = False,
     agents: options.Agents = None,
     duration: options.Duration = None,
     threads: options.Threads = None,
     as_json: options.Json = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
 ) -> None:
     """Evolve a flock's parameters; the folder then holds the optimum, all evaluations, tables and pictures.
 
-    Exit status 1 where nothing flies; then there is no best.toml.
+    Exit status 1 if no candidate flies; then there is no best.toml.
 
     Example: airflock evolve vasarhelyi_2018/6ms --out study --generations 20
     """

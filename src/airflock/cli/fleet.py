@@ -29,9 +29,7 @@ def fleet(
     vehicle: Annotated[str, typer.Option(help="Autopilot that the vehicles imitate: px4 or ardupilot.")] = "px4",
     body: Annotated[
         str | None,
-        typer.Option(
-            metavar="multirotor|quadrotor", help="What the vehicles move like.", show_default="the scenario's"
-        ),
+        typer.Option(metavar="multirotor|quadrotor", help="How the vehicles move.", show_default="the scenario's"),
     ] = None,
     mode: Annotated[
         str,
@@ -45,12 +43,12 @@ def fleet(
         typer.Option(
             min=1024,
             max=65000,
-            help="On the real clock: port at which the first vehicle calls for MAVSDK, MAVProxy or QGroundControl; "
-            "the others call at the next ones.",
+            help="On the real clock: port where the first vehicle contacts MAVSDK, MAVProxy or QGroundControl; "
+            "the others use the next ones.",
         ),
     ] = 14540,
     faults: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help=r"What goes wrong: tables \[\[fault]].")
+        Path | None, typer.Option(metavar="FILE.toml", help=r"Faults to inject: tables \[\[fault]].")
     ] = None,
     against: Annotated[
         str | None, typer.Option(metavar="simulator", help="Fly the simulator beside it, and compare.")
@@ -254,7 +252,7 @@ def _tell(scenario: Any, card: Any, series: Series, as_json: bool) -> None:
             f"p (Holm) {line.p:.2f}"
         )
     if series.simulated and not lines:
-        tables.say("note: one seed tells no table of differences; --seeds 2 or more do")
+        tables.say("note: a table of differences needs two or more seeds: --seeds 2")
 
 
 def _tell_load(load: dict[str, Any] | None) -> None:

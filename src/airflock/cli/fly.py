@@ -34,7 +34,7 @@ class Fly(TyperGroup):
 
 app = typer.Typer(
     cls=Fly, no_args_is_help=True, rich_markup_mode="rich",
-    help="""Fly the same law on real drones: a card for all, a node beside each autopilot, orders of one operator.
+    help="""Fly the same law on real drones: one card for all, a node beside each autopilot, orders from one operator.
 
     Example: airflock fly prepare vasarhelyi_2018/real_4ms --site 47.50,19.04,120 --members 1-10,
     then on each drone airflock fly mission.json --member 3 --autopilot udp:127.0.0.1:14540 --radio ...
@@ -46,7 +46,7 @@ app = typer.Typer(
     "card", context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
 )
 def card(ctx: typer.Context) -> None:
-    """Run a node: the same as python -m airflock.onboard CARD ...; `airflock fly card --help` tells its options."""
+    """Run a node: the same as python -m airflock.onboard CARD ...; `airflock fly card --help` lists its options."""
     from airflock.onboard.run import main
 
     raise typer.Exit(main(ctx.args))
@@ -65,8 +65,8 @@ def prepare(
     height: Annotated[
         float | None, typer.Option(help="Height of the flock, m above the site.", show_default="20")
     ] = None,
-    margin: Annotated[float, typer.Option(min=0.0, help="Fence outside the law's walls, m.")] = 30.0,
-    hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="For how long card and key are good.")] = 12.0,
+    margin: Annotated[float, typer.Option(min=0.0, help="Distance of the fence outside the law's walls, m.")] = 30.0,
+    hours: Annotated[float, typer.Option(min=0.1, max=168.0, help="How long card and key stay valid, h.")] = 12.0,
     limits: Annotated[
         list[str] | None, typer.Option("--limit", metavar="KEY=VALUE", help="Change a limit, for instance brake=2.")
     ] = None,
@@ -210,17 +210,17 @@ def _say_prepared(files: Files, card: Any, loads: list[Airtime]) -> None:
 def order(
     card_file: Annotated[Path, typer.Argument(metavar="CARD", help="The flight card.", show_default=False)],
     do: Annotated[
-        str, typer.Argument(metavar="ORDER", help="start, go, goto, hold, resume, return, land, kill, ping.")
+        str, typer.Argument(metavar="ORDER", help="start, go, goto, hold, resume, return, land, kill or ping.")
     ],
     radio: Annotated[str, typer.Option(metavar="PORT", help="udp:HOST:PORT>HOST:PORT or serial:/dev/NAME:BAUD")],
     target: Annotated[int, typer.Option(min=0, max=250, help="System id; 0 for all.")] = 0,
-    delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="s until a start.")] = 3.0,
+    delay: Annotated[float, typer.Option("--in", min=0.0, max=60.0, help="Delay of a start, s.")] = 3.0,
     point: Annotated[
-        str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to, for goto; ALT as of the site.")
+        str | None, typer.Option(metavar="LAT,LON,ALT", help="Where to go, for goto; ALT above sea level, m.")
     ] = None,
     confirm: Annotated[bool, typer.Option("--confirm", help="Second step of a kill, within 5 s of the first.")] = False,
 ) -> None:
-    """Give an order, signed with the operator's key beside the card. Sent five times; each drone obeys it once.
+    """Send an order, signed with the operator's key beside the card. It is sent five times; each drone obeys it once.
 
     Example: airflock fly order mission.json start --radio 'udp:0.0.0.0:14601>192.168.1.255:14600'
     """
@@ -255,7 +255,7 @@ def order(
         message, sign = orders.message(command, private), Signer(key, orders.OPERATOR)
         for _ in range(5):
             if not port.write(sign(message, time.time_ns() // 1000)):
-                raise CardError([f"{radio}: cannot send; does the port name where to (>HOST:PORT)?"])
+                raise CardError([f"{radio}: cannot send; does the port say where to send (>HOST:PORT)?"])
             time.sleep(0.1)
     finally:
         port.close()

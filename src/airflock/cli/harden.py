@@ -17,19 +17,22 @@ def harden(
         str, typer.Argument(metavar="FILE|PRESET|DIR", help="An optimum: a scenario, or a study's folder.")
     ],
     out: Annotated[Path, typer.Option(metavar="FILE.toml", help="The hardened scenario.", show_default=False)],
-    seeds: Annotated[int, typer.Option(min=2, help="Flights of each step.")] = 100,
+    seeds: Annotated[int, typer.Option(min=2, help="Flights per step.")] = 100,
     first_seed: options.FirstSeed = 0,
     r_coll: Annotated[
         float | None,
         typer.Option(
-            help="Not the recipe: evolve again, radius of collision so many times as large.",
+            help="Instead of the recipe: evolve again, with the collision radius this many times as large.",
             show_default=False,
         ),
     ] = None,
     delay: Annotated[
-        float | None, typer.Option(help="Likewise with a delay so many times as large.", show_default=False)
+        float | None,
+        typer.Option(
+            help="Instead of the recipe: evolve again, with the delay this many times as large.", show_default=False
+        ),
     ] = None,
-    generations: Annotated[int, typer.Option(min=1, help="Generations of that evolution.")] = 150,
+    generations: Annotated[int, typer.Option(min=1, help="Generations when evolving again.")] = 150,
     cost: Annotated[float, typer.Option(min=0.0, help="Fitness that the recipe may give up.")] = 0.05,
     limit: Annotated[
         list[str] | None,
@@ -38,7 +41,7 @@ def harden(
             "-l",
             metavar="LIMIT",
             show_default=False,
-            help="What no step may break, such as 'r_min<3 at 0.01/h', as in certify; repeatable.",
+            help="A limit that no step may break, such as 'r_min<3 at 0.01/h', as in certify; repeatable.",
         ),
     ] = None,
     changes: options.Set = None,
@@ -47,10 +50,10 @@ def harden(
     threads: options.Threads = None,
     as_json: options.Json = False,
 ) -> None:
-    """Make an optimum safer: steps of Table S4 stay if they gain, cost little, and break nothing that held.
+    """Make an optimum safer: try the steps of Table S4, and keep those that help, cost little and break nothing.
 
-    A step towards a limit that is not kept yet may cost more. Of a study of several scenarios a step must keep what
-    held in each; further files end in _2 and so on. Exit status 1 where no step could be kept.
+    A step towards a limit that is not kept yet may cost more. With a study of several scenarios, a step must keep what
+    held in each; further files end in _2 and so on. Exit status 1 if no step was kept.
 
     Example: airflock harden study --out flyable.toml
     """

@@ -24,9 +24,9 @@ def identify(
         ),
     ] = "",
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario to write.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Six panels of what was found.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw what was found, in six panels.")] = None,
     conservative: Annotated[
-        float | None, typer.Option(help="Write the pessimistic ends of intervals of this level, such as 0.95.")
+        float | None, typer.Option(help="Write the pessimistic end of each interval of this level, such as 0.95.")
     ] = None,
     uncertain: Annotated[bool, typer.Option("--uncertain", help="Also write the intervals into the scenario.")] = False,
     plan: Annotated[
@@ -46,7 +46,7 @@ def identify(
 ) -> None:
     """Find the lag, limits, noise, sensor error and radio of a fleet in its own logs, with 95 % intervals.
 
-    What the logs cannot tell is refused with the reason, and stays as in --like. Logs need commands and raw velocities.
+    What the logs cannot show is listed with the reason, and stays as in --like. Logs need commands and raw velocities.
 
     Example: airflock identify logs/*.ulg --heard heard.csv --like vasarhelyi_2018/real_6ms --out mine.toml
     """
@@ -77,7 +77,9 @@ def identify(
             files, scenario, heard=packets, standing=ground, same_clock=same_clock, options=reading, accept=accept or ()
         )
     if out is not None and not result.settings():
-        raise AirflockError("\n".join([f"{out}: not written: these logs tell no number", *_reasons(result)]))
+        raise AirflockError(
+            "\n".join([f"{out}: not written: no number can be identified from these logs", *_reasons(result)])
+        )
     check = _checked(result, flights, as_json)
     if out is not None:
         from airflock.evolve.folder import write
@@ -135,7 +137,9 @@ def _table(result: Any) -> None:
         console.print(_numbers_table(result))
         console.print("not identified, kept from --like:")
     else:
-        console.print(f"{result.logs.drones} drones: these logs tell no number; all are kept from --like:")
+        console.print(
+            f"{result.logs.drones} drones: no number can be identified from these logs; all are kept from --like:"
+        )
     for line in _reasons(result):
         console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
     for key, reason in NEVER.items():
@@ -184,7 +188,7 @@ def _verdicts(check: Any, result: Any, flights: int) -> None:
         line = f"  {name} {tables.number(own)} in [{low:.4g}, {high:.4g}] {verdict}"
         console.print(line, highlight=False, markup=False)
     if not result.comparable:
-        console.print("  distances are left out: nothing says that the clocks agree (--same-clock)")
+        console.print("  distances are left out: it is not known whether the clocks agree (--same-clock)")
 
 
 def _card(result: Any) -> None:

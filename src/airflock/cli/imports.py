@@ -21,12 +21,14 @@ Map = Annotated[
     list[str] | None,
     typer.Option("--map", metavar="TARGET:=COLUMNS", help="For instance x:=pos_e or t:=time_us*1e-6; repeatable."),
 ]
-Unit = Annotated[str, typer.Option(metavar="UNIT", help="Of lengths that bring none: m, cm, mm, km, ft, px.")]
+Unit = Annotated[str, typer.Option(metavar="UNIT", help="Unit of lengths that have none: m, cm, mm, km, ft, px.")]
 Scale = Annotated[float | None, typer.Option(help="Metres per pixel.", show_default=False)]
-TimeUnit = Annotated[str, typer.Option(metavar="UNIT", help="Of times that bring none: s, ms, us, ns, min, frames.")]
-Fps = Annotated[float | None, typer.Option(help="Frames per second, where frames are counted.", show_default=False)]
+TimeUnit = Annotated[
+    str, typer.Option(metavar="UNIT", help="Unit of times that have none: s, ms, us, ns, min, frames.")
+]
+Fps = Annotated[float | None, typer.Option(help="Frames per second, if the file counts frames.", show_default=False)]
 Axes = Annotated[
-    str, typer.Option(help="enu, or ned where x is north and z down.", show_default="enu; ned of fields of PX4")
+    str, typer.Option(help="enu, or ned where x is north and z down.", show_default="enu; ned for fields of PX4")
 ]
 SameClock = Annotated[bool, typer.Option("--same-clock", help="The clocks of all files agree.")]
 Accept = Annotated[
@@ -34,7 +36,7 @@ Accept = Annotated[
     typer.Option(metavar="KIND", help="Keep what looks wrong: absent, axes, down, duplicates, height, jumps, time."),
 ]
 Decimal = Annotated[str, typer.Option(help="Decimal point of a text file: . or ,")]
-Delimiter = Annotated[str, typer.Option(help="Between columns of a text file.", show_default="found out")]
+Delimiter = Annotated[str, typer.Option(help="Separator between columns of a text file.", show_default="detected")]
 
 
 def mapped(pairs: list[str] | None) -> dict[str, str]:
@@ -63,17 +65,19 @@ def import_tracks(
     scale: Scale = None,
     time_unit: TimeUnit = "",
     fps: Fps = None,
-    keypoint: Annotated[str, typer.Option(help="Which one, where a file has several.")] = "",
+    keypoint: Annotated[str, typer.Option(help="Keypoint to use, if a file has several.")] = "",
     axes: Axes = "",
     origin: Annotated[
-        str, typer.Option(metavar="LAT,LON[,HEIGHT]", help="Of the local frame.", show_default="the first fix")
+        str, typer.Option(metavar="LAT,LON[,HEIGHT]", help="Origin of the local frame.", show_default="the first fix")
     ] = "",
     rate: Annotated[
         float | None, typer.Option(help="Frames per second of the recording.", show_default="the tracks'")
     ] = None,
-    bridge: Annotated[float, typer.Option(help="Longest gap that is bridged, s; longer ones leave one absent.")] = 1.0,
-    begin: Annotated[float | None, typer.Option(help="First instant kept, s.", show_default=False)] = None,
-    end: Annotated[float | None, typer.Option(help="Last instant kept, s.", show_default=False)] = None,
+    bridge: Annotated[
+        float, typer.Option(help="Longest gap to bridge, s; in longer gaps the individual counts as absent.")
+    ] = 1.0,
+    begin: Annotated[float | None, typer.Option(help="First instant to keep, s.", show_default=False)] = None,
+    end: Annotated[float | None, typer.Option(help="Last instant to keep, s.", show_default=False)] = None,
     same_clock: SameClock = False,
     accept: Accept = None,
     decimal: Decimal = ".",
@@ -84,7 +88,7 @@ def import_tracks(
     r"""Turn flight logs and animal tracks into a recording that every other verb takes.
 
     Columns are recognised by their headers (x \[mm], time_us, vel_e, location-lat, ...), or mapped. Positions, signs,
-    units, clocks, duplicates, jumps and gaps are checked; each fault is one line that says what to write instead.
+    units, clocks, duplicates, jumps and gaps are checked; each fault is one line, which says what to write instead.
 
     Example: airflock import drone*.csv --map t:=time_us*1e-6 --map x:=pos_e --map y:=pos_n --map id:=file --same-clock
     """
@@ -166,7 +170,7 @@ def export(
     recording: Annotated[Path, typer.Argument(metavar="FILE.nc", help="A recording.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help=".csv, .parquet or .nc (movement).")],
     layout: Annotated[
-        Layout, typer.Option(help="Of .nc: movement of today or up to 0.16; of .csv: a PX4 log.")
+        Layout, typer.Option(help="For .nc: for current movement, or up to 0.16; for .csv: as a PX4 log.")
     ] = Layout.MOVEMENT,
 ) -> None:
     """Write a recording for other tools: a long table with units in its headers, or a dataset of movement.

@@ -26,25 +26,27 @@ def infer(
     models: Annotated[
         str,
         typer.Option(
-            "--models", metavar="LAW,FILE,...", help="Laws by name, presets, scenario files, files with own laws."
+            "--models",
+            metavar="LAW,FILE,...",
+            help="Laws by name, presets, scenario files, or files with laws of your own.",
         ),
     ] = LAWS,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario of the law found.")
+        Path | None, typer.Option("--out", "-o", metavar="FILE.toml", help="Scenario to write, with the law found.")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Force maps: the tracks' and each law's.")
+        Path | None, typer.Option(metavar="FILE.png", help="Draw force maps of the tracks and of each law.")
     ] = None,
     changes: options.Set = None,
     flights: Annotated[int, typer.Option("--check", min=0, help="Flights to compare with the tracks; 0: none.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of the search for the best fit.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search for the best fit.")] = 0,
     trust: options.Trust = False,
     as_json: options.Json = False,
 ) -> None:
-    """Find which flocking law explains tracks, with which numbers, and how much it misses.
+    """Find which flocking law explains tracks best, with which numbers, and what it leaves unexplained.
 
-    Each law is fitted by the likelihood of the next frame and judged on parts that it has not seen: neighbouring spans
-    of one recording, or whole recordings where there are several. --set says what is known of the place, for all laws.
+    Each law is fitted by the likelihood of the next frame and judged on data that it has not seen: neighbouring spans
+    of one recording, or whole recordings where there are several. --set gives what is known of the place, for all laws.
 
     Example: airflock infer fish.nc --models couzin_2002,reynolds_1987,vicsek_1995 --out best.toml --plot forces.png
     """
@@ -123,7 +125,8 @@ def _table(result: Any) -> None:
     console = Console()
     console.print(table)
     console.print(
-        "gain: log-likelihood of held-out steps above going straight on; AIC: of the fit, below it", highlight=False
+        "compared with going straight on: gain in log-likelihood of held-out steps; AIC of the fit, negative is better",
+        highlight=False,
     )
     console.print(result.verdict, style="bold", highlight=False, markup=False)
 

@@ -15,7 +15,7 @@ def presets(
         str | None, typer.Argument(metavar="PRESET", help="Show one preset in full.", show_default=False)
     ] = None,
     for_speed: Annotated[
-        float | None, typer.Option(min=0.1, max=100.0, help="Starting set for this speed, m/s.")
+        float | None, typer.Option(min=0.1, max=100.0, help="Print a starting set for this speed, m/s.")
     ] = None,
     as_json: options.Json = False,
 ) -> None:
@@ -87,9 +87,7 @@ def _validate(name: str, changed: dict[str, Any], law: str | None, trust: bool) 
 
 
 def doctor(
-    clear: Annotated[
-        bool, typer.Option("--clear-cache", help="Remove all compiled drivers, and do nothing else.")
-    ] = False,
+    clear: Annotated[bool, typer.Option("--clear-cache", help="Only remove all compiled drivers.")] = False,
     as_json: options.Json = False,
 ) -> None:
     """Show versions, cores, extras, GPUs and cache, and fly a ten-second self-check on each device.

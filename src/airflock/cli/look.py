@@ -26,8 +26,8 @@ class Kind(StrEnum):
     RECEPTION = "reception"
 
 
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending decides the format.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the flight, where a scenario is flown.")]
+Out = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="File to write; its ending sets the format.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the flight, if a scenario is flown.")]
 Begin = Annotated[float | None, typer.Option(help="First instant shown, s.", show_default="see the picture's title")]
 End = Annotated[float | None, typer.Option(help="Last instant shown, s.", show_default="the end")]
 
@@ -47,7 +47,7 @@ def plot(
 ) -> None:
     """Draw trajectories coloured by speed, a long-exposure picture, order parameters over time, or a model's rules.
 
-    In a city, forest or mesh: paths through the scene from above or in space, rays of one agent, share flocked. Also
+    In a city, forest or mesh: paths through the scene from above or in space, one agent's rays, share flocked. Also
     the time since the last packet by distance: --kind reception.
 
     Example: airflock plot vasarhelyi_2018/real_8ms --kind series --out course.png
@@ -79,14 +79,17 @@ def video(
     space: Annotated[
         bool | None,
         typer.Option(
-            "--space/--above", help="Seen obliquely, buildings solid; or from above.", show_default="as flown"
+            "--space/--above", help="View at an angle with solid buildings, or from above.", show_default="as flown"
         ),
     ] = None,
     chart: Annotated[
-        str, typer.Option(metavar="NAME", help="An order parameter over time beside the picture.", show_default=False)
+        str,
+        typer.Option(
+            metavar="NAME", help="Show this order parameter over time beside the picture.", show_default=False
+        ),
     ] = "",
-    fps: Annotated[int, typer.Option(min=1, max=120, help="Pictures per second.")] = 25,
-    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Times real time.")] = 10.0,
+    fps: Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")] = 25,
+    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Speed relative to real time.")] = 10.0,
     changes: options.Set = None,
     law: options.Law = None,
     trust: options.Trust = False,
@@ -127,9 +130,9 @@ def replay(
         "flight.html"
     ),
     seed: Seed = 0,
-    rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Frames per second that are kept at most.")] = 10.0,
+    rate: Annotated[float, typer.Option(min=0.1, max=100.0, help="Most frames kept per second.")] = 10.0,
     colour: Annotated[
-        str, typer.Option(metavar="NAME", help="By speed, heading, agent, cluster, group, fault or a variable.")
+        str, typer.Option(metavar="NAME", help="Colour by speed, heading, agent, cluster, group, fault or a variable.")
     ] = "speed",
     changes: options.Set = None,
     law: options.Law = None,
@@ -137,7 +140,7 @@ def replay(
     agents: options.Agents = None,
     duration: options.Duration = None,
 ) -> None:
-    """Write a flight as one HTML file that plays in any browser, from disk and without network.
+    """Write a flight as one HTML file that plays in any browser, from disk and without a network.
 
     Example: airflock replay flight.nc --html show.html --colour cluster
     """

@@ -14,13 +14,13 @@ from airflock.suffixes import suffix_fault
 from airflock.untrusted import from_outside, is_file, toml_value
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-COMPILING = "compiling … (once for this kind of flight; later ones begin at once)"
+COMPILING = "compiling … (only once for this kind of flight; later flights start at once)"
 Where = Annotated[
     str, typer.Argument(metavar="PRESET|FILE", help="A preset's name or a scenario file.", show_default=False)
 ]
 Set = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change any key, for instance model.p_rep=0.14; repeatable."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change any key, such as model.p_rep=0.14; repeatable."),
 ]
 Seeds = Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of flights, with seeds 0, 1, 2, ...")]
 FirstSeed = Annotated[int, typer.Option(min=0, help="Seed of the first flight.")]
@@ -28,14 +28,18 @@ Agents = Annotated[int | None, typer.Option(help="Number of agents.", show_defau
 Duration = Annotated[
     str | None,
     typer.Option(
-        metavar="TIME", help="Time flown, such as 10min; a plain number is in s.", show_default="the scenario's"
+        metavar="TIME", help="Length of a flight, such as 10min; a plain number is in s.", show_default="the scenario's"
     ),
 ]
-Threads = Annotated[int | None, typer.Option(min=1, help="Flights side by side.", show_default="one per core")]
+Threads = Annotated[
+    int | None, typer.Option(min=1, help="Number of flights flown at the same time.", show_default="one per core")
+]
 Precision = Annotated[int, typer.Option(help="Bits per number: 32 or 64.")]
-Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (no compiler, for debuggers).")]
+Device = Annotated[str, typer.Option(help="auto, cpu, cuda (an NVIDIA GPU) or python (not compiled, for debugging).")]
 Scheduler = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on the workers of this dask scheduler.")]
-Trust = Annotated[bool, typer.Option("--trust", help="Run the code that a file names: a law, fitness functions.")]
+Trust = Annotated[
+    bool, typer.Option("--trust", help="Allow the Python code that a file names to run: a law, fitness functions.")
+]
 Law = Annotated[
     str | None,
     typer.Option(metavar="NAME|FILE.py", help="Fly this law instead of the scenario's.", show_default=False),
@@ -125,7 +129,7 @@ def writable(*outputs: tuple[Path | None, tuple[str, ...]], reads: Sequence[str 
         elif path.is_dir() or not os.access(folder, os.W_OK):
             faults.append(f"{path}: cannot be written")
         elif path.exists() and any(is_file(read) and path.samefile(read) for read in reads if read is not None):
-            faults.append(f"{path}: is read here, and would be lost; give another file to write")
+            faults.append(f"{path}: is an input and would be overwritten; give another file to write")
     refuse(faults)
 
 

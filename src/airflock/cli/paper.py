@@ -12,15 +12,15 @@ from airflock.cli import options, tables
 def paper(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A publication, for instance vasarhelyi_2018; or all.")],
     only: Annotated[
-        str | None, typer.Option(help="One part only, for instance s2 or fig1.", show_default="all")
+        str | None, typer.Option(help="Recompute only this part, for instance s2 or fig1.", show_default="all")
     ] = None,
-    quick: Annotated[bool, typer.Option(help="A coarse form with few seeds.")] = False,
+    quick: Annotated[bool, typer.Option(help="Use the small form, with few seeds.")] = False,
     seeds: Annotated[int | None, typer.Option(min=2, help="Flights per number.", show_default="the paper's")] = None,
     breaks: Annotated[
-        bool, typer.Option(help="Make the change that must turn each claim red, and judge it again.")
+        bool, typer.Option(help="For each claim, make the change that must turn it red, and judge it again.")
     ] = False,
     keep: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Of all: where what is done is kept.", show_default="the cache")
+        Path | None, typer.Option(metavar="DIR", help="For all: folder for finished work.", show_default="the cache")
     ] = None,
     threads: options.Threads = None,
     as_json: options.Json = False,
@@ -29,9 +29,9 @@ def paper(
 
     Needs pip install airflock-papers; in a clone of the repository: pip install -e ./papers
 
-    `all --quick` flies the small form of every paper and fails if a verdict is not the committed one of this kind of
-    processor. `all --breaks` makes the change of every claim and fails if one that is committed as turned red no longer
-    is.
+    `all --quick` flies the small form of every paper, and fails if a verdict differs from the one committed for this
+    kind of processor. `all --breaks` makes the change of every claim, and fails if a claim that was committed as turned
+    red stays green.
 
     Example: airflock paper vasarhelyi_2018 --quick --only s2
     """
@@ -83,7 +83,7 @@ def _all(
             typer.echo(f"{row.paper} {row.id}: {told}{why}")
         typer.echo(f"{len(rows)} claims in their small form, {len(changed)} of another verdict than the committed one")
         if any(row.elsewhere for row in changed):
-            typer.echo("Another kind of processor flies other flights of the same seeds; a few may judge otherwise.")
+            typer.echo("On another kind of processor the same seeds give other flights; a few verdicts may differ.")
     if not all(row.elsewhere for row in changed):
         raise typer.Exit(1)
 

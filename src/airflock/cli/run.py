@@ -30,7 +30,7 @@ def run(
     save: options.SaveFile = None,
     plot: options.PlotFile = None,
 ) -> None:
-    """Fly a scenario and print its order parameters, beside the paper's where there are any.
+    """Fly a scenario and print its order parameters, next to those of the paper if it gives any.
 
     Example: airflock run vasarhelyi_2018/4ms --seeds 20 --set radio.delay=0.5 --plot flight.png
     """
@@ -115,17 +115,23 @@ def score(
         Path | None, typer.Option(metavar="FILE.csv", help="Also write the order parameters over time.")
     ] = None,
     aero: Annotated[
-        bool, typer.Option("--aero", help="Measure the power that the geometry saves; --set wing.span=... and so on.")
+        bool,
+        typer.Option(
+            "--aero",
+            help="Measure the power saved by flying in each other's upwash; set the wing with --set wing.span=...",
+        ),
     ] = False,
-    groups: Annotated[bool, typer.Option("--groups", help="Each group of the scenario, and each two of them.")] = False,
+    groups: Annotated[
+        bool, typer.Option("--groups", help="Measure each group of the scenario, and each pair of groups.")
+    ] = False,
     body_length: Annotated[
         float | None,
-        typer.Option(metavar="METRES", help="Of tracks: length of a body, by which it is judged who is near."),
+        typer.Option(metavar="METRES", help="For tracks: length of a body, which sets what counts as near."),
     ] = None,
 ) -> None:
     """Measure recordings, simulated or flown, with the same order parameters.
 
-    Tracks bring no scenario: what depends on a length (collisions, clusters) is told where it is given.
+    Tracks have no scenario: what depends on a length (collisions, clusters) is shown only if you give it.
 
     Example: airflock score fish.nc --body-length 0.04 --series course.csv
     """

@@ -22,7 +22,7 @@ def sweep(
         typer.Option(
             "--over",
             metavar="KEY=VALUES",
-            help="Values as a list a,b,c or a range low:high:count; repeat for a grid.",
+            help="Values to fly, as a list a,b,c or a range low:high:count; repeat for a grid.",
             show_default=False,
         ),
     ],
@@ -40,7 +40,7 @@ def sweep(
     as_json: options.Json = False,
     table: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Write one row per flight.")] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one).")
+        Path | None, typer.Option(metavar="FILE.png", help="Draw a heat map (two keys) or a line (one key).")
     ] = None,
     show: Annotated[
         str | None,

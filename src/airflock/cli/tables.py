@@ -81,7 +81,9 @@ def score_table(
         table.add_row(*cells, unit, meaning)
     Console().print(table)
     if untold:
-        Console().print(f"not told, as there is nothing to measure: {', '.join(untold)}", style="dim", soft_wrap=True)
+        Console().print(
+            f"not shown, because there is nothing to measure: {', '.join(untold)}", style="dim", soft_wrap=True
+        )
 
 
 def _untold(key: str, mean: Any) -> bool:

@@ -16,7 +16,9 @@ def tune(
         list[str],
         typer.Argument(metavar="FILE|PRESET|LOGS", help="Your drones, field and speed; or logs, with --like."),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of everything.", show_default=False)],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for all results.", show_default=False)
+    ],
     budget: Annotated[str, typer.Option(metavar="TIME", help="Time to spend, such as 20min or 2h.")] = "20min",
     limit: Annotated[
         list[str] | None,
@@ -24,22 +26,24 @@ def tune(
             "--limit",
             "-l",
             metavar="LIMIT",
-            help="As in certify; repeatable. Search, hardening and certificate hold to it.",
+            help="As in certify; repeatable. Search, hardening and certificate all use it.",
             show_default="collisions and contacts with walls at 0.01/h each",
         ),
     ] = None,
-    confidence: Annotated[float, typer.Option(help="Of the certificate.")] = 0.95,
+    confidence: Annotated[float, typer.Option(help="Confidence of the certificate.")] = 0.95,
     like: Annotated[
         str | None,
-        typer.Option(metavar="PRESET|FILE", help="Tune logs: whose law, field and speed.", show_default=False),
+        typer.Option(
+            metavar="PRESET|FILE", help="For logs: the scenario with their law, field and speed.", show_default=False
+        ),
     ] = None,
     heard: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="Packets of the logs, as identify takes them.")
+        Path | None, typer.Option(metavar="FILE.csv", help="For logs: their packets, as in identify.")
     ] = None,
     warm: Annotated[
-        bool, typer.Option("--warm", help="Search from the scaled numbers on, not from the middle of all ranges.")
+        bool, typer.Option("--warm", help="Start the search at the scaled numbers, not in the middle of all ranges.")
     ] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue what is in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the work in the folder.")] = False,
     changes: options.Set = None,
     trust: options.Trust = False,
     agents: options.Agents = None,
@@ -49,9 +53,10 @@ def tune(
 ) -> None:
     """Start, evolve, harden, certify, report: tuned.toml to fly, certificate.toml, and report.html to sign.
 
-    Numbers of the law that the file does not give are scaled to its speed. Exit status 1 where a limit is not shown.
+    Numbers of the law that the file leaves out are scaled to its speed. Exit status 1 if a limit is not shown.
 
-    Of logs, the numbers of the drones are identified first (more options: airflock identify, then tune what it writes).
+    From logs, the numbers of the drones are identified first. For more options, run airflock identify and tune the
+    file that it writes.
 
     Example: airflock tune mine.toml --budget 20min --out tuned
     """
@@ -63,9 +68,9 @@ def tune(
     with gathering(faults):
         seconds = options.time_of(budget)
     if like is None and (len(scenario) > 1 or heard is not None):
-        faults.append(f"{', '.join(scenario)}: one scenario is tuned; of logs, give --like PRESET")
+        faults.append(f"{', '.join(scenario)}: give one scenario to tune; with logs, give --like PRESET")
     elif like is None and Path(scenario[0]).suffix != ".toml" and Path(scenario[0]).is_file():
-        faults.append(f"{scenario[0]}: is not a scenario file (.toml); of logs, give --like PRESET")
+        faults.append(f"{scenario[0]}: is not a scenario file (.toml); with logs, give --like PRESET")
     else:
         with gathering(faults):
             base = load(like or scenario[0], options.settings(changes, agents, duration), trust=trust)

@@ -19,7 +19,7 @@ def types(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    r"""Find misspelled parameters and wrong records in rules of your own; nothing of the files runs.
+    r"""Find misspelled parameters and wrong records in rules of your own; no code in the files is run.
 
     The argument names of a rule say what it is given, so no annotations are needed. Needs mypy: pip install
     'airflock\[types]'.

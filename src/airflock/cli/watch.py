@@ -14,7 +14,7 @@ def watch(
         str,
         typer.Argument(
             metavar="PRESET|FILE",
-            help="A preset, a scenario file or a recording (.nc), flown again; or a flight card (.json): its fleet.",
+            help="A preset, a scenario file, a recording (.nc) to fly again, or the flight card (.json) of a fleet.",
         ),
     ],
     changes: options.Set = None,
@@ -24,27 +24,30 @@ def watch(
     agents: options.Agents = None,
     against: Annotated[
         list[str] | None,
-        typer.Option(metavar="PRESET|FILE|KEY=VALUE", help="Fly this beside it, same seed and noise; keys may repeat."),
+        typer.Option(
+            metavar="PRESET|FILE|KEY=VALUE",
+            help="Fly this beside it, with the same seed and noise; repeatable for keys.",
+        ),
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes any free one.")] = 8080,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 picks a free one.")] = 8080,
     radio: Annotated[
         list[str] | None,
         typer.Option(
             metavar="PORT",
-            help="Of a fleet: where its packets are heard; repeatable.",
-            show_default="udp:127.0.0.1:14600, as of airflock fleet --card",
+            help="For a fleet: where to receive its packets; repeatable.",
+            show_default="udp:127.0.0.1:14600, as airflock fleet --card uses",
         ),
     ] = None,
     key: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Of a fleet: the mission's key.", show_default="beside the card, .key"),
+        typer.Option(metavar="FILE", help="For a fleet: the mission's key.", show_default="beside the card, .key"),
     ] = None,
 ) -> None:
-    """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what was found.
+    """Open a page that flies a scenario live: play it, turn its sliders, select agents, save what you found.
 
-    Two laws or sets of parameters fly side by side with --against. Of a flight card it shows the fleet that carries
-    it, in software or in the air, by the packets that a radio hears; it sends nothing.
+    With --against, two laws or sets of parameters fly side by side. Given a flight card, the page shows its fleet, in
+    software or in the air, from the packets that a radio receives; it sends nothing.
 
     Example: airflock watch vasarhelyi_2018/4ms --agents 50 --against radio.delay=3
 

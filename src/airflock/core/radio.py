@@ -39,7 +39,12 @@ class Packets(Parameters):
         meaning="probability of losing a packet at the distance loss_at; grows with the square of the distance",
     )
     loss_at: float = quantity(
-        80.0, "m", low=0.1, high=1e6, source="authors' program", meaning="distance at which loss is meant"
+        80.0,
+        "m",
+        low=0.1,
+        high=1e6,
+        source="authors' program",
+        meaning="distance at which a packet is lost with probability loss",
     )
 
 

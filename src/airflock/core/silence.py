@@ -24,10 +24,10 @@ class Parameters(Record):
 
     rule: str = choice(
         "fly_on", ("fly_on", "stop"), source=OURS,
-        meaning="an agent forgets whom it does not hear any more; or it stops while such a neighbour could be near",
+        meaning="an agent forgets a neighbour that it no longer hears; or it stops while that neighbour could be near",
     )  # fmt: skip
     keep: float = quantity(
-        5.0, "m", low=0.0, high=1000.0, source=OURS, meaning="distance that a lost neighbour is not to come within"
+        5.0, "m", low=0.0, high=1000.0, source=OURS, meaning="smallest distance to keep from a lost neighbour"
     )
     patience: float | None = quantity(
         None, "s", low=0.0, high=600.0, source=OURS,
@@ -41,11 +41,11 @@ class Parameters(Record):
     )  # fmt: skip
     hold: float = quantity(
         0.5, "1/s", low=0.0, high=10.0, source=OURS,
-        meaning="speed per distance at which an agent that stopped goes back to where it stopped",
+        meaning="speed, per distance, at which an agent that has stopped returns to the place where it stopped",
     )  # fmt: skip
     pause: float = quantity(
         1.0, "s", low=0.0, high=60.0, source=OURS,
-        meaning="an agent that stopped goes on once nobody whom it had lost could have been near for so long",
+        meaning="an agent that has stopped goes on once no lost neighbour could have been near for this long",
     )  # fmt: skip
     forget: float = quantity(
         20.0, "s", low=0.0, high=3600.0, source=OURS, meaning="age of data after which a neighbour is given up"

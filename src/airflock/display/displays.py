@@ -28,7 +28,7 @@ def display(
     Parameters
     ----------
     shapes : sequence of str
-        Images, meshes (stl, obj, glb) or texts, one after another.
+        Images, meshes (stl, obj, glb) or texts, shown one after another.
     drones : int
         Number of drones.
     failing : float
@@ -38,7 +38,7 @@ def display(
     points : int, optional
         Points of a shape; by default one per drone.
     spacing : float
-        Least distance of two points, m.
+        Smallest distance between two points, m.
     seed : int
         Seed of failures and noise.
     settings : mapping, optional

@@ -143,7 +143,7 @@ class _Trial:
             if float(table["fitness"].max()) < ZERO:
                 told = {name: values.tolist() for name, values in table.items()}
                 rows = [dict(zip(told, row, strict=True)) for row in zip(*told.values(), strict=True)]
-                raise ScenarioError([f"{scenario.name}: does not fly, so there is nothing to harden{why_zero(rows)}"])
+                raise ScenarioError([f"{scenario.name}: does not fly, so it cannot be hardened{why_zero(rows)}"])
 
     def _fly(self, parameters: Mapping[str, float], seeds: Sequence[int]) -> list[Table]:
         return [flown(each, [parameters], seeds, self.threads, self.done)[0] for each in self.scenarios]
@@ -169,7 +169,7 @@ class _Trial:
             table = self._fly(parameters, self.seeds)
             broken = self._broken(self.optimum, table)
             gains = _gains(together(self.table), together(table)) or self._short(table) < self._short(self.table)
-            verdict = broken or ("kept" if gains else "undone: gains neither distance nor room at walls")
+            verdict = broken or ("kept" if gains else "undone: gains no distance and no room at walls")
             kept = verdict == "kept"
             named = replace(step, name=name)
             found.append(
@@ -196,7 +196,7 @@ class _Trial:
         parameters = self.kept[-1][1]
         was, now = (together(_joined(rounds)) for rounds in (before, after or before))
         left = [step.name for step, _ in self.kept[1:]]
-        said = f"kept: {', '.join(left)}" if left else "nothing was kept: the optimum as it was"
+        said = f"kept: {', '.join(left)}" if left else "no step was kept: the optimum is unchanged"
         return replace(against(was, now, Step("on fresh seeds", {}, said), parameters), verdict=said, kept=bool(left))
 
     def _lasting(self, before: list[list[Table]]) -> list[list[Table]]:

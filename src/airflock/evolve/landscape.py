@@ -13,12 +13,12 @@ FEWEST = 40  # candidates of which that can be said
 ZERO = 1e-6  # a product of partial fitnesses below this does not fly
 # partial fitness → what it says if it is zero, and what may be changed
 ADVICE = {
-    "f_speed": "the flock is too slow: lower model.v_flock, or fewer agents, walls and obstacles",
-    "f_coll": "agents collide: fewer agents, a larger arena, a smaller metrics.r_coll, or a shorter radio.delay",
-    "f_disc": "agents are out of everybody's range: raise radio.range, or a smaller arena",
-    "f_cluster": "the flock falls apart: raise radio.range or metrics.r_cluster, or a smaller arena",
-    "f_wall": "agents leave the arena or enter obstacles: lower model.v_flock, a larger arena, or raise metrics.r_tol",
-    "f_corr": "neighbours do not fly the same way: a shorter radio.delay, less noise, or lower model.v_flock",
+    "f_speed": "the flock is too slow: lower model.v_flock, or take fewer agents, walls and obstacles",
+    "f_coll": "agents collide: take fewer agents, a larger arena, a smaller metrics.r_coll, or a shorter radio.delay",
+    "f_disc": "agents are too far from all others: raise radio.range, or take a smaller arena",
+    "f_cluster": "the flock falls apart: raise radio.range or metrics.r_cluster, or take a smaller arena",
+    "f_wall": "agents leave the arena or enter obstacles: lower model.v_flock, raise metrics.r_tol, or take more room",
+    "f_corr": "neighbours do not fly the same way: lower radio.delay, the noise or model.v_flock",
 }
 
 
@@ -47,7 +47,7 @@ def dead(study: Study, rows: Sequence[Mapping[str, Any] | None]) -> str:
         return ""
     if max(float(row["fitness"]) for row in sound) >= ZERO:
         return ""
-    return f"nothing flies, so nothing is best{why_zero(sound)}"
+    return f"no candidate flies, so there is no best one{why_zero(sound)}"
 
 
 def flights(store: Store) -> list[Mapping[str, Any]]:

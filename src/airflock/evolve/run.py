@@ -154,7 +154,7 @@ def study_of(
         beside = [*(key for key, value in asked.items() if value), *(search_keys or {})]
         if beside:
             said = ", ".join(beside)
-            raise StudyError(f"{said}: a Study that is made says this itself; give a preset, a file or a Scenario")
+            raise StudyError(f"{said}: a Study object sets this itself; give a preset, a file or a Scenario")
         return what
     by_hand, search_keys = search_keys or {}, fast_keys(search_keys or {}, limits=bool(limit)) if fast else search_keys
     given = {"space": space, "objective": objective, "over_scenarios": over_scenarios}

@@ -38,10 +38,10 @@ class Search(Record):
         source=S6,
         meaning="CMA-ES; a binary genetic algorithm; NSGA-II or NSGA-III (Pareto fronts)",
     )
-    population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates of a generation")
-    generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations of a run")
+    population: float = quantity(100, "1", low=2, high=1e6, source=S6, meaning="candidates per generation")
+    generations: float = quantity(150, "1", low=1, high=1e6, source=S6, meaning="generations per run")
     seeds: float = quantity(
-        1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights of a candidate"
+        1, "1", low=1, high=1e5, source="Results: one simulation a candidate", meaning="flights per candidate"
     )
     late_seeds: float = quantity(
         0,
@@ -49,7 +49,7 @@ class Search(Record):
         low=0,
         high=1e5,
         source="our choice; docs/decisions/0121",
-        meaning="flights of a candidate in the last generation; they grow from seeds on, after three tenths of all",
+        meaning="flights per candidate in the last generation; they grow from seeds on, after three tenths of all",
     )
     random_numbers: str = choice(
         "fresh",
@@ -64,7 +64,7 @@ class Search(Record):
         meaning="whether candidates of several seeds that cannot reach the better half of a generation fly on",
     )
     restarts: float = quantity(
-        0, "1", low=0, high=1000, source="our choice", meaning="independent further runs after the first"
+        0, "1", low=0, high=1000, source="our choice", meaning="further independent runs after the first"
     )
     growth: float = quantity(
         1.0,
@@ -118,11 +118,18 @@ class Search(Record):
         source="our choice; docs/decisions/0097",
         meaning="with limits: how many times rarer than allowed an event is to look",
     )
-    seed: float = quantity(0, "1", low=0, high=2**20, source="our choice", meaning="decides all chance of the study")
-    precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits of a number in a flight")
+    seed: float = quantity(
+        0, "1", low=0, high=2**20, source="our choice", meaning="seed of everything random in the study"
+    )
+    precision: str = choice("32", ("32", "64"), source="our choice", meaning="bits per number in a flight")
     top: float = quantity(20, "1", low=0, high=1e4, source="our choice", meaning="best candidates that are flown again")
     pool: float = quantity(
-        200, "1", low=0, high=1e6, source="our choice", meaning="candidates that race for the top; 0: the luckiest win"
+        200,
+        "1",
+        low=0,
+        high=1e6,
+        source="our choice",
+        meaning="candidates that race for the top; 0: no race, the luckiest win",
     )
     final_seeds: float = quantity(
         100, "1", low=2, high=1e6, source="Results: 100 stochastic simulations", meaning="fresh flights of each of them"

@@ -60,7 +60,7 @@ def validate(
         same, differences = fly_again(load_recording(name), law, settings, trust=trust)
         if not same:
             told = "".join(f"\n{text}: {line}" for line in differences)
-            reason = "see below" if differences else "although nothing that should matter differs"
+            reason = "see below" if differences else "although nothing relevant differs"
             raise AirflockError(f"{text}: flown again, the positions differ, {reason}{told}")
         return Valid("flown again with the same bits", tuple(differences))
     if is_study(text):

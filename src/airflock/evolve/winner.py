@@ -300,7 +300,7 @@ def finalists(
     else:
         chosen = np.arange(min(top, len(known)))
     if not len(chosen) and not centres:
-        raise StudyError("search.top = 0 leaves nobody to fly again; give at least 1")
+        raise StudyError("search.top = 0 leaves no candidate to fly again; give at least 1")
     return np.array([*centres, *_points(store, known.iloc[chosen])]), ["mean"] * len(centres) + ["top"] * len(chosen)
 
 

@@ -1,4 +1,4 @@
-"""Battery: the agent grows weaker, and lands when the battery is empty: from then on it is absent."""
+"""Battery: the agent grows weaker, and lands when the battery is empty; from then on it is absent."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ class Parameters(Record):
         60.0, "s", low=0.0, high=1e6, source="our choice", meaning="time from the warning to the landing"
     )
     share: float = quantity(
-        0.5, "1", low=0.0, high=1.0, source="our choice", meaning="what is left of the acceleration at the end"
+        0.5, "1", low=0.0, high=1.0, source="our choice", meaning="share of the acceleration that is left at the end"
     )
 
 

@@ -14,7 +14,7 @@ class Parameters(Record):
     north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="drift towards the north")
     up: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="drift upwards")
     grows: float = quantity(
-        60.0, "s", low=0.0, high=1e6, source="our choice", meaning="time after which the error grows no more"
+        60.0, "s", low=0.0, high=1e6, source="our choice", meaning="time after which the error stops growing"
     )
 
 

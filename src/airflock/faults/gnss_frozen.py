@@ -1,4 +1,4 @@
-"""GNSS frozen: the receiver goes on telling the last position; the agent believes it, and sends it to the others."""
+"""GNSS frozen: the receiver keeps reporting its last position; the agent believes it, and sends it to the others."""
 
 
 def sense(vx, vy, vz, at_x, at_y, at_z):

@@ -1,4 +1,4 @@
-"""GNSS spoofed: a stranger's signal makes the agent believe a track of its own, which it sends to the others."""
+"""GNSS spoofed: a false signal makes the agent believe another track, which it also sends to the others."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,15 @@ from airflock.core.parameters import quantity
 class Parameters(Record):
     """A straight track from the place where the fault began."""
 
-    east: float = quantity(3.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the track")
-    north: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="the same, north")
-    up: float = quantity(0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="the same, up")
+    east: float = quantity(
+        3.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, east"
+    )
+    north: float = quantity(
+        0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, north"
+    )
+    up: float = quantity(
+        0.0, "m/s", low=-100.0, high=100.0, source="our choice", meaning="velocity of the false track, up"
+    )
 
 
 def sense(at_x, at_y, at_z, since, f):

@@ -11,7 +11,7 @@ class Parameters(Record):
     """A weak motor."""
 
     share: float = quantity(
-        0.3, "1", low=0.0, high=1.0, source="our choice", meaning="what is left of the acceleration"
+        0.3, "1", low=0.0, high=1.0, source="our choice", meaning="share of the acceleration that is left"
     )
 
 

@@ -1,4 +1,4 @@
-"""Pretender: the agent knows where it is and tells the others another place."""
+"""Pretender: the agent knows where it is, but sends the others another position."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ class Parameters(Record):
     """Where it pretends to be, from where it is."""
 
     east: float = quantity(20.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, east")
-    north: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="the same, north")
-    up: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="the same, up")
+    north: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, north")
+    up: float = quantity(0.0, "m", low=-1e4, high=1e4, source="our choice", meaning="pretended offset, up")
 
 
 def tell(x, y, z, vx, vy, vz, f):

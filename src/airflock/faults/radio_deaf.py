@@ -1,4 +1,4 @@
-"""Radio deaf: the agent hears nobody any more; the others hear it."""
+"""Radio deaf: the agent no longer hears the others; they still hear it."""
 
 
 def radio(reach):

@@ -1,4 +1,4 @@
-"""Radio frozen: the radio repeats the packet of the moment at which it got stuck, stamped anew."""
+"""Radio frozen: the radio repeats its last packet from before it got stuck, each time with a new time stamp."""
 
 
 def tell(at_x, at_y, at_z, at_vx, at_vy, at_vz):

@@ -1,4 +1,4 @@
-"""Radio silent: nobody hears the agent any more; it hears the others."""
+"""Radio silent: the others no longer hear the agent; it still hears them."""
 
 
 def radio(reach):

@@ -1,4 +1,4 @@
-"""Stuck: the autopilot goes on following the command of the moment at which it lost its computer."""
+"""Stuck: the autopilot keeps following the last command from before it lost its computer."""
 
 
 def overrule(at_cx, at_cy, at_cz):

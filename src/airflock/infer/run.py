@@ -50,7 +50,7 @@ def infer(
     check : int
         Flights of the law found that are compared with the tracks; 0: none.
     seed : int
-        Of the search for the best fit.
+        Seed of the search for the best fit.
     trust : bool
         Whether laws in files may run.
     done : callable, optional

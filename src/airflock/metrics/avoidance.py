@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 REPORTS = {
     "avoiding": ("", "share of agents whose way ahead is not free"),
-    "n_avoid": ("", "avoidances begun per agent"),
+    "n_avoid": ("", "number of avoidances begun, per agent"),
     "rays": ("", "rays cast per agent and decision"),
 }
 

@@ -7,7 +7,7 @@ counts once, and again only after a separation.
 
 from typing import NamedTuple
 
-REPORTS = {"phi_coll": ("", "collision risk"), "n_coll": ("", "collisions")}
+REPORTS = {"phi_coll": ("", "share of pairs in contact (collision risk)"), "n_coll": ("", "number of collisions")}
 
 CLOCK = "collision"
 VIOLATES = {"renumbering": "of two that meet, the one with the higher index begins the event, if nobody was near it"}

@@ -5,7 +5,7 @@ Self pairs are excluded, as in the authors' program; a lone agent and an agent a
 
 from typing import NamedTuple
 
-REPORTS = {"phi_corr": ("", "velocity correlation within clusters"), "n_min": ("", "smallest cluster")}
+REPORTS = {"phi_corr": ("", "velocity correlation within clusters"), "n_min": ("", "size of the smallest cluster")}
 
 REDUCE = {"smallest": "min"}
 

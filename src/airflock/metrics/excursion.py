@@ -10,7 +10,7 @@ from typing import NamedTuple
 from airflock.core.maths import FAR
 
 REPORTS = {
-    "phi_wall": ("m", "mean excursion of those outside"),
+    "phi_wall": ("m", "mean excursion of agents that are outside"),
     "clearance": ("m", "smallest distance to walls and obstacles; below 0: outside"),
 }
 

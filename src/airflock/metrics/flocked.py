@@ -10,7 +10,7 @@ from airflock.core.maths import FAR
 
 REPORTS = {
     "flocked": ("", "share of agents within metrics.r_flock of the flock's centre"),
-    "time_to_flock": ("s", "until all are flocked for the first time"),
+    "time_to_flock": ("s", "time until all agents are flocked for the first time"),
 }
 
 OVER_TIME = {"time_to_flock": "min"}

@@ -15,15 +15,15 @@ from typing import NamedTuple
 from airflock.metrics.quality import angle_from, offset_from
 
 REPORTS = {
-    "n_groups": ("", "groups of two and more"),
-    "share_alone": ("", "share of agents alone"),
-    "share_largest": ("", "share in the largest group"),
+    "n_groups": ("", "number of groups of two or more agents"),
+    "share_alone": ("", "share of agents that are alone"),
+    "share_largest": ("", "share of agents in the largest group"),
     "extension_groups_cm": ("cm", "extension within groups"),
     "polarization_groups_deg": ("deg", "polarization within groups"),
     "cns_ext_groups": ("", "consistency in extension within groups"),
     "cns_pol_groups": ("", "consistency in polarization within groups"),
     "quality_groups": ("", "quality of groups"),
-    "local_density": ("1/m² or 1/m³", "agents around an agent"),
+    "local_density": ("1/m² or 1/m³", "density of agents around an agent"),
 }
 
 REDUCE = {"nearest2": "min", "largest": "max"}

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from airflock.core.maths import norm
 
-REPORTS = {"milling": ("", "rotation about the own centre, 1 is a mill")}
+REPORTS = {"milling": ("", "rotation about the group's own centre, 1 is a mill")}
 
 
 class Agent(NamedTuple):

@@ -7,8 +7,8 @@ from airflock.core.maths import FAR
 
 REPORTS = {
     "r_min_mean": ("m", "mean distance to the nearest neighbour"),
-    "r_min": ("m", "smallest distance of two agents"),
-    "n_disc": ("", "disconnected agents"),
+    "r_min": ("m", "smallest distance between two agents"),
+    "n_disc": ("", "number of disconnected agents"),
 }
 
 REDUCE = {"nearest2": "min", "least": "min"}  # of Pair, and of Agent

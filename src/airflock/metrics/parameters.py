@@ -24,7 +24,7 @@ class Parameters(Record):
     )
     stop: str = choice(
         "never", ("never", "collision"), source="Dimock & Selig 2003: a collision halts the simulation",
-        meaning="what ends a flight before its time; order parameters are those until then",
+        meaning="what ends a flight early; order parameters are then measured up to that moment",
     )  # fmt: skip
     fitness: str = choice(
         "paper", ("paper", "sound"), source="Dimock & Selig 2003, Eq. 10, and its future work",
@@ -35,12 +35,19 @@ class Parameters(Record):
         meaning="agents in collision that quality counts: each that has another within r_b; or those that the authors' "
         "program marks, which skips the pairs of agents marked before and so misses some in chains",
     )  # fmt: skip
-    t_settle: float = quantity(10.0, "s", low=0.0, high=1e6, source="our choice", meaning="a formation is settled then")
+    t_settle: float = quantity(
+        10.0, "s", low=0.0, high=1e6, source="our choice", meaning="time by which a formation counts as settled"
+    )
     v_settle: float = quantity(
-        0.25, "m/s", low=0.0, high=100.0, source="our choice", meaning="it is if unrest is below this"
+        0.25, "m/s", low=0.0, high=100.0, source="our choice", meaning="unrest below which a formation counts as stable"
     )
     r_safe: float = quantity(
-        1.0, "m", low=0.0, high=1e4, source="our choice: two thirds of a span", meaning="nearer birds crowd each other"
+        1.0,
+        "m",
+        low=0.0,
+        high=1e4,
+        source="our choice: two thirds of a span",
+        meaning="distance below which birds crowd each other",
     )
     period: float = quantity(
         0.2, "s", low=0.0, high=600.0, meaning="time between samples; 0: every step dt", source="our choice"
@@ -48,7 +55,9 @@ class Parameters(Record):
     collision_period: float | None = quantity(
         None, "s", low=0.0001, high=600.0, meaning="time between checks for collisions; by default every step dt"
     )
-    r_coll: float = quantity(3.0, "m", low=0.0, high=1000.0, source=METHODS, meaning="nearer pairs collide")
+    r_coll: float = quantity(
+        3.0, "m", low=0.0, high=1000.0, source=METHODS, meaning="distance below which two agents collide"
+    )
     r_flock: float = quantity(
         20.0, "m", low=0.0, high=1e6, source="our choice, because Kidger halves a diameter without a number",
         meaning="an agent is flocked within this distance of the flock's centre",
@@ -63,7 +72,7 @@ class Parameters(Record):
         low=0.0,
         high=1e6,
         source="Eq. 12",
-        meaning="nearer agents belong to one cluster; by default the model's",
+        meaning="distance below which two agents belong to one cluster; by default the model's",
     )
     r_comm: float | None = quantity(
         None,
@@ -71,7 +80,7 @@ class Parameters(Record):
         low=0.0,
         high=1e8,
         source=METHODS,
-        meaning="an agent with nobody nearer is disconnected; by default radio.range",
+        meaning="an agent with no neighbour within this distance is disconnected; by default radio.range",
     )
     v_flock: float | None = quantity(
         None,
@@ -90,7 +99,7 @@ class Parameters(Record):
         low=1e-6,
         high=1000.0,
         source=f"{ZAPOTECATL}, Eq. 18",
-        meaning="boids collide when their centres are nearer",
+        meaning="distance of centres below which boids collide",
     )
     max_e: float | None = quantity(
         None,

@@ -12,9 +12,9 @@ from airflock.aero.wing import profile_drag, segments_of
 
 REPORTS = {
     "power": ("W", "mean power per bird"),
-    "power_most": ("W", "power of the bird that spends most, mean over time"),
+    "power_most": ("W", "power of the bird that uses most, averaged over time"),
     "power_solo": ("W", "power of a bird alone"),
-    "saving": ("", "share of its power that flying together saves a bird"),
+    "saving": ("", "share of power that a bird saves by flying together"),
 }
 VIOLATES = {"rotation": "forward is along x, in a frame that flies along (wing.frame)"}
 REDUCE = {"most": "max"}

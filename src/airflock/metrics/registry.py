@@ -117,7 +117,7 @@ POWER = {"metrics.kind": "dimock", "metrics.fitness": "sound"}  # settings that 
 GOALS = {
     "goals_reached": ("", "goals reached by the flock's centre"),
     "goals": ("", "goals given"),
-    "time_to_goal": ("s", "when each was reached"),
+    "time_to_goal": ("s", "time at which each was reached"),
 }
 
 
@@ -218,7 +218,7 @@ def numbers_of(found: MetricSet, q: Any, goals: bool = False) -> tuple[str, ...]
     return tuple(dict.fromkeys((*own, *found.reports)))
 
 
-PRESENCE = {"present": ("", "share of individuals and instants that a recording holds")}
+PRESENCE = {"present": ("", "share of all individuals and instants for which the recording has data")}
 
 
 def reports(found: MetricSet) -> dict[str, tuple[str, str]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 REPORTS = {
     "crowding": ("", "mean over birds of the squared shares by which others are nearer than r_safe"),
-    "unrest": ("m/s", "RMS velocity against the flock's mean, after t_settle"),
+    "unrest": ("m/s", "RMS velocity relative to the flock's mean, after t_settle"),
     "stable": ("", "1 if unrest is below v_settle"),
 }
 

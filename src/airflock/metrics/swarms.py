@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 REPORTS = {
-    "n_clusters": ("", "sub-swarms, stragglers included"),
-    "n_stragglers": ("", "agents alone"),
+    "n_clusters": ("", "number of sub-swarms, stragglers included"),
+    "n_stragglers": ("", "number of agents that are alone"),
 }
 
 

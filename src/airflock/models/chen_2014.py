@@ -30,22 +30,27 @@ OURS = "our choice"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Role, and strengths of what drives prey and predators."""
+    """The role of an agent, and the strengths of the forces on prey and predators."""
 
     role: str = choice("prey", ("prey", "predator"), source=PAPER, meaning="whether an agent is hunted or hunts")
-    k_rep: float = quantity(
-        1.0, "m^2/s", low=0.0, high=1e6, source=f"{PAPER}: 1", meaning="repulsion of prey by its fellows"
-    )
-    k_att: float = quantity(1.0, "1/s", low=0.0, high=1e6, source=OURS, meaning="attraction of prey by its fellows (a)")
+    k_rep: float = quantity(1.0, "m^2/s", low=0.0, high=1e6, source=f"{PAPER}: 1", meaning="repulsion between prey")
+    k_att: float = quantity(1.0, "1/s", low=0.0, high=1e6, source=OURS, meaning="attraction between prey (a)")
     k_flee: float = quantity(
         0.2, "m^2/s", low=0.0, high=1e6, source=OURS, meaning="repulsion of prey by a predator (b)"
     )
     v_hunt: float = quantity(
         0.4, "m/s", low=0.0, high=1e4, source=OURS, meaning="speed at which prey at r_hunt draws a predator (c)"
     )
-    r_hunt: float = quantity(1.0, "m", low=1e-6, high=1e6, source="the unit of length", meaning="distance of v_hunt")
+    r_hunt: float = quantity(
+        1.0, "m", low=1e-6, high=1e6, source="the unit of length", meaning="distance to which v_hunt refers"
+    )
     decay: float = quantity(
-        3.0, "1", low=1.0, high=10.0, source=OURS, meaning="how fast that falls with distance: as r^(1 - decay) (p)"
+        3.0,
+        "1",
+        low=1.0,
+        high=10.0,
+        source=OURS,
+        meaning="how fast the pull of prey falls with distance: as r^(1 - decay) (p)",
     )
     v_max: float = quantity(100.0, "m/s", low=0.0, high=1e4, source=OURS, meaning="largest speed")
 

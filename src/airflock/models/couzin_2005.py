@@ -31,13 +31,17 @@ PAPER = "Couzin et al. 2005, as commonly told"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Radii of avoidance and of company, what an informed animal prefers and how much, and the error."""
+    """Radii of avoidance and attraction, the preferred direction of informed animals and its weight, and the error."""
 
-    alpha: float = quantity(1.0, "m", low=0.0, high=1e4, source=PAPER, meaning="distance below which one is avoided")
-    rho: float = quantity(6.0, "m", low=0.0, high=1e4, source=PAPER, meaning="distance up to which one is followed")
+    alpha: float = quantity(
+        1.0, "m", low=0.0, high=1e4, source=PAPER, meaning="distance below which a neighbour is avoided"
+    )
+    rho: float = quantity(
+        6.0, "m", low=0.0, high=1e4, source=PAPER, meaning="distance up to which a neighbour is followed"
+    )
     omega: float = quantity(
         0.0, "1", low=0.0, high=100.0, usual=(0.0, 1.0), source=PAPER,
-        meaning="weight of the preferred direction against that of the others; 0 of who is not informed",
+        meaning="weight of the preferred direction relative to that of the others; 0 for uninformed animals",
     )  # fmt: skip
     direction: float = quantity(
         0.0, "rad", low=-2.0 * math.pi, high=2.0 * math.pi, source="our choice: east",

@@ -60,10 +60,18 @@ class Parameters(Record):
     r_c: float = quantity(10.171176, "m", low=1e-3, high=1e5, source=f"{BEST}: 33.37 ft", meaning="range of cohesion")
     r_a: float = quantity(1.072896, "m", low=1e-3, high=1e5, source=f"{BEST}: 3.52 ft", meaning="range of avoidance")
     v_max: float = quantity(
-        1000.0, "m/s", low=0.0, high=1e4, source="our choice: the paper has none", meaning="largest demand"
+        1000.0,
+        "m/s",
+        low=0.0,
+        high=1e4,
+        source="our choice: the paper has none",
+        meaning="largest velocity that the law demands",
     )
     cohesion: str = choice(
-        "C1", ("C1", "C3", "C7", "C0", "C2", "C5", "C6"), source="Eq. 1, illegible", meaning="how it grows with |X|"
+        "C1",
+        ("C1", "C3", "C7", "C0", "C2", "C5", "C6"),
+        source="Eq. 1, illegible",
+        meaning="how cohesion grows with |X|",
     )
     centroid: str = choice(
         "n", ("n", "others", "weights"), source="Eq. 2, illegible", meaning="what divides the weighted sum of positions"

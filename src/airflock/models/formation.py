@@ -24,20 +24,29 @@ OURS = "our choice, for drones that stand 3 m apart"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Gains of the way to the own point, and of what keeps drones apart."""
+    """Gains for flying to a point, and for keeping drones apart."""
 
     v_max: float = quantity(6.0, "m/s", low=0.1, high=100.0, source=OURS, meaning="largest commanded speed")
     p_goal: float = quantity(1.0, "1/s", low=0.01, high=10.0, source=OURS, meaning="gain of the braking curve")
-    a_goal: float = quantity(2.0, "m/s^2", low=0.01, high=50.0, source=OURS, meaning="its deceleration")
+    a_goal: float = quantity(
+        2.0, "m/s^2", low=0.01, high=50.0, source=OURS, meaning="deceleration of the braking curve"
+    )
     r0_rep: float = quantity(2.4, "m", low=0.0, high=100.0, source=OURS, meaning="repulsion range")
     p_rep: float = quantity(2.5, "1/s", low=0.0, high=20.0, source=OURS, meaning="repulsion gain")
     r0_frict: float = quantity(
-        1.2, "m", low=0.0, high=100.0, source=OURS, meaning="where two drones that near each other shall have stopped"
+        1.2,
+        "m",
+        low=0.0,
+        high=100.0,
+        source=OURS,
+        meaning="distance at which two drones that approach each other must have stopped",
     )
     c_frict: float = quantity(0.8, "1", low=0.0, high=10.0, source=OURS, meaning="coefficient of alignment")
     r0_wall: float = quantity(2.0, "m", low=0.0, high=100.0, source=OURS, meaning="range of obstacles")
     p_wall: float = quantity(2.5, "1/s", low=0.0, high=20.0, source=OURS, meaning="gain of obstacles")
-    turn: float = quantity(0.7, "1", low=-10.0, high=10.0, source=OURS, meaning="share of that push to the side")
+    turn: float = quantity(
+        0.7, "1", low=-10.0, high=10.0, source=OURS, meaning="sideways push, as a share of the push from obstacles"
+    )
 
 
 class Sums(NamedTuple):

@@ -58,7 +58,7 @@ class Parameters(Record):
     r_cohes: float = quantity(40.0, "m", low=0.0, high=1000.0, source=FINAL, meaning="radius of cohesion")
     r_ray: float = quantity(20.0, "m", low=0.01, high=1000.0, source=INSPECTOR, meaning="length of a ray")
     speed: float = quantity(60.0, "m/s", low=0.01, high=1000.0, source=f"{FINAL}: 1 per frame", meaning="drone speed")
-    accel: float = quantity(1.01, "1", low=1.0, high=10.0, source=FINAL, meaning="growth of the speed per frame")
+    accel: float = quantity(1.01, "1", low=1.0, high=10.0, source=FINAL, meaning="increase of the speed per frame")
     gravity: float = quantity(0.0, "m/s", low=0.0, high=1000.0, source=f"{FINAL}: none", meaning="constant sinking")
     s_obst: float = quantity(1.0, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of obstacle avoidance")
     s_sep: float = quantity(0.25, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of separation")
@@ -66,7 +66,7 @@ class Parameters(Record):
     s_align: float = quantity(0.125, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of alignment")
     s_goal: float = quantity(0.25, "1", low=-100.0, high=100.0, source=FINAL, meaning="scale of the goal; < 0: repels")
     s_prev: float = quantity(1.0, "1", low=0.0, high=100.0, source=FINAL, meaning="scale of the previous movement")
-    rays: float = quantity(1000.0, "1", low=1.0, high=1e6, source=INSPECTOR, meaning="rays that may be cast at most")
+    rays: float = quantity(1000.0, "1", low=1.0, high=1e6, source=INSPECTOR, meaning="largest number of rays cast")
     most: float = quantity(3.0, "1", low=1.0, high=6.0, source="our choice", meaning="oracles heard in scheme 4")
     radius: float = quantity(0.5, "m", low=0.0, high=100.0, source="our choice", meaning="radius of a boid")
     margin: float = quantity(0.1, "m", low=0.0, high=100.0, source="our choice", meaning="added to the radius of casts")
@@ -80,7 +80,9 @@ class Parameters(Record):
     )
     cast: str = choice("swept", ("swept", "thin"), source="ours; the thesis", meaning="cast spheres or thin rays")
     ahead: str = choice("suggested", ("suggested", "movement"), source="4.6.2; 4.2", meaning="where rays start")
-    first: str = choice("axis", ("axis", "point"), source="ours; the thesis", meaning="what of the spiral lies ahead")
+    first: str = choice(
+        "axis", ("axis", "point"), source="ours; the thesis", meaning="which part of the spiral points ahead"
+    )
     fan: str = choice("space", ("space", "plane"), source="4.6; 4.2", meaning="spiral of rays, or left and right")
 
 

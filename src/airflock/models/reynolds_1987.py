@@ -51,7 +51,7 @@ class Parameters(Record):
     r_a: float = quantity(0.30, "m", low=0.0, high=1000.0, source="Fig. 8", meaning="radius of alignment")
     r_c: float = quantity(0.50, "m", low=0.0, high=1000.0, source=TABLE, meaning="radius of cohesion")
     r_floor: float = quantity(
-        0.015, "m", low=0.0, high=100.0, source=PROGRAM, meaning="nearer boids act in all behaviours"
+        0.015, "m", low=0.0, high=100.0, source=PROGRAM, meaning="distance below which boids act in all behaviours"
     )
     fov_s_deg: float = quantity(360.0, "deg", low=0.0, high=360.0, source=TABLE, meaning="field of view, separation")
     fov_a_deg: float = quantity(360.0, "deg", low=0.0, high=360.0, source=TABLE, meaning="field of view, alignment")

@@ -85,7 +85,7 @@ class Parameters(Record):
         "rescale",
         ("rescale", "cap"),
         source="Eq. 11 and the authors' program",
-        meaning="length of the desired velocity: always v_flock, or the sum capped at v_max as printed",
+        meaning="length of the desired velocity: always v_flock; or that of the sum, capped at v_max, as printed",
     )
 
 

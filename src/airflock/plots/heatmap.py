@@ -52,11 +52,11 @@ def heatmap(
     if len(keys) == 1:
         _line(axes, table, keys[0], value)
         style.dress(axes, labels[0], shown)
-        details = f"mean ± SD of {per_point} flights a point"
+        details = f"mean ± SD of {per_point} flights per point"
     else:
         _map(figure, axes, table, keys, value, shown)
         style.dress(axes, labels[0], labels[1], grid=False)
-        details = f"mean of {per_point} flights a cell"
+        details = f"mean of {per_point} flights per cell"
     style.heading(axes, name_of(scenario) if scenario else f"{value} over {', '.join(keys)}", details)
     return figure
 

@@ -136,7 +136,7 @@ def _standing(panel: Axes, found: Identified) -> None:
     """Variogram of the velocity on the ground, with that of the fitted error."""
     ground, value = found.logs.grounded(), found.sensors.value
     if len(ground.time) < 50 or not np.isfinite(value["noise"]):
-        _empty(panel, "nobody stood on the ground")
+        _empty(panel, "no drone stood on the ground")
         return
     step, run = ground.step, np.cumsum(ground.new)
     lags, seen = [], []

@@ -57,7 +57,7 @@ def plot(
         formation of wings; reception, the time since the last packet by distance; rules of a model;
         transfer, the partial fitnesses.
     seed : int
-        Seed of the flight, where a scenario is flown.
+        Seed of the flight, if a scenario is flown.
     start, stop : float, optional
         Window of time, s; which one is shown otherwise stands in the picture's title.
     settings : mapping, optional

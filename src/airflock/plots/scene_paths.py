@@ -57,7 +57,7 @@ def through(
     if scenario is None:
         raise RecordingError("recording: tracks have no scene; plot its trajectories")
     if space and shown.position.shape[1] == 2:
-        raise RecordingError("recording: was flown in a plane; look at it from above")
+        raise RecordingError("recording: was flown in a plane; draw it from above")
     figure, axes = style.place(ax, 7.4, 5.4 if space else 6.0)
     scale = Normalize(*speed_range(shown))
     goals = scenario.waypoints()
@@ -71,7 +71,7 @@ def through(
         low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
         _stars(axes, goals[:, :2][((goals[:, :2] >= low) & (goals[:, :2] <= high)).all(axis=1)])
         if heights is not None and shown.position.shape[1] == 3:
-            style.colour_bar(figure, heights, axes, "height of what stands (m)", shrink=0.8)
+            style.colour_bar(figure, heights, axes, "height of the scene (m)", shrink=0.8)
     bar = ScalarMappable(scale, style.SPEED)
     style.colour_bar(figure, bar, axes, "speed (m/s)", shrink=0.6 if space else 0.8)
     style.legend(axes, above=True)

@@ -141,7 +141,7 @@ def rotations(
     for number, (label, recording) in enumerate(flights.items()):
         course = _window(over_time(recording), start, stop)
         if "phi_lap" not in course:
-            raise RecordingError(f"{label}: has no phi_lap, as tracks do not say about which point they turn")
+            raise RecordingError(f"{label}: has no phi_lap, because tracks do not say which point they turn about")
         _rotation(axes, course, style.LINES[number % len(style.LINES)], label, Pen(course, 0.0))
     style.legend(axes, columns=len(flights), above=True)
     return figure

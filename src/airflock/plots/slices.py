@@ -53,8 +53,8 @@ def slices(
             style.dress(axes, *labels, grid=False)
             axes.tick_params(labelbottom=row == n - 1, labelleft=column == 0, labelsize=style.SMALL - 2.0)
     if mesh is not None:
-        style.colour_bar(figure, mesh, grid.ravel().tolist(), f"best {objective} in a cell")
-    style.overall(figure, what or "Pairwise slices", "grey: nobody was there; cross: chosen")
+        style.colour_bar(figure, mesh, grid.ravel().tolist(), f"best {objective} in each cell")
+    style.overall(figure, what or "Pairwise slices", "grey: no candidate there; cross: chosen")
     return style.root(figure)
 
 

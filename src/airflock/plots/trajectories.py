@@ -89,7 +89,7 @@ def trajectories(
         _in_space(axes, shown, world)
     else:
         _from_above(axes, shown, world)
-    said = details_of(recording, shown) + (" · each agent in a colour of its own" if way == "agent" else "")
+    said = details_of(recording, shown) + (" · each agent in its own colour" if way == "agent" else "")
     if space and ax is None:
         style.overall(figure, name_of(recording), said)
     else:

@@ -92,9 +92,9 @@ def wash(recording: xr.Dataset, *, start: float | None = None, ax: Axes | None =
     """
     scenario, shown = flown_with(recording), paths_of(recording)
     if scenario is None or shown.position.shape[1] == 2:
-        raise RecordingError("recording: wings fly in space, and their scenario says which wings they are")
+        raise RecordingError("recording: the wash needs a scenario with wings that fly in space")
     if shown.agents > MOST:
-        raise RecordingError(f"recording: of {shown.agents} birds; the wash of at most {MOST} is drawn")
+        raise RecordingError(f"recording: has {shown.agents} birds; the wash can be drawn for at most {MOST}")
     frame = len(shown.times) - 1 if start is None else int(np.abs(shown.times - start).argmin())
     found = formation_at(scenario, shown.position[frame], shown.velocity[frame])
     span = float(scenario.wing.span)

@@ -16,10 +16,16 @@ class Parameters(Packets):
     / (1 + outage_rate · outage_time).
     """
 
-    outage_rate: float = quantity(0.1, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often a good link fails")
-    outage_time: float = quantity(2.0, "s", low=0.001, high=1e4, source=OURS, meaning="mean time that it stays bad")
-    received_good: float = quantity(0.98, "1", low=0.0, high=1.0, source=OURS, meaning="received share while good")
-    received_bad: float = quantity(0.0, "1", low=0.0, high=1.0, source=OURS, meaning="received share while bad")
+    outage_rate: float = quantity(
+        0.1, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often a good link turns bad"
+    )
+    outage_time: float = quantity(2.0, "s", low=0.001, high=1e4, source=OURS, meaning="mean time that a link stays bad")
+    received_good: float = quantity(
+        0.98, "1", low=0.0, high=1.0, source=OURS, meaning="share of packets received while the link is good"
+    )
+    received_bad: float = quantity(
+        0.0, "1", low=0.0, high=1.0, source=OURS, meaning="share of packets received while the link is bad"
+    )
 
 
 class Packet(NamedTuple):

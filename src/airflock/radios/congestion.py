@@ -18,13 +18,13 @@ RATES = ("rate",)
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Packets):
-    """A channel that all agents share. All within `range` of a receiver disturb it, and so does whoever is heard."""
+    """A channel that all agents share. All within `range` of a receiver disturb it, including the one it hears."""
 
     rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=OURS, meaning="packets that each agent sends")
     airtime: float = quantity(0.002, "s", low=0.0, high=1.0, source=OURS, meaning="how long one packet is in the air")
     vulnerable: float = quantity(
         2.0, "1", low=0.0, high=10.0, source=ABRAMSON,
-        meaning="time in which another packet would destroy it, in airtimes: 2 of free senders, 1 in time slots",
+        meaning="time in which another packet would destroy it, in airtimes: 2 for free senders, 1 with time slots",
     )  # fmt: skip
 
 

@@ -17,8 +17,8 @@ OURS = "our choice"
 class Parameters(Packets):
     """A delay with an exponential part. A decision acts on what has come by then."""
 
-    jitter: float = quantity(0.1, "s", low=0.0, high=30.0, source=OURS, meaning="mean of what comes on top of delay")
-    longest: float = quantity(2.0, "s", low=0.0, high=60.0, source=OURS, meaning="most that comes on top of it")
+    jitter: float = quantity(0.1, "s", low=0.0, high=30.0, source=OURS, meaning="mean of the extra delay")
+    longest: float = quantity(2.0, "s", low=0.0, high=60.0, source=OURS, meaning="largest extra delay")
 
 
 def late(u0, k):

@@ -25,10 +25,16 @@ class Parameters(Packets):
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")
-    near: float = quantity(20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="reception is near-perfect below")
-    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="outages begin beyond")
-    received_near: float = quantity(0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="received share below near")
-    received_far: float = quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="received share at far")
+    near: float = quantity(
+        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
+    )
+    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
+    received_near: float = quantity(
+        0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near"
+    )
+    received_far: float = quantity(
+        0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far"
+    )
 
 
 def share(distance, near, far, received_near, received_far):

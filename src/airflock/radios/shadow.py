@@ -15,15 +15,23 @@ OURS = "our choice: a house"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Packets):
-    """One link whose reception depends on the distance and on what stands between, as both agents truly are."""
+    """One link whose reception depends on the true distance of both agents and on what stands between them."""
 
-    near: float = quantity(20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="reception is near-perfect below")
-    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="outages begin beyond")
-    received_near: float = quantity(0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="received share below near")
-    received_far: float = quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="received share at far")
-    wall: float = quantity(20.0, "dB", low=0.0, high=200.0, source=OURS, meaning="lost behind what stands in the world")
+    near: float = quantity(
+        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
+    )
+    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
+    received_near: float = quantity(
+        0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near"
+    )
+    received_far: float = quantity(
+        0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far"
+    )
+    wall: float = quantity(
+        20.0, "dB", low=0.0, high=200.0, source=OURS, meaning="loss of signal behind an obstacle or the scene"
+    )
     exponent: float = quantity(
-        2.0, "1", low=0.5, high=8.0, source="free space", meaning="of the path loss of signals over distance"
+        2.0, "1", low=0.5, high=8.0, source="free space", meaning="exponent of the path loss of signals over distance"
     )
 
 

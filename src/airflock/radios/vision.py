@@ -23,9 +23,17 @@ class Parameters(Packets):
     """Cameras that know the direction to a neighbour well, and its distance less well, by its size in the picture."""
 
     delay: float = quantity(
-        0.1, "s", low=0.0, high=30.0, source=OURS, usual=(0.0, 1.0), meaning="age of a picture when it is understood"
+        0.1,
+        "s",
+        low=0.0,
+        high=30.0,
+        source=OURS,
+        usual=(0.0, 1.0),
+        meaning="age of a picture once it has been processed",
     )
-    range: float = quantity(30.0, "m", low=0.0, high=1e8, source=OURS, meaning="largest distance at which one is seen")
+    range: float = quantity(
+        30.0, "m", low=0.0, high=1e8, source=OURS, meaning="largest distance at which a neighbour is seen"
+    )
     field: float = quantity(
         2.0 * TURN, "rad", low=0.0, high=2.0 * TURN, source=OURS, meaning="horizontal angle of view, about the heading"
     )
@@ -55,10 +63,15 @@ class Parameters(Packets):
         low=0.0,
         high=1e4,
         source=OURS,
-        meaning="how long a neighbour is believed in after it was last seen",
+        meaning="how long a neighbour is remembered after it was last seen",
     )
     still: float = quantity(
-        0.2, "m/s", low=0.0, high=100.0, source=OURS, meaning="speed below which it keeps looking where it looked"
+        0.2,
+        "m/s",
+        low=0.0,
+        high=100.0,
+        source=OURS,
+        meaning="speed below which an agent keeps looking in its last direction",
     )
 
 

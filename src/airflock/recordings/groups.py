@@ -15,9 +15,9 @@ from airflock.recordings.layout import frames_of
 from airflock.recordings.scores import measure, scenario_of
 
 BETWEEN = {
-    "r_centres": ("m", "mean distance of the centres of two groups; nan in a periodic world"),
-    "r_between": ("m", "smallest distance of an agent of one group from one of the other"),
-    "phi_between": ("", "velocity correlation of agents of one group with those of the other"),
+    "r_centres": ("m", "mean distance between the centres of two groups; nan in a periodic world"),
+    "r_between": ("m", "smallest distance between agents of the two groups"),
+    "phi_between": ("", "velocity correlation between agents of the two groups"),
 }
 PART = 200  # instants at once
 

@@ -49,7 +49,7 @@ class Opening:
             raise RecordingError(f"{self.path}: no such file")
         if how == "recording" and self.path.suffix.lower() in FOREIGN:
             raise RecordingError(
-                f"{self.path}: holds tracks, not yet a recording: airflock import {self.path.name} --save FILE.nc"
+                f"{self.path}: holds tracks, not a recording: airflock import {self.path.name} --save FILE.nc"
             )
         self.how = how
         self.limit = LEAST_TIME + self.path.stat().st_size / PACES.get(how, PACE) if limit is None else limit

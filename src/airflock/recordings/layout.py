@@ -126,5 +126,7 @@ def frames_of(found: xr.Dataset, where: str = "recording") -> tuple[NDArray[Any]
         raise RecordingError(f"{where}: the {what} of {name} at t = {times[time]:g} s is infinite")
     present = ~np.isnan(frames).any(axis=1)
     if not present.any():
-        raise RecordingError(f"{where}: nobody is there at any instant: a position or velocity is always missing")
+        raise RecordingError(
+            f"{where}: no individual is present at any instant: a position or velocity is always missing"
+        )
     return frames, period, present

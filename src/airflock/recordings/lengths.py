@@ -80,4 +80,4 @@ def told(found: Mapping[str, tuple[str, ...]]) -> str:
         "--body-length 0.04" if set(keys) & IN_BODIES.keys() else "",
         " ".join(f"--set {key if '.' in key else f'metrics.{key}'}=..." for key in keys),
     )))  # fmt: skip
-    return f"not told, as tracks do not say what is near, fast or the middle: {', '.join(found)}; give {lengths}"
+    return f"not shown, as tracks do not say what is near, fast or the centre: {', '.join(found)}; give {lengths}"

@@ -45,4 +45,4 @@ def refuse_without_files(document: Mapping[str, Any], settings: Mapping[str, Any
         )
     other = [key for key in settings if key not in {f"{section}.kind" for section in own_kinds(document)}]
     if other:
-        raise RecordingError(f"recording: {other[0]}: it is flown again as it was flown, so that no key can change")
+        raise RecordingError(f"recording: {other[0]}: it can only be flown again as it was, so no key can change")

@@ -25,12 +25,12 @@ def remarks(rows: Sequence[Mapping[str, Any]], seeds: Sequence[int]) -> list[str
         hit = sum(row["n_coll"] > 0.0 for row in rows)
         bound = upper_bound(hit, len(rows))
         said.append(
-            f"collisions in {hit} of {len(rows)} flights: with {100.0 * CONFIDENCE:g} % confidence at most "
-            f"{100.0 * bound:.2g} % of such flights have one"
+            f"collisions in {hit} of {len(rows)} flights: with {100.0 * CONFIDENCE:g} % confidence, at most "
+            f"{100.0 * bound:.2g} % of such flights have a collision"
         )
     if all("fitness" in row for row in rows):
         worst, row = min(zip(seeds, rows, strict=True), key=lambda pair: pair[1]["fitness"])
         said.append(
-            f"worst flight: seed {worst}, fitness {row['fitness']:.4g}; airflock plot ... --seed {worst} draws it"
+            f"worst flight: seed {worst}, fitness {row['fitness']:.4g}; draw it with airflock plot ... --seed {worst}"
         )
     return said

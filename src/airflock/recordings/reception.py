@@ -53,7 +53,7 @@ def reception(heard: xr.Dataset | pd.DataFrame, bins: int = BINS) -> pd.DataFram
 def _of_recording(recording: xr.Dataset) -> tuple[NDArray[Any], NDArray[Any]]:
     """Distance (m) and age (s) of every pair at every instant at which both are there."""
     if "age" not in recording:
-        raise RecordingError(f"recording: holds no age of what was heard; {HOW}")
+        raise RecordingError(f"recording: does not hold the age of received data; {HOW}")
     frames, _, present = frames_of(recording)
     axes, agents = frames.shape[1] // 2, frames.shape[2]
     age = recording["age"].transpose("time", "receiver", "sender").values.astype(float)

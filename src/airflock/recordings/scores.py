@@ -124,7 +124,7 @@ def score(
     asked = {"aero": aero, "groups": groups, "body_length": body_length is not None}
     if any(asked.values()):
         names = ", ".join(name for name, given in asked.items() if given)
-        raise RecordingError(f"{names}: needs a recording, such as airflock.simulate(scenario) gives")
+        raise RecordingError(f"{names}: needs a recording, such as one from airflock.simulate(scenario)")
     scenario, numbers = variant(what, settings, trust=trust), sound_seeds(seeds)
     options: dict[str, Any] = {"threads": threads, "precision": precision, "done": done, "device": device, "say": say}
     rows = scores([scenario] * len(numbers), numbers, scheduler=scheduler, **options)

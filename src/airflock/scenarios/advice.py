@@ -56,7 +56,7 @@ def _lengths(scenario: Scenario) -> str:
         return ""
     return (
         f"agents of {model.name} interact within {reach:.3g} m in an arena {2.0 * size:.3g} m across, a factor of "
-        f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are hardly meant"
+        f"{max(reach / (2.0 * size), 2.0 * size / reach):.0f}: the lengths of one of them are probably wrong"
     )
 
 
@@ -70,8 +70,8 @@ def _about_an_edge(scenario: Scenario) -> str:
     if obstacle(q.centre_x, q.centre_y, 0.0, edges, 0, corners).distance < -ON_EDGE:
         return ""
     return (
-        f"phi_lap tells the rotation about ({q.centre_x:g}, {q.centre_y:g}) m, which does not lie inside the arena; "
-        "metrics.centre_x and metrics.centre_y say another point"
+        f"phi_lap measures the rotation about ({q.centre_x:g}, {q.centre_y:g}) m, which does not lie inside the arena; "
+        "set metrics.centre_x and metrics.centre_y to another point"
     )
 
 
@@ -83,7 +83,7 @@ def _unsent(scenario: Scenario) -> str:
     if not told:
         return ""
     return (
-        f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults change nothing: "
+        f"radio.kind = {scenario.transceiver.name!r}: agents send nothing, so these faults have no effect: "
         + ", ".join(kind.name for kind in told)
     )
 
@@ -96,9 +96,9 @@ def _all_met(scenario: Scenario) -> str:
     numbers = [f"topology.{key}" for key in given if key != "kind"]
     if topology.kind == "range" and numbers:
         return (
-            f"topology.kind = 'range' does not read {', '.join(numbers)}: agents meet all whom they hear; name a kind, "
+            f"topology.kind = 'range' does not read {', '.join(numbers)}: agents meet all that they hear; set a kind, "
             "such as topology.kind = 'nearest'"
         )
     if topology.kind in ("nearest", "strongest") and topology.k >= scenario.agents - 1 > 0:
-        return f"topology.k = {topology.k:g}: each of {scenario.agents} agents meets all whom it hears"
+        return f"topology.k = {topology.k:g}: each of {scenario.agents} agents meets all that it hears"
     return ""

@@ -43,13 +43,13 @@ def group_notes(scenario: Scenario) -> list[str]:
         return []
     if not by_cells(scenario):
         endless = next(law.model.name for law in scenario.laws if not _within_reach(law))
-        why = f"{endless} looks without end (it has no reach)"
+        why = f"{endless} sees without limit (it has no reach)"
     else:
         drawn = any(_widest_reach(scenario, law) == math.inf for law in scenario.laws)
         why = "their reach is drawn, in a periodic box" if drawn else "the box is less than two of their reaches wide"
     return [
-        f"groups: {why}, so each of {scenario.agents} agents looks at all others, on one core, and not at those in the "
-        "cells around it, on all cores"
+        f"groups: {why}, so each of {scenario.agents} agents looks at all others, on one core, instead of at those "
+        "in the cells around it, on all cores"
     ]
 
 

@@ -89,7 +89,7 @@ def agent_numbers(given: Any, agents: int) -> list[int]:
     """Numbers of one agent or of several different ones. Raises FlightError in one line."""
     found = [agent_number(number, agents) for number in (given if are_several(given) else [given])]
     if not found:
-        raise FlightError(f"agent = {given!r}: names nobody")
+        raise FlightError(f"agent = {given!r}: names no agent")
     twice = [number for place, number in enumerate(found) if number in found[:place]]
     if twice:
         raise FlightError(f"agent = {given!r}: {twice[0]} is named twice")

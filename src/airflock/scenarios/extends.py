@@ -42,7 +42,7 @@ def _extended(
     if not isinstance(name, str):
         raise ScenarioError([f"{where}: extends = {name!r} is not a name; give a preset or a scenario file"])
     if name in chain or len(chain) > LONGEST:
-        raise ScenarioError([f"{where}: extends = {name!r} comes back to itself: {' → '.join((*chain, name))}"])
+        raise ScenarioError([f"{where}: extends = {name!r} leads back to itself: {' → '.join((*chain, name))}"])
     try:
         base, place = read(name, folder)
     except ScenarioError as fault:

@@ -26,17 +26,17 @@ class Timing(Record):
     """When a fault begins and ends, and how many it hits; beside the numbers of its kind."""
 
     at: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it begins")
-    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends, and no other begins")
-    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; without it, to the end")
+    until: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="when it ends; after that no new one begins")
+    lasts: float | None = quantity(None, "s", low=0.0, high=1e6, meaning="how long it lasts; by default until the end")
     per_hour: float | None = quantity(
-        None, "1", low=0.0, high=1e6, meaning="how often it hits the flock in an hour, at random, instead of at"
+        None, "1", low=0.0, high=1e6, meaning="how often per hour it hits the flock, at random times; give this or at"
     )
     number: float | None = quantity(
         None,
         "1",
         low=1.0,
         high=1e7,
-        meaning="how many it hits at once, drawn; by default all, with per_hour one",
+        meaning="how many agents it hits at once, drawn at random; by default all, or one with per_hour",
     )
 
 
@@ -174,7 +174,7 @@ def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) 
     if (when.at is None) == (when.per_hour is None):
         faults.append(f"{where}: give at, when it begins, or per_hour, how often it comes")
     if when.until is not None and when.lasts is not None and when.at is not None:
-        faults.append(f"{where} says when it ends twice; give until or lasts")
+        faults.append(f"{where} says twice when it ends; give until or lasts")
     if when.at is not None and when.until is not None and when.until <= when.at:
         faults.append(f"{where}.until = {when.until:g} s is not after at = {when.at:g} s")
     if when.number is not None and (when.number != int(when.number) or when.number > may):
@@ -182,5 +182,7 @@ def _when_faults(where: str, when: Timing, kind: Fault, numbers: Any, may: int) 
     if kind.leaves is not None and (when.lasts is not None or (when.at is not None and when.until is not None)):
         given = {"f": kind.record(*(getattr(numbers, name) for name in kind.fields))}
         if kind.leaves(*(given[name] for name in asks(kind.leaves, "leaves", kind.name))) <= 0.0:
-            faults.append(f"{where}: {kind.name} does not end, as who drops out stays out; leave out until and lasts")
+            faults.append(
+                f"{where}: {kind.name} does not end, as an agent that drops out stays out; leave out until and lasts"
+            )
     return faults

@@ -207,5 +207,5 @@ def faults(
             + ("start.separation or start.wall_clearance" if begin.wall_clearance else "start.separation")
         )
     if not found and world.arena == "none" and agents > 1 and begin.kind == "arena":
-        found.append("world.arena = 'none' has no room to start in; give an arena, or start.kind = 'ball'")
+        found.append("world.arena = 'none' has no region to start in; give an arena, or start.kind = 'ball'")
     return found

@@ -133,7 +133,9 @@ def _agents(given: Sequence[Mapping[str, Any]], agents: int) -> tuple[list[tuple
         found[number] = tuple(left)
         if not left:
             faults.append(f"groups[{number}] has no agents, and no agent is left for it")
-    faults += [f"groups[{number}].agents is missing; one group may take those who are left" for number in rest[1:]]
+    faults += [
+        f"groups[{number}].agents is missing; only one group may take the agents that are left" for number in rest[1:]
+    ]
     return found, faults
 
 

@@ -90,7 +90,7 @@ def sections() -> Mapping[str, Section]:
     for name, radio in OTHER_RADIOS.items():
         found = _section(f'radio.kind = "{name}"', "radio", radio.Parameters, name)
         result[name] = found._replace(keys=tuple(key for key in found.keys if _last(key) not in OF_ALL))
-    groups = "Agents that have numbers of their own of the law or the body."
+    groups = "Agents with their own numbers for the law, the body or the sensor."
     result["groups"] = Section("[[groups]]", groups, tuple(_whole("groups")))
     shared = _section("[[faults]]", "faults", Timing)
     result["faults"] = shared

@@ -62,8 +62,8 @@ def place_notes(scenario: Scenario) -> list[str]:
     share = _blocked(scenario)
     if share > CROWDED:
         notes.append(
-            f"start: {share:.0%} of the region lies inside what stands in the scene or nearer than start.clearance = "
-            f"{scenario.start.clearance:g} m; agents start in the rest"
+            f"start: {share:.0%} of the region lies inside the scene or nearer to it than start.clearance = "
+            f"{scenario.start.clearance:g} m; agents start only in the rest"
         )
     if scenario.goals.role == "herd" and not getattr(scenario.parameters, "s_goal", -1.0) < 0.0:
         notes.append("goals.role = 'herd': a flock with model.s_goal >= 0 follows the shepherd instead of fleeing it")

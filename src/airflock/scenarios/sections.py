@@ -29,7 +29,7 @@ class Flight(Record):
         "synchronous",
         ("synchronous", "sequential"),
         source="authors' program of Zapotecatl et al. 2016 (sequential)",
-        meaning="all agents decide and then all move; or one after another, each seeing those before it moved",
+        meaning="all agents decide, then all move; or one after another, each seeing how those before it moved",
     )
     dt: float = quantity(
         0.01, "s", low=1e-6, high=10.0, source="authors' program of Vásárhelyi et al. 2018", meaning="motion step"

@@ -34,5 +34,5 @@ def sound_seeds(seeds: int | Iterable[int]) -> list[int]:
         except TypeError:
             raise ParameterError(f"seeds = {seeds!r} is neither a whole number nor a list of seeds") from None
     if not found:
-        raise ParameterError(f"seeds = {seeds!r}: nothing would be flown; give at least 1")
+        raise ParameterError(f"seeds = {seeds!r}: no flight would be flown; give at least 1")
     return found

@@ -53,7 +53,7 @@ def notes(scenario: Scenario) -> list[str]:
     period, delay = scenario.sensors.period, scenario.radio.delay
     if period > 0.0 and abs(delay / period - round(delay / period)) > 1e-9:
         told.append(
-            f"radio.delay = {delay:g} s is not a multiple of sensors.period = {period:g} s: decisions use the states "
-            "of exactly that long ago, taken between two measurements"
+            f"radio.delay = {delay:g} s is not a multiple of sensors.period = {period:g} s: decisions use "
+            "states exactly that old, which lie between two measurements"
         )
     return told

@@ -113,7 +113,7 @@ def _converted(name: str, given: Any, declared: Declaration) -> tuple[Any, str, 
         return given, "", ""
     note = f"{name} = {_short(value)} {unit} is {with_unit(_short(scaled), declared.unit)}"
     if isinstance(scaled, list):
-        note = f"{name} is converted from {unit} to {declared.unit}"
+        note = f"{name} was converted from {unit} to {declared.unit}"
     return ({**given, "value": scaled, "unit": declared.unit} if long else scaled), note, ""
 
 

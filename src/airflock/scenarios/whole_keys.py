@@ -23,26 +23,28 @@ class Whole(NamedTuple):
 WHOLE_KEYS: Mapping[str, Mapping[str, Whole]] = {
     "": {
         "title": Whole("text", "what the scenario is, for pictures and lists"),
-        "extends": Whole("text", "a preset or a file to begin from; what is not given here is taken from there"),
+        "extends": Whole("text", "a preset or a file to start from; keys that are left out here are taken from it"),
         "published": Whole(
-            "table", "order parameter → mean, [mean, SD] or { mean, sd } that a paper reports; shown beside ours"
+            "table",
+            "what a paper reports: order parameter → mean, [mean, SD] or { mean, sd }; shown beside ours",
         ),
-        "model.kind": Whole("choice", "the law that flies", (*MODELS, OWN)),
+        "model.kind": Whole("choice", "the law that all agents fly by", (*MODELS, OWN)),
         "body.kind": Whole("choice", "what turns commands into motion", (*BODIES, OWN)),
         "sensors.kind": Whole("choice", "how an agent knows its own state", (*SENSORS, OWN)),
     },
     "faults": {
-        "kind": Whole("choice", "what befalls an agent", (*KINDS, OWN)),
-        "agents": Whole("list", "numbers of the agents that it may hit; by default all"),
-        "group": Whole("text", "name of the group that it may hit, instead of agents"),
+        "kind": Whole("choice", "what happens to an agent", (*KINDS, OWN)),
+        "agents": Whole("list", "numbers of the agents that the fault may hit; by default all"),
+        "group": Whole("text", "name of the group that the fault may hit; give this or agents"),
     },
     "groups": {
-        "name": Whole("text", "of the group"),
+        "name": Whole("text", "name of the group"),
         "agents": Whole(
-            "list", 'numbers of its agents, how many, or a share ("20 %"); left out, all who are in no other group'
+            "list",
+            'numbers of its agents, how many, or a share ("20 %"); by default all that are in no other group',
         ),
-        "model": Whole("table", "kind, choices, numbers of its law; { value, spread } for a tolerance"),
-        "body": Whole("table", "numbers of the body that its agents have; { value, spread } for a tolerance"),
-        "sensors": Whole("table", "numbers of the sensor that its agents have; likewise"),
+        "model": Whole("table", "kind, choices and numbers of its law; { value, spread } for a tolerance"),
+        "body": Whole("table", "numbers of its agents' body; { value, spread } for a tolerance"),
+        "sensors": Whole("table", "numbers of its agents' sensor; { value, spread } for a tolerance"),
     },
 }

@@ -96,7 +96,7 @@ def _overlapping(parts: Mapping[str, Any]) -> list[str]:
             if dx < wing.chord and dy < wing.span and dz < THIN * wing.span:
                 return [
                     f"start.spacing_y = {begin.spacing_y:g} m: the wings of agents {i} and {j} overlap by "
-                    f"{wing.span - dy:.3g} m; keep wing.span = {wing.span:g} m aside or wing.chord = {wing.chord:g} m "
-                    "behind"
+                    f"{wing.span - dy:.3g} m; keep wing.span = {wing.span:g} m apart sideways, or wing.chord = "
+                    f"{wing.chord:g} m behind"
                 ]
     return []

@@ -14,7 +14,7 @@ class Parameters(Sampled):
     """A constant delay of the own state, at most four periods."""
 
     lag: float = quantity(
-        0.2, "s", low=0.0, high=60.0, source="our choice", meaning="age of what is known of the own state"
+        0.2, "s", low=0.0, high=60.0, source="our choice", meaning="age of what an agent knows of its own state"
     )
 
 

@@ -29,13 +29,13 @@ class Parameters(Sampled):
         0.0, "m", low=0.0, high=1000.0, source=OURS, meaning="SD of an error that is new at each measurement"
     )
     bias: float = quantity(
-        0.0, "m", low=0.0, high=1000.0, source=OURS, meaning="SD of an error that an agent keeps all flight long"
+        0.0, "m", low=0.0, high=1000.0, source=OURS, meaning="SD of an error that stays the same for the whole flight"
     )
     sd_velocity: float = quantity(
         0.05, "m/s", low=0.0, high=100.0, source=OURS, meaning="SD of the velocity, from Doppler shifts"
     )
     jump_rate: float = quantity(
-        0.0, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often a sound receiver falls into multipath"
+        0.0, "1/s", low=0.0, high=100.0, source=OURS, meaning="how often multipath begins while there is none"
     )
     jump_time: float = quantity(20.0, "s", low=0.0, high=1e5, source=OURS, meaning="how long multipath lasts")
     jump_sd: float = quantity(

@@ -7,7 +7,7 @@ from airflock.core.sensor import Sampled
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Sampled):
-    """A sensor without errors; it only says how often an agent measures, and so decides."""
+    """A sensor without errors; it only sets how often an agent measures, and thus decides."""
 
 
 def exact(s):

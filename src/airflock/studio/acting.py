@@ -54,7 +54,7 @@ class Acting(Room):
 
     def _aim(self) -> None:
         self.aiming = not self.aiming
-        self.said.content = note("click the place where it shall stand" if self.aiming else "")
+        self.said.content = note("click the place where it should stand" if self.aiming else "")
 
     def at(self, origin: NDArray[Any], way: NDArray[Any]) -> None:
         """Throw an obstacle to where a ray meets the plane of the flock."""

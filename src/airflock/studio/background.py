@@ -49,7 +49,7 @@ class Study:
         population: int = 20, generations: int = 20, trust: bool = False,
     ):  # fmt: skip
         if not space:
-            raise StudioError("evolve: the law has no number that could vary")
+            raise StudioError("evolve: the law has no number that can vary")
         self.folder, self.objective, self.generations = folder, objective, generations
         start = folder.with_name(f"{folder.name}_start.toml")
         study = folder.with_name(f"{folder.name}_search.toml")

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from airflock.studio.page import Page
 
 ALONE = (
-    "“Fork here” flies a second flight beside this one, from here on and with the same noise. The controls then act "
-    "on B: what you change is all that differs."
+    "“Fork here” starts a second flight beside this one, from now on and with the same noise. The controls then act "
+    "on B: they differ only in what you change."
 )
 
 

@@ -31,13 +31,13 @@ class Evolving(Room):
         self.found = Progress([], math.nan, {})
         self._looked = 0.0
         with panel.folder("Evolve from here", is_open=False):
-            self.population = panel.number("population", 20, 4, 1000, lambda _: None, "candidates of a generation")
+            self.population = panel.number("population", 20, 4, 1000, lambda _: None, "candidates per generation")
             self.generations = panel.number("generations", 20, 1, 1000, lambda _: None)
             panel.row(
                 {"Start": self.ask(self.start), "Stop": self.ask(self.stop), "Take the best": self.ask(self.take)}
             )
-            self.said = panel.text(note("searches from half of each number of the law to twice it"))
-            self.course = panel.chart("course of the search", ("best so far", "mean"), across="generation")
+            self.said = panel.text(note("searches each number of the law from half to twice its value"))
+            self.course = panel.chart("progress of the search", ("best so far", "mean"), across="generation")
 
     def start(self) -> None:
         """Begin a study around the present scenario. Raises StudioError where one runs or none can."""
@@ -46,7 +46,7 @@ class Evolving(Room):
             raise StudioError("evolve: a study is running; stop it first")
         if side.origin.law is not None:
             raise StudioError(
-                "evolve: a law given by --law has no name in a file; write model.kind into a scenario file"
+                "evolve: a law given by --law is not named in a file; write model.kind into a scenario file"
             )
         scores = side.flight.scores()
         objective = "fitness" if "fitness" in scores else self.page.measuring.name

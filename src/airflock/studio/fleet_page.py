@@ -43,7 +43,7 @@ class FleetPage:
             self.key = panel.text()
             panel.menu(
                 "links", LINKS, LINKS[0], lambda kind: setattr(drawing, "links", kind),
-                "packets that arrive: known of fleets in software; pale where they arrive one way only",
+                "packets that arrive (known only for fleets in software); pale where they arrive one way only",
             )  # fmt: skip
             panel.checkbox("trails", True, action=lambda on: self.ask(lambda: self.drawing.trails.show(on)))
             panel.menu("follow", FOLLOWED, FOLLOWED[0], lambda whom: setattr(drawing, "follow", whom))

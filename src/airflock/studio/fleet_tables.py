@@ -11,11 +11,11 @@ SHOWN = 14  # notes
 MOST = 60  # drones that have a row of their own
 LATE = 10  # datagrams of other keys after which it is said that none fits
 WHY = {
-    "signature": "signed with another key than that of this card's mission",
-    "clock": "of another time: the clocks differ by more than the card allows, or the card's limit is too small",
-    "card": "of another card",
-    "mission": "of another mission",
-    "stranger": "of systems that are no members",
+    "signature": "signed with a different key than this card's mission uses",
+    "clock": "from another time: the clocks differ by more than the card allows, or the card's limit is too small",
+    "card": "from another card",
+    "mission": "from another mission",
+    "stranger": "from systems that are not members",
 }
 SOME = {  # what is said of faults whose amount the ether does not tell
     "loss": "some packets to these drones are lost",
@@ -24,7 +24,7 @@ SOME = {  # what is said of faults whose amount the ether does not tell
     "corrupt": "some packets to these drones arrive with a wrong bit",
     "rogue": "somebody without the key sends packets as these drones, from another place",
     "impostor": "somebody with the key sends packets as these drones, from another place",
-    "battery": "the battery tells another level",
+    "battery": "the battery reports a wrong level",
     "clock": "the node's clock is wrong",
 }
 TABLE = "<table style='width:100%;font-size:0.8em;border-collapse:collapse;text-align:right'>"
@@ -93,5 +93,5 @@ def trouble_of(observer: Observer, now: float) -> str:
     if not observer.accepted and sum(refused.values()) >= LATE:
         return f"{sum(refused.values())} packets were refused, and none believed: {WHY.get(most, most)}"
     if not observer.accepted:
-        return "nothing was heard yet" if now - observer.begun > FRESH else ""
-    return "" if observer.heard(now) else "nobody is heard any more"
+        return "nothing has been heard yet" if now - observer.begun > FRESH else ""
+    return "" if observer.heard(now) else "no drone is heard any more"

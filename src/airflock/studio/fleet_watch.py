@@ -62,7 +62,7 @@ def watch_fleet(
     found, secret, heard = opened(Path(card), Path(key) if key else None, radios)
     try:
         if time.time() >= found.expires:
-            say(f"note: {card} has expired; its drones do not start any more")
+            say(f"note: {card} has expired; its drones no longer start")
         from airflock.studio.fleet_page import FleetPage
         from airflock.studio.view import View
 

@@ -24,7 +24,7 @@ class Opening(Room):
         with self.panel.folder("Open another scenario", is_open=False):
             self.menu = self.panel.menu("preset", (CHOOSE, *sorted(presets())), CHOOSE, self._chosen)
             self.panel.upload(
-                "Open a file (.toml)", ".toml", self._given, "it is kept in the folder in which airflock watch runs"
+                "Open a file (.toml)", ".toml", self._given, "it is saved in the folder where airflock watch runs"
             )
             self.said = self.panel.text()
 
@@ -76,7 +76,7 @@ def scenario_text(name: str, content: bytes) -> str:
     except TextError as fault:
         raise StudioError(f"{name}: {fault}") from fault
     if "\0" in name:
-        raise StudioError(f"{printable(name)}: holds a letter (NUL) that no name of a file may have")
+        raise StudioError(f"{printable(name)}: holds a character (NUL) that no file name may have")
     if not name.lower().endswith(".toml"):
         raise StudioError(f"{name}: is not a scenario file; its name must end with .toml")
     return text

@@ -33,7 +33,7 @@ class Page:
         self.drawing = Drawing(player, view)
         panel = view.panel
         self.title, self.trouble = panel.text(), panel.text()
-        self.rescue = panel.button("Back to the moment before", lambda: player.ask(self._rescued))
+        self.rescue = panel.button("Go back one moment", lambda: player.ask(self._rescued))
         self.rescue.visible = False
         play, tune, measure, compare = panel.tabs("Play", "Tune", "Measure", "Compare")
         with play:

@@ -49,9 +49,9 @@ class Player(Flights):
         if self.failure:
             return self.failure
         if self.compiling:
-            return "compiling … (flying interpreted meanwhile, with other rounding)"
+            return "compiling … (meanwhile flying interpreted, with different rounding)"
         if self.over:
-            return f"no page flies longer than {self.time:g} s; Reset begins anew"
+            return f"a page flies at most {self.time:g} s; Reset starts again"
         return "compiling …" if any(side.flight.waiting for side in self.sides) else self.note
 
     @property

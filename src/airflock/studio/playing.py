@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SOON = 10  # s; how far one press goes back
 BEFORE = 1.0  # s; a jump to a collision ends so long before it
-SPEEDS = {"0.1 ×": 0.1, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0, "20 ×": 20.0, "as fast as it goes": 1e9}
+SPEEDS = {"0.1 ×": 0.1, "0.5 ×": 0.5, "1 ×": 1.0, "2 ×": 2.0, "5 ×": 5.0, "20 ×": 20.0, "as fast as possible": 1e9}
 JUMP = "jump to …"
 
 
@@ -26,14 +26,14 @@ class Playing(Room):
         panel, player, drawing = self.panel, self.player, self.drawing
         self.pause = panel.button("Pause", self.ask(player.toggle), "or the key P")
         panel.row({"Step": self.ask(player.step), f"Back {SOON} s": self.ask(self.back), "Reset": self.ask(self.reset)})
-        self.moment = panel.field("moment (s)", "any time that was flown; what came after it is given up")
+        self.moment = panel.field("moment (s)", "any time already flown; everything after it is discarded")
         panel.row({"Go to this moment": self.ask(self._go)})
         panel.menu("speed", tuple(SPEEDS), "1 ×", lambda chosen: self._speed(SPEEDS[chosen]))
         self.seed = panel.number("seed", player.seed, 0, 2**31, lambda seed: player.ask(lambda: self.reset(seed)))
         most = max(1000, player.flight.agents)
         self.agents = panel.number(
             "agents", player.flight.agents, 1, most, lambda n: player.ask(lambda: self.reset(agents=n)),
-            "another number begins another flight",
+            "another number starts another flight",
         )  # fmt: skip
         self.way = panel.menu(
             "colour by", ways(drawing.flocks), drawing.shading.way, lambda way: setattr(drawing.shading, "way", way)
@@ -42,10 +42,10 @@ class Playing(Room):
         panel.checkbox("trails", True, action=lambda on: player.ask(lambda: drawing.trails.show(on)))
         panel.menu(
             "links", LINKS, drawing.links, lambda kind: setattr(drawing, "links", kind),
-            "to the three nearest, or to all in radio range, paler where packets are lost",
+            "to the three nearest, or to all in radio range; paler where packets are lost",
         )  # fmt: skip
         self.follow = panel.menu("follow", FOLLOWED, FOLLOWED[0], self._follow)
-        self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes to one second before it")
+        self.jump = panel.menu("collisions", (JUMP,), JUMP, self._jump, "goes back to one second before it")
         self.listed = panel.text()
         self._in_menu: list[Collision] = []
         self._camera_of = ""  # which scenario the camera is set for
@@ -130,4 +130,4 @@ class Playing(Room):
             self.jump.options = (JUMP, *dict.fromkeys(map(self._name, collisions)))
             self.jump.value = JUMP
             few = "<br>".join(self._name(c) for c in collisions[:8])
-            self.listed.content = note(f"<b>Nearer than a collision</b><br>{few}") if collisions else ""
+            self.listed.content = note(f"<b>Pairs that collided</b><br>{few}") if collisions else ""

@@ -40,7 +40,7 @@ def difference_table(a: Scenario, b: Scenario) -> str:
     """What two scenarios do not have in common, as HTML."""
     found = differences(a, b)
     if not found:
-        return _table([], "no difference but chance that grew")
+        return _table([], "no difference, only chance that has grown")
     heads = "<tr><th></th><th style='text-align:right'>A</th><th style='text-align:right'>B</th></tr>"
     rows = [_row(key, [_word(one), _word(other)]) for key, one, other in found]
     return _table([heads, *rows], f"{len(found)} parameter{'s' if len(found) > 1 else ''} with other values")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from airflock.studio.page import Page
 
 EXAMPLE = "radio.delay = 400 ms, or goals.points = [[0, 50, 0]]"
-ANEW = {"agents": "“agents” under Play begins another flight", "dt": "write it into the scenario file"}
+ANEW = {"agents": "“agents” under Play starts another flight", "dt": "write it into the scenario file"}
 
 
 class Tuning(Room):
@@ -136,7 +136,7 @@ def pair(text: str, scenario: Scenario) -> tuple[str, Any]:
     if key in LASTING:
         raise ScenarioError([f"{key} = {value}: {LASTING[key]} cannot change in flight; {ANEW[key]}"])
     if key in TOP:
-        raise ScenarioError([f"{key}: cannot be set while a flock flies; write it into the scenario file"])
+        raise ScenarioError([f"{key}: cannot be changed while a flock flies; write it into the scenario file"])
     records = {section: type(record) for section, record in scenario.records.items()}
     whole, _, faults = whole_keys({key: found}, records, ())
     if faults:

@@ -57,7 +57,7 @@ def watch(
     """
     if str(scenario).lower().endswith(".json"):
         idle = {"settings": settings, "seed": seed, "law": law, "trust": trust, "against": against}
-        _refuse(f"{scenario}: is a flight card, whose fleet is watched as it flies", idle, "a scenario")
+        _refuse(f"{scenario}: is a flight card; its fleet is shown as it flies", idle, "a scenario")
         from airflock.studio.fleet_watch import watch_fleet
 
         watch_fleet(scenario, key, radios, host, port, say)
@@ -73,7 +73,7 @@ def watch(
 
     player.fault = say
     if player.compiling:
-        say("compiling ... (interpreted meanwhile)")
+        say("compiling ... (flying interpreted meanwhile)")
     player.start()
     view = View(host, port, player.where)
     try:

@@ -80,7 +80,7 @@ def _told(found: Identified) -> dict[str, Any]:
     numbers = [
         {"key": n.key, "value": n.value, "low": n.low, "high": n.high, "origin": n.origin}
         if n.told
-        else {"key": n.key, "reason": n.reason or "the logs do not tell"}
+        else {"key": n.key, "reason": n.reason or "not found in the logs"}
         for n in found.numbers.values()
     ]
     return {"name": found.like.name, "drones": found.logs.drones, "numbers": numbers, "notes": list(found.notes)}

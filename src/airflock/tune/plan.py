@@ -50,7 +50,7 @@ def plan_of(budget: float, rate: float, *, warm: bool = False, telling: int = US
     if generations < LEAST or seeds < 10:
         flown = max((LEAST * POPULATION * FLIGHTS + spent) / SEARCH, 10 * TRIED / HARDEN)
         raise StudyError(
-            f"the budget of {budget:g} s is too small: a flight takes {1.0 / rate:.2g} s here; give at least "
+            f"the budget of {budget:g} s is too small: one flight takes {1.0 / rate:.2g} s here; give at least "
             f"{1.1 * flown / rate:.2g} s, or shorten the flights with --duration"
         )
     search: dict[str, Any] = {

@@ -53,7 +53,7 @@ def _figures(found: Tuned) -> dict[str, Figure]:
         table = tables.candidates(store, ["fitness"])
     return {
         "What the search found, generation by generation.": convergence(table, "fitness", what=found.start.name),
-        "Bounds by flights, distances, and how far numbers may move.": certificate(found.certificate),
+        "Bounds by number of flights, distances, and how far numbers may change.": certificate(found.certificate),
     }
 
 
@@ -157,7 +157,7 @@ def _certified(found: Tuned) -> list[str]:
         "<h2>Certificate</h2>",
         made._repr_html_(),
         _list(hazards),
-        "<h2>How far numbers may move</h2>",
+        "<h2>How far numbers may change</h2>",
         _table(("number", "nominal", "safe to", "factor", ""), rows)
         if rows
         else f"<p>{escape(str(made.tolerance.get('reason', 'not asked for')))}</p>",

@@ -58,7 +58,7 @@ def tune(
         than 0.01 per flock hour, and so is leaving the arena or entering an obstacle. Search and hardening put sets
         that look as if they kept these limits before all others.
     confidence : float
-        Of the certificate.
+        Confidence of the certificate.
     like : Scenario, str or path, optional
         The scenario whose law, field and speed are tuned with the numbers that the logs tell of the drones.
     heard : str or path, optional
@@ -66,7 +66,7 @@ def tune(
     warm : bool
         Search from the start's own numbers on, which its speed scales, instead of the middle of all ranges.
     resume : bool
-        Continue what is in the folder.
+        Continue the work in the folder.
     settings : mapping, optional
         Keys of the scenario to change.
     threads : int, optional
@@ -145,11 +145,13 @@ def _mine(
     paths = [what] if isinstance(what, (Scenario, str, os.PathLike)) else list(what)
     if like is None:
         if len(paths) != 1 or heard is not None:
-            raise ScenarioError(["tune takes one scenario; of logs, give --like PRESET: whose law, field and speed"])
+            raise ScenarioError(
+                ["tune takes one scenario; for logs, give --like PRESET, the scenario with their law, field and speed"]
+            )
         return variant(paths[0], settings, trust=trust), None
     files = [path for path in paths if not isinstance(path, Scenario)]
     if not files or len(files) != len(paths):
-        raise ScenarioError(["like is given, so log files are to be tuned, and no scenario"])
+        raise ScenarioError(["like is given, so give log files, not a scenario"])
     found = identified(folder, files, variant(like, settings, trust=trust), heard)
     return found.scenario, found
 

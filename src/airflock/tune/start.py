@@ -23,7 +23,7 @@ def start_of(scenario: Scenario) -> tuple[Scenario, list[str]]:
     start = remade(scenario, values) if values else scenario
     for room in _off_the_walls(scenario):
         with suppress(ScenarioError):  # they have no place so far from the walls
-            why = f"nobody starts nearer than {room:g} m to walls and obstacles"
+            why = f"no agent starts nearer than {room:g} m to walls and obstacles"
             away = remade(start, {"start.wall_clearance": room})
             return away, [*told, f"{why} (start.wall_clearance, which is not given)"]
     return start, told
@@ -38,7 +38,9 @@ def has_walls(scenario: Scenario) -> bool:
 def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
     """Numbers of the law, scaled to the speed of the scenario."""
     if scenario.model.name != SCALES:
-        return {}, [f"{scenario.model.name}: no scaling with the speed is published; its own values are the start"]
+        return {}, [
+            f"{scenario.model.name}: no scaling with the speed is published; the search starts from its own values"
+        ]
     speed = float(scenario.parameters.v_flock)
     scaled: Mapping[str, Any] = tomllib.loads(starting_set(speed))["model"]
     given = scenario.document.get("model", {})
@@ -48,7 +50,7 @@ def _scaled(scenario: Scenario) -> tuple[dict[str, Any], list[str]]:
         if isinstance(entry, dict) and name not in given and name != "v_max"
     }
     if not values:
-        return {}, ["all numbers of the law are given; they are the start"]
+        return {}, ["all numbers of the law are given; the search starts from them"]
     return values, [f"{len(values)} numbers of the law scaled to {speed:g} m/s, as Tables S1 and S3 of {SCALES} say"]
 
 

@@ -41,13 +41,13 @@ class Parameters(Record):
         "every_edge",
         ("every_edge", "nearest_per_axis"),
         source="Vásárhelyi et al. 2018, Methods (every_edge) and the authors' program (nearest_per_axis)",
-        meaning="every edge acts; or, in a square, only the nearer wall of each axis",
+        meaning="which edges act: all; or, in a square, only the nearer wall of each axis",
     )
     edges: str = choice(
         "open",
         ("open", "bounce", "periodic"),
         source="Zapotecatl et al. 2016, authors' program (bounce); Vicsek et al. 1995 (periodic)",
-        meaning="beyond a square's faces: nothing happens; clamped with the velocity reversed; or in again opposite",
+        meaning="beyond a square's faces: nothing happens; held there, velocity reversed; or back in on the far side",
     )
     obstacles: tuple[tuple[tuple[float, ...], ...], ...] = points(
         "m", 3, meaning="polygons that must not be entered, each a list of corners: trees, houses, holes of the arena"

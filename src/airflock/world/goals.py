@@ -13,7 +13,7 @@ OURS = "our choice, because the thesis shows moving goals without numbers"
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(Record):
-    """Where a flock shall go. A goal is reached when the flock's centre is within `radius`; then the next counts."""
+    """Where the flock should go. A goal is reached when the flock's centre is within `radius`; then the next counts."""
 
     kind: str = choice(
         "none",
@@ -21,13 +21,15 @@ class Parameters(Record):
         meaning="no goal, given points, free points of the scene; or to each agent a point of its own, all under way "
         "for the same time",
     )
-    points: tuple[tuple[float, ...], ...] = points("m", 2, axes=3, meaning="goals in their order, [east, north, up]")
-    count: float = quantity(5, "1", low=1, high=1000, source=OURS, meaning="free points of the scene, a whole number")
-    low: float = quantity(5.0, "m", low=0.0, high=1e4, source=OURS, meaning="least height of free points")
-    high: float = quantity(15.0, "m", low=0.0, high=1e4, source=OURS, meaning="greatest height of free points")
+    points: tuple[tuple[float, ...], ...] = points("m", 2, axes=3, meaning="goals in order, [east, north, up]")
+    count: float = quantity(
+        5, "1", low=1, high=1000, source=OURS, meaning="number of free points of the scene, a whole number"
+    )
+    low: float = quantity(5.0, "m", low=0.0, high=1e4, source=OURS, meaning="smallest height of free points")
+    high: float = quantity(15.0, "m", low=0.0, high=1e4, source=OURS, meaning="largest height of free points")
     clearance: float = quantity(3.0, "m", low=0.0, high=1e3, source=OURS, meaning="free distance around free points")
     apart: float = quantity(
-        60.0, "m", low=0.0, high=1e5, source=OURS, meaning="least way from one free point to the next"
+        60.0, "m", low=0.0, high=1e5, source=OURS, meaning="smallest distance from one free point to the next"
     )
     radius: float = quantity(
         20.0,
@@ -35,11 +37,11 @@ class Parameters(Record):
         low=0.01,
         high=1e5,
         source="our choice: the flocking radius",
-        meaning="the centre is at the goal within",
+        meaning="distance from the goal at which the flock's centre has reached it",
     )
     speed: float = quantity(
         0.0, "m/s", low=0.0, high=1e3, source=OURS, usual=(0.0, 20.0),
-        meaning="of the goal on its way to the next point; 0: it jumps",
+        meaning="speed of the goal on its way to the next point; 0: it jumps",
     )  # fmt: skip
     role: str = choice(
         "lead",
@@ -54,10 +56,10 @@ class Parameters(Record):
         low=0.0,
         high=1e5,
         source="our choice: the thesis's radius of cohesion",
-        meaning="a shepherd first gathers who is farther than this from the flock's centre",
+        meaning="a shepherd first gathers agents that are farther than this from the flock's centre",
     )
     behind: float = quantity(
-        15.0, "m", low=0.0, high=1e5, source=OURS, meaning="a shepherd keeps this far behind whom it drives"
+        15.0, "m", low=0.0, high=1e5, source=OURS, meaning="how far a shepherd stays behind those that it drives"
     )
 
 

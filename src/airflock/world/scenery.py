@@ -12,7 +12,7 @@ OURS = "our choice; the thesis's scenes are not available"
 class Parameters(Record):
     """A city or a forest made from a seed, a mesh from a file, or given boxes. The ground is at height 0."""
 
-    kind: str = choice("none", ("none", "city", "forest", "mesh", "boxes"), meaning="what stands in the world")
+    kind: str = choice("none", ("none", "city", "forest", "mesh", "boxes"), meaning="what the scene is made of")
     seed: float = quantity(0, "1", low=0, high=2**31, meaning="seed of the city or forest, a whole number")
     draw: str = choice(
         "once",
@@ -22,23 +22,28 @@ class Parameters(Record):
         "scene.seed and the flight's seed",
     )
     density: float = quantity(
-        1.0, "1", low=0.0, high=5.0, source=OURS, meaning="share of the blocks or trees that stand"
+        1.0, "1", low=0.0, high=5.0, source=OURS, meaning="share of the blocks or trees that are present"
     )
-    ground: str = choice("yes", ("yes", "no"), meaning="whether there is a ground below; never in a plane")
+    ground: str = choice("yes", ("yes", "no"), meaning="whether there is ground below; never in a plane")
     blocks: float = quantity(
-        10, "1", low=1, high=200, source=OURS, meaning="city: blocks along each side, a whole number"
+        10, "1", low=1, high=200, source=OURS, meaning="city: number of blocks along each side, a whole number"
     )
     block: float = quantity(30.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: side of a block")
     street: float = quantity(15.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: width of a street")
-    low: float = quantity(15.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: lowest building")
-    high: float = quantity(60.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: highest building")
+    low: float = quantity(15.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: height of the lowest building")
+    high: float = quantity(60.0, "m", low=0.1, high=1e4, source=OURS, meaning="city: height of the highest building")
     trees: float = quantity(400, "1", low=0, high=1e6, source=OURS, meaning="forest: number of trees at density 1")
     side: float = quantity(200.0, "m", low=0.1, high=1e5, source=OURS, meaning="forest: side of its square")
     later: float = quantity(
-        0.0, "1", low=0.0, high=1.0, meaning="share of the buildings or trees that appear while flying"
+        0.0, "1", low=0.0, high=1.0, meaning="share of the buildings or trees that appear during the flight"
     )
     later_until: float = quantity(
-        60.0, "s", low=0.0, high=1e6, source=OURS, meaning="by when: each at a time that the seed draws"
+        60.0,
+        "s",
+        low=0.0,
+        high=1e6,
+        source=OURS,
+        meaning="time by which all of these have appeared; the seed draws when each does",
     )
     boxes: tuple[tuple[float, ...], ...] = points(
         "m and s", 2, axes=7, meaning="boxes: lowest and highest corner, and when it appears: [x, y, z, x, y, z, time]"

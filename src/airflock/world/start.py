@@ -28,15 +28,27 @@ class Parameters(Record):
         low=0.0,
         high=1e4,
         source="authors' program of Vásárhelyi et al. 2018: max(3 m, 2 s · v_flock)",
-        meaning="smallest distance of two agents at the start; in a ball or a box 0 by default",
+        meaning="smallest distance between two agents at the start; in a ball or a box 0 by default",
     )
     spacing_x: float = quantity(
-        1.524, "m", low=0.0, high=1e4, source="Dimock & Selig 2003 give none", meaning="formation: each rank behind"
+        1.524,
+        "m",
+        low=0.0,
+        high=1e4,
+        source="Dimock & Selig 2003 give none",
+        meaning="formation: distance of each rank behind the one before",
     )
     spacing_y: float = quantity(
-        1.9812, "m", low=-1e4, high=1e4, source="Dimock & Selig 2003 give none", meaning="formation: each rank aside"
+        1.9812,
+        "m",
+        low=-1e4,
+        high=1e4,
+        source="Dimock & Selig 2003 give none",
+        meaning="formation: distance of each rank to the side of the one before",
     )
-    spacing_z: float = quantity(0.0, "m", low=-1e4, high=1e4, meaning="formation: each rank above")
+    spacing_z: float = quantity(
+        0.0, "m", low=-1e4, high=1e4, meaning="formation: height of each rank above the one before"
+    )
     jitter: float = quantity(
         0.0, "m", low=0.0, high=1e3, source="our choice", meaning="standard deviation of the places in a formation"
     )
@@ -49,7 +61,7 @@ class Parameters(Record):
         low=0.0,
         high=1e3,
         source="none in the authors' programs",
-        meaning="free distance to walls, obstacles and the scene; in a formation not asked",
+        meaning="free distance to walls, obstacles and the scene; not used in a formation",
     )
     speed: float = quantity(
         0.0,

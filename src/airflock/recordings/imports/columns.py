@@ -139,12 +139,14 @@ def _recognised(found: Layout, columns: Sequence[str], options: Options) -> None
     if faults:
         raise RecordingError("\n".join(faults))
     if unsaid:
-        tells = [f"{c} tells of a tracker" for c in columns if headers.split(c)[0] in OF_A_TRACKER]
+        tells = [f"{c} comes from a tracker" for c in columns if headers.split(c)[0] in OF_A_TRACKER]
         if "t" not in found.trees and "frame" in found.trees:
-            tells.append(f"{found.labels['frame']} tells of a camera")
+            tells.append(f"{found.labels['frame']} comes from a camera")
         if tells:
             raise RecordingError(f"{found.where}: column {unsaid[0]} has no unit, and {tells[0]}; {headers.GIVE}")
-        found.notes.append(f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; otherwise --unit mm")
+        found.notes.append(
+            f"{found.where}: {', '.join(unsaid)} without a unit: taken as m; if not, write for instance --unit mm"
+        )
 
 
 def _frames(found: Layout, options: Options, faults: list[str]) -> None:

@@ -138,12 +138,16 @@ def load_tracks(
     checks.check_presence(tracks, findings)
     findings.refuse()
     if not all(track.has(VELOCITY) for track in tracks):
-        findings.notes.append("no velocity: differentiated from positions; axes and units could not be checked by it")
+        findings.notes.append(
+            "no velocity: differentiated from positions; axes and units could not be checked against them"
+        )
     times, period = grid.grid_of(tracks, rate, begin, end)
     sources = sorted({track.source for track in tracks})
     kept, step = grid.bits(tracks, precision)
     if kept != precision:
-        findings.notes.append(f"far from the origin: kept with 64 bits; 32 tell places there to {step:.2g} m")
+        findings.notes.append(
+            f"far from the origin: kept with 64 bits; 32 bits resolve positions there only to {step:.2g} m"
+        )
     found, shares = grid.recording(tracks, times, period, bridge, kept)
     absent = 1.0 - shares["present"]
     findings.notes.append(
@@ -290,7 +294,7 @@ def _to_metres(tracks: list[Track], origin: tuple[float, float, float] | None, f
     free = [t for t in tracks if "x" in t.columns and t.origin is None]
     if free and (geodetic or placed):
         findings.fault(
-            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them apart"
+            f"{free[0].source}: has no origin, while {(geodetic or placed)[0].source} has one; import them separately"
         )
         return
     if origin is None and placed:

@@ -90,7 +90,7 @@ def _compare(source: str, track: Track, moved: Array, summed: Array, findings: F
     moved, summed : displacements, and the same from the velocities, (pair, axis), m
     """
     if summed.std(axis=0).max() <= 1e-12:
-        findings.notes.append(f"{source}: nothing moves: axes and units cannot be compared with velocities")
+        findings.notes.append(f"{source}: nothing moves: axes and units cannot be checked against velocities")
         return
     likeness = _likeness(moved, summed)
     lively, r, slopes = likeness
@@ -171,7 +171,7 @@ def check_jumps(track: Track, findings: Findings) -> None:
     next_row = float(np.median(np.linalg.norm(place[1:] - place[:-1], axis=1)))
     if next_row > 3.0 * float(np.median(np.linalg.norm(place[2:] - place[:-2], axis=1))):
         findings.fault(
-            f"{track.source}: {track.name} goes to and fro by {next_row:.3g} m, row {track.rows[0]} on: "
+            f"{track.source}: {track.name} jumps back and forth by {next_row:.3g} m, row {track.rows[0]} on: "
             "two individuals under one id? Map another column: --map id:=COLUMN",
             "jumps",
         )
