@@ -1,4 +1,4 @@
-"""Processor time of `airflock infer` on many individuals: fish of Couzin et al., four laws, 20 flights of what is found.
+"""Processor time of `airflock infer` on many individuals: fish of Couzin et al., four laws, 20 flights of the best.
 
 python benchmarks/infer_large.py [--agents 100] [--seconds 1000] [--seed 21]
 
