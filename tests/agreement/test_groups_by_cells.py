@@ -121,4 +121,4 @@ def test_a_law_without_a_reach_keeps_a_large_flock_from_cells_and_a_note_says_so
     large = {**SCHOOL, "agents": 2000, "groups": [group]}
     found, plain = load("couzin_2002/torus", large, trust=True), load("couzin_2002/torus", {**large, "groups": []})
     assert not plan_of(found).grid and seconds_of(found) > 10.0 * seconds_of(plain)
-    assert any("wary looks without end" in note and "on one core" in note for note in found.notes)
+    assert any("wary sees without limit" in note and "on one core" in note for note in found.notes)

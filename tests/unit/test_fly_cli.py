@@ -83,7 +83,7 @@ def test_mistakes_of_a_preparation_are_told_together_and_nothing_is_written(airf
     for part in ("did you mean brake?", "longitude", "occurs twice", "none of px4, ardupilot"):
         assert any(part in line for line in lines), (part, lines)
     code, _, (line,) = airflock("fleet", "vicsek_1995/ordered", "--duration", "1")  # of 300 agents, all of whom it told
-    assert code == 2 and "members: 251 is no system id; they are whole numbers from 1 to 250" in line
+    assert code == 2 and "members: 251 is none of the system ids from 1 to 250" in line
     code, _, lines = airflock("fly", "prepare", "dimock_2003/published", "--site", "47,19,0", "--members", "1-3")
     assert code == 2 and lines
     assert not list(tmp_path.iterdir())

@@ -215,7 +215,7 @@ def _member_faults(members: Any) -> list[str]:
     listed = members if isinstance(members, list) else []
     wrong = [m for m in listed if type(m) is not int or not 1 <= m <= LARGEST_SYSTEM]
     if wrong:
-        return [f"members: {wrong[0]!r} is no system id; they are whole numbers from 1 to {LARGEST_SYSTEM}"]
+        return [f"members: {wrong[0]!r} is none of the system ids from 1 to {LARGEST_SYSTEM}"]
     if not listed:
         return [f"members = {members!r}: give a list of system ids from 1 to {LARGEST_SYSTEM}"]
     return [f"members = {members}: a system id occurs twice"] if len(set(listed)) < len(listed) else []
