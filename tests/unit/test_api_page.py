@@ -28,6 +28,7 @@ def the(name):
     return resolve_name(f"{home}:{last}")
 
 
+OPENED = ["airflock.AirflockError", "airflock.Scenario", "airflock.Flight", "airflock.Parameters"]
 FUNCTIONS = [name for name in LISTED if inspect.isfunction(the(name))]
 
 
@@ -59,7 +60,7 @@ def test_every_argument_and_result_has_a_type_and_each_argument_its_meaning(name
     assert [argument.name for argument in mine if not re.search(rf"\b{argument.name}\b", text)] == []
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", [*FUNCTIONS, *OPENED])
 def test_every_example_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     finder = doctest.DocTestFinder(recurse=False)

@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import airflock
+from airflock.scenarios.laws import MODELS
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -38,3 +39,13 @@ def test_every_extra_stands_in_the_table_of_the_documentation():
         "lint",
         "dev",
     }  # for who works on Airflock
+
+
+def test_the_paper_names_as_many_laws_as_there_are_and_cites_each_publication():
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    written = dict(zip(("eight", "nine", "ten", "eleven", "twelve"), range(8, 13), strict=True))
+    (laws,) = re.findall(r"(\w+) laws come with the package", text)
+    assert written[laws.lower()] == len(MODELS)
+    cited = set(re.findall(r"@(\w+)", text))
+    assert set(MODELS) - {"formation"} <= cited  # formation is ours
+    assert cited <= set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), re.M))
