@@ -1,6 +1,7 @@
 """Public functions: typed, each argument and the result told; commands and functions match."""
 
 import inspect
+import re
 from importlib import import_module
 from pkgutil import resolve_name
 
@@ -18,6 +19,7 @@ HOMES = {
     "tune": "airflock.tune.run", "identify": "airflock.identify.run", "infer": "airflock.infer.run",
     "body": "airflock.core.contract",
 }  # fmt: skip
+UNITS = {"duration": "s", "budget": "s", "timeout": "s", "start": "s", "stop": "s", "body_length": "m"}
 FUNCTIONS = sorted(set(airflock.__all__) - PACKAGES - {"__version__"} - CLASSES)  # their examples: test_api_page
 
 
@@ -41,10 +43,11 @@ def test_every_argument_and_result_has_a_type(name):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_every_function_tells_its_arguments_and_its_result(name):
+def test_every_function_tells_its_arguments_its_result_and_its_errors(name):
     function = the(name)
     text = inspect.getdoc(function) or ""
     assert "Returns\n-------" in text and "Examples\n--------" in text
+    assert re.search(r"\bRaises\b", text) or not inspect.signature(function).parameters  # which errors
     told = {word.strip(" *") for line in text.splitlines() for word in line.partition(" :")[0].split(",")}
     missing = set(inspect.signature(function).parameters) - told
     assert not missing
@@ -110,3 +113,12 @@ def test_keys_are_printed_for_people_and_for_machines():
     text = run(app, ["keys", "radio"]).stdout
     assert "radio.delay" in text and "age of neighbours' data on arrival" in text and "[0 … 30 s]" in text
     assert "radio" in run(app, ["keys"]).stdout
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_arguments_with_a_unit_say_it(name):
+    text = inspect.getdoc(the(name)) or ""
+    for argument, unit in UNITS.items():
+        if argument in inspect.signature(the(name)).parameters:
+            (told,) = re.findall(rf"^[\w, ]*\b{argument}\b[\w, ]* : ?.*(?:\n .*)*", text, re.M)[:1]
+            assert re.search(rf"\b{unit}\b|second", told), (argument, told)
