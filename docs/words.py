@@ -53,7 +53,8 @@ def pages() -> list[Path]:
     """Texts written by hand: pages, and examples with their comments."""
     scripts = [path for folder in ("gallery", "notebooks", "tours") for path in sorted((DOCS / folder).glob("*.py"))]
     beside = [DOCS.parent / name for name in BESIDE if (DOCS.parent / name).is_file()]
-    return [*sorted(DOCS.glob("*.md")), *sorted((DOCS / "equations").glob("*.md")), *scripts, *beside]
+    own = [path for folder in (".", "equations", "decisions") for path in sorted((DOCS / folder).glob("*.md"))]
+    return [*own, *scripts, *beside]
 
 
 def faults_of(path: Path) -> Iterator[str]:

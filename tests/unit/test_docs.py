@@ -41,6 +41,12 @@ def test_the_check_of_words_finds_what_is_wrong(tmp_path, monkeypatch, name, tex
     assert told.startswith(fault)
 
 
+def test_decisions_and_the_front_pages_are_held_to_the_words_too():
+    names = {path.name for path in words.pages()}
+    assert {"README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "paper.md", "glossary.md"} <= names
+    assert {path.name for path in (DOCS / "decisions").glob("*.md")} <= names
+
+
 def test_code_and_equations_are_no_words(tmp_path, monkeypatch):
     monkeypatch.setattr(words, "DOCS", tmp_path)
     path = tmp_path / "a.md"
