@@ -103,6 +103,17 @@ def test_the_glossary_has_each_term_once_in_order_and_the_words_of_the_papers():
     assert not any(re.fullmatch(wrong, term) for wrong in words.SPELLINGS for term in terms)
 
 
+def test_terms_are_found_at_the_head_of_a_sentence_and_in_the_plural_but_not_in_keys(monkeypatch):
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+    from terms import pattern_of, term_of
+
+    known = {"agent", "shill agent", "radio", "v_flock"}
+    text = "Agents turn to a shill agent. A radio, not radio.delay, and v_flock; reagent and V_flocked are none."
+    found = [term_of(match[1], known) for match in pattern_of(known).finditer(text)]
+    assert found == ["agent", "shill agent", "radio", "v_flock"]
+
+
 def test_a_link_that_leads_nowhere_is_told(tmp_path):
     (tmp_path / "a.html").write_text(
         '<h2 id="one">1</h2><a href="b.html#two"><a href="#one"><a href="https://x.org/y">'
