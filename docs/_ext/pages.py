@@ -160,7 +160,9 @@ def order_parameters(drawn: bool) -> None:
             reference = plain((module.__doc__ or "").strip().split("\n\n")[0].replace("\n", " "))
         rows = [("unit", unit or "none"), ("range", about["range"]), ("sets", ", ".join(f"`{k}`" for k in sets[name]))]
         rows += [("where some are absent", absent[name])] if name in absent else []
-        rows += [("defined in", f"`{home.__module__}`: {reference}")] if reference else []
+        if not reference and "source" not in about:
+            raise ExtensionError(f"order parameter {name}: say where it comes from: source in order_parameters.toml")
+        rows.append(("defined in", f"`{home.__module__}`: {reference}") if reference else ("source", about["source"]))
         pieces.append(table(("property", "value"), rows))
         pieces.append(f"\n{about['reads']}\n" if "reads" in about else "")
         if name not in pairs:
