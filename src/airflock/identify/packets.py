@@ -17,7 +17,7 @@ from airflock.radios import links, table
 OF_TABLE = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
 # half of an interval, relative, beyond which a number is not told
-WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
+WIDEST = {"near": 0.15, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
 MANY = 20  # packets due in a metre of distance, above which pairs count as having flown there
 
