@@ -1,9 +1,11 @@
 """The Python names as a notebook uses them: names instead of scenarios, laws by name, seeds that can be one."""
 
+import pickle
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import airflock
@@ -128,6 +130,21 @@ def test_what_is_no_scenario_is_told_by_its_kind_and_not_printed(short):
 def test_a_sweep_over_a_single_value_is_told_to_give_a_list(short, value):
     with pytest.raises(ScenarioError, match="radio.delay = .*0.4.*: give the values to sweep over in a list"):
         airflock.sweep(short, {"radio.delay": value})
+
+
+def test_scores_show_units_and_meanings_in_their_heads_and_stay_a_dataframe(short):
+    table = airflock.score(short, seeds=2)
+    page = table._repr_html_()
+    assert '<th title="mean speed">phi_vel<br>m/s</th>' in page and "<br>&nbsp;</th>" in page  # phi_corr has no unit
+    assert page.count("<th title=") == len(table.columns) and f"{table['phi_vel'].iloc[0]:.6f}" in page
+    part = table[["phi_vel", "n_coll"]].round(3)
+    assert part._repr_html_().count("<th title=") == 2  # of a part, what it holds
+    assert type(table["phi_vel"]) is pd.Series and table.equals(pd.DataFrame(table))
+    assert "units" in pickle.loads(pickle.dumps(table)).attrs
+    swept = airflock.sweep(short, {"radio.delay": [0.2]}, seeds=1)
+    assert "<th>radio.delay</th>" in swept._repr_html_() and "mean speed" in swept._repr_html_()
+    with pd.option_context("display.notebook_repr_html", False):
+        assert table._repr_html_() is None
 
 
 def test_courses_say_their_units(short):

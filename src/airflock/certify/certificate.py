@@ -84,7 +84,15 @@ class Certificate:
         return found
 
     def document(self) -> dict[str, Any]:
-        """The certificate as plain values: what certificate.toml holds."""
+        """The certificate as plain values: what certificate.toml holds.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).document()["flights"]["count"]
+        100
+        """
         c, step = self.campaign, max(1, min(CHECKED, len(self.rows) // FEWEST))
         digests = [digest(row) for row in self.rows]
         made = {
@@ -118,12 +126,30 @@ class Certificate:
         return sealed(plain(made))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write certificate.toml, complete or not at all."""
+        """Write certificate.toml to `path`, complete or not at all.
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml").name
+        'certificate.toml'
+        """
         write(Path(path), self.document(), "A certificate of Airflock; check it with: airflock certify FILE --check")
         return Path(path)
 
     def check(self, threads: int | None = None) -> Any:
-        """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`."""
+        """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`.
+
+        threads : of the flights, all processors by default
+
+        Examples
+        --------
+        >>> import airflock
+        >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 2.0})
+        >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).check().same
+        True
+        """
         from airflock.certify.check import checked
 
         return checked(self.document(), "certificate", scenario=self.campaign.scenario, threads=threads)

@@ -24,7 +24,16 @@ class PictureError(RecordingError):
 def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: float = 200.0) -> Path:
     """Write a figure as .png, .pdf or .svg; raises PictureError and leaves nothing behind.
 
+    path       : of the picture; its ending says of which kind it is
     resolution : dots per inch of .png, and of what is drawn as pixels within the others
+
+    Examples
+    --------
+    >>> import airflock
+    >>> short = airflock.load("vasarhelyi_2018/4ms", {"agents": 4, "duration": 1.0})
+    >>> recording = airflock.simulate(short)
+    >>> airflock.plots.save_figure(airflock.plots.trajectories(recording), "flight.png").name
+    'flight.png'
     """
     with complete_or_absent(path, PICTURES) as temporary:
         ending, content = temporary.suffix.lower(), io.BytesIO()

@@ -24,6 +24,7 @@ from airflock.recordings.attributes import check_format, flown_with_own_law, mea
 from airflock.recordings.layout import frames_of
 from airflock.recordings.lengths import in_bodies, unsaid
 from airflock.recordings.own_kinds import missing_kinds, with_files
+from airflock.recordings.score_table import described
 from airflock.scenarios.change import variant
 from airflock.scenarios.document import keyed
 from airflock.scenarios.families import Given
@@ -165,10 +166,7 @@ def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
-    known = reports(scenario.measures)
-    table.attrs["units"] = {name: known[name][0] for name in table.columns if name in known}
-    table.attrs["meanings"] = {name: known[name][1] for name in table.columns if name in known}
-    return table
+    return described(table, dict(reports(scenario.measures)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
