@@ -543,3 +543,55 @@ def test_a_window_holds_the_frames_that_lie_in_it(begin, end):
 def test_two_individuals_of_one_name_in_a_dataset_are_told():
     found = airflock.load_tracks(flock(1))
     assert "bird_0 is also in dataset" in refused(xr.concat([found, found], "individual"))
+
+
+@pytest.mark.parametrize("kind", ["frame", "csv", "wide", "array", "dataset"])
+def test_rows_without_a_number_are_told_with_file_column_and_first_row(tmp_path, kind):
+    """They were dropped in silence: a log half of nan looked like a short one."""
+    table = flock(2, seconds=10.0)
+    table.loc[10:14, ["x", "y"]] = np.nan
+    table.loc[30:32, "x"] = np.inf
+    x = table["x"].to_numpy().reshape(2, -1)
+    y = table["y"].to_numpy().reshape(2, -1)
+    places = np.stack([x, y], axis=-1).swapaxes(0, 1)
+    options, first, where = {}, 10, "DataFrame"
+    if kind == "csv":
+        table = written(tmp_path, table)
+        first, where = 12, str(table)
+    if kind == "wide":
+        table = pd.DataFrame({"t": np.arange(len(places)) / RATE, "x1": x[0], "y1": y[0], "x2": x[1], "y2": y[1]})
+    if kind == "array":
+        table, options, where = places, {"fps": RATE, "unit": "m"}, "array"
+    if kind == "dataset":
+        plain = airflock.load_tracks(flock(2, seconds=10.0), precision=64)
+        table, where = plain.assign(position=(plain["position"].dims, places.swapaxes(1, 2)[:, :, None])), "dataset"
+        options = {"unit": "m"}
+    found = airflock.load_tracks(table, bridge=0.0, **options)
+    notes = json.loads(found.attrs["airflock_import"])["notes"]
+    told = [note for note in notes if "taken as absent" in note]
+    assert told == [
+        f"{where}: column x: 8 rows without a number taken as absent (3 of them inf), first row {first}",
+        f"{where}: column y: 5 rows without a number taken as absent, first row {first}",
+    ]
+    assert (~np.isfinite(values(found)[:, 0])).sum() == 8
+
+
+def test_speeds_and_commands_without_a_number_are_told_and_infinite_ones_are_none():
+    table = circle()
+    table.loc[5:8, ["vx", "vy"]] = np.nan
+    table.loc[20:21, "cx"] = -np.inf
+    found = airflock.load_tracks(table)
+    notes = json.loads(found.attrs["airflock_import"])["notes"]
+    assert (
+        "DataFrame: column vx, vy: 4 rows without a number: differentiated from positions there, first row 5" in notes
+    )
+    assert "DataFrame: column cx: 2 rows without a number: no command there (2 of them inf), first row 20" in notes
+    assert not np.isinf(values(found, "command")).any()
+
+
+def test_rows_that_a_px4_estimator_calls_invalid_are_told():
+    table = circle().rename(columns={"t": "timestamp"}).drop(columns=["cx", "cy"])
+    table = table.assign(timestamp=table["timestamp"] * 1e6, z=-5.0, vz=0.0, xy_valid=1, v_xy_valid=1)
+    table.loc[100:109, "xy_valid"] = 0
+    notes = json.loads(airflock.load_tracks(table).attrs["airflock_import"])["notes"]
+    assert "DataFrame: individual: 10 rows that the estimator calls invalid left out, first row 100" in notes

@@ -34,13 +34,9 @@ def read_array(
     found = []
     for number in range(values.shape[1]):
         own = values[:, number].astype(float) * scale
-        there = np.isfinite(own).all(axis=1)
-        columns = {axis: own[there, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
+        columns = {axis: own[:, c] for c, axis in enumerate(POSITION[: own.shape[1]])}
         name = names[number] if names else str(number + 1)
-        found.append(Track(name, where, frames[there] / rate, columns, frames[there]))
-    found = [track for track in found if len(track.time)]
-    if not found:
-        raise RecordingError(f"{where}: every position is missing")
+        found.append(Track(name, where, frames / rate, columns, frames))
     return found
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 from airflock.errors import RecordingError
 from airflock.numeric import is_number
 from airflock.recordings.imports import (
+    absent,
     arrays,
     checks,
     clocks,
@@ -149,10 +150,10 @@ def load_tracks(
             f"far from the origin: kept with 64 bits; 32 bits resolve positions there only to {step:.2g} m"
         )
     found, shares = grid.recording(tracks, times, period, bridge, kept)
-    absent = 1.0 - shares["present"]
+    gone = 1.0 - shares["present"]
     findings.notes.append(
         f"{found.sizes['individual']} individuals, {times[-1] - times[0]:.4g} s at {1 / period:.4g} Hz; "
-        f"{absent:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
+        f"{gone:.1%} absent, {shares['bridged']:.1%} bridged (gaps up to {bridge:g} s)"
     )
     if found.sizes["individual"] > 1 and period > 0.05:
         findings.notes.append(f"nearest distances between frames {period:.3g} s apart are upper bounds")
@@ -177,7 +178,9 @@ def read_tracks(
     """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
     tracks = _read(what, options, findings)
     findings.refuse()
+    tracks = absent.leave_out(tracks, findings)
     checks.check_columns(tracks, findings)
+    absent.tell_speeds(tracks, findings)
     for track in tracks:
         checks.check_time(track, findings)
     checks.check_names(tracks, findings)

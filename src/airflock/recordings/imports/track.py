@@ -57,7 +57,8 @@ class Options:
 
 @dataclass
 class Track:
-    """One individual. Arrays have one entry per row of the file that has a time and a position.
+    """One individual. Arrays have one entry per row of the file. Readers keep rows without a
+    time or a place (nan); `absent.leave_out` tells of them and takes them out.
 
     name, source : the individual and its file, for messages
     time    : (row,) s, of the clock that `clock` names
