@@ -2,6 +2,7 @@
 
 import json
 import re
+import zipfile
 
 import numpy as np
 import pandas as pd
@@ -322,6 +323,73 @@ def test_files_that_are_no_tables_end_with_one_line(tmp_path):
     assert "pickled" in line and "idtrackerai_format" in line
     assert ": unknown format" in refused(written(tmp_path, own, "a.xlsx"))
     assert "no such file" in refused(tmp_path / "nothing.csv")
+
+
+def test_archives_and_pickles_are_told_whatever_they_are_called(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("log.csv", "t,x,y")
+    for name in ("a.csv", "a.nc", "a.parquet", "a.ulg", "a.h5"):
+        path = tmp_path / name
+        path.write_bytes((tmp_path / "a.zip").read_bytes())
+        assert refused(path) == f"{path}: is a zip archive; unpack it first: unzip {name}"
+    with pytest.raises(RecordingError, match=r"a\.nc: is a zip archive; unpack it first"):
+        airflock.load_recording(tmp_path / "a.nc")
+    (tmp_path / "a.npz").write_bytes((tmp_path / "a.zip").read_bytes())
+    assert "is an archive of log.csv, which is no array" in refused(tmp_path / "a.npz", fps=1.0, unit="m")
+    circle().to_pickle(tmp_path / "log.pkl")
+    for open_it in (airflock.load_tracks, airflock.load_recording):
+        with pytest.raises(RecordingError, match="pickled Python objects.*to_csv"):
+            open_it(tmp_path / "log.pkl")
+
+
+def test_faults_of_many_individuals_are_one_line_for_the_file(tmp_path):
+    table = flock(5)
+    path = written(tmp_path, pd.concat([table, table.iloc[::100]], ignore_index=True))
+    line = refused(path)
+    assert line == (
+        f"{path}: column t: 20 rows of 5 individuals repeat a time, first row 2002; remove the duplicates; "
+        "or keep the first of each: --accept duplicates"
+    )
+    assert airflock.load_tracks(path, accept="duplicates").equals(airflock.load_tracks(written(tmp_path, table)))
+    short = pd.concat([circle().assign(id="a"), *(circle(i).iloc[: 10 + i].assign(id=f"b{i}") for i in range(9))])
+    line = refused(written(tmp_path, short))
+    assert line.count("\n") == 0 and "b0 is there for 3% of" in line and "8 more for less than 20%" in line
+
+
+def test_a_unit_of_time_that_is_wrong_is_told_without_a_velocity(tmp_path):
+    """Microseconds named milliseconds were taken for one row in 50 seconds."""
+    own = circle()[["t", "x", "y"]]
+    path = written(tmp_path, own.assign(t=(own["t"] * 1e6).round().astype(int)).rename(columns={"t": "t [ms]"}))
+    line = refused(path)
+    assert line == (
+        f"{path}: column t [ms]: rows of log are 50 s apart, first row 2: us named ms? "
+        "Write --map \"t:='t [ms]'*1e-06\"; or keep it so: --accept time"
+    )
+    assert airflock.load_tracks(path, map={"t": "'t [ms]'*1e-06"}).attrs["fps"] == RATE
+    slow = own.assign(t=own["t"] * 1e6 / RATE)
+    assert (
+        "if it does not count seconds, write for instance --time-unit us"
+        in (airflock.load_tracks(slow).attrs["airflock_import"])
+    )
+    dates = own.assign(t=1.7e12 + own["t"] * 1e6).rename(columns={"t": "t [ms]"})  # a fix a minute, since 1970
+    assert airflock.load_tracks(dates).sizes["time"] == len(own)
+
+
+def test_what_is_said_of_a_reset_helps(tmp_path):
+    """The window was cut after the check, so that the advice to cut was refused, too."""
+    own = circle()
+    own.loc[200:, "x"] += 4.0
+    assert "cut before or after it with --end or --begin" in refused(written(tmp_path, own))
+    for window in ({"end": 9.95}, {"begin": 10.0}):
+        found = airflock.load_tracks(own, **window)
+        assert found.sizes["time"] == 200 and (found["confidence"] == 1.0).all()
+
+
+def test_axes_of_headers_with_units_are_told_apart(tmp_path):
+    table = circle()[["t", "vx", "vy"]].assign(**{"x [m]": circle()["y"], "y [m]": circle()["x"]})
+    line = refused(written(tmp_path, table), axes="ned")
+    assert "write, without --axes, --map \"x:='y [m]'\" --map \"y:='x [m]'\"" in line
+    airflock.load_tracks(written(tmp_path, table), map={"x": "'y [m]'", "y": "'x [m]'"})
 
 
 def test_all_faults_are_told_at_once(tmp_path):

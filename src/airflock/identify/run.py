@@ -156,6 +156,8 @@ def identify(
     same_clock: bool = False,
     options: Options | None = None,
     accept: Iterable[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
 ) -> Identified:
     """Numbers of a scenario from flight logs, with 95 % intervals, and reasons where logs cannot tell.
 
@@ -176,6 +178,8 @@ def identify(
         How files are read (`airflock.recordings.imports.track.Options`), as in `load_tracks`.
     accept : iterable of str
         Kinds of faults that are meant so, as in `load_tracks`.
+    begin, end : float, optional
+        Window of time of the files that is used, s.
 
     Returns
     -------
@@ -204,7 +208,7 @@ def identify(
     if not isinstance(scenario.sensors, langevin.Parameters):
         raise AirflockError(f"{scenario.name}: its sensor is {scenario.sensor.name}; identify knows langevin alone")
     findings = Findings(frozenset([accept] if isinstance(accept, str) else accept))
-    logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock)
+    logs, comparable, sources = _logs(what, options or Options(), findings, standing, same_clock, (begin, end))
     if heard is not None:
         logs, aligned = _on_one_clock(logs, packets.checked(heard))
         comparable = comparable or aligned
@@ -234,13 +238,18 @@ def identify(
 
 
 def _logs(
-    what: Any, options: Options, findings: Findings, standing: tuple[float, float] | None, same_clock: bool
+    what: Any,
+    options: Options,
+    findings: Findings,
+    standing: tuple[float, float] | None,
+    same_clock: bool,
+    window: tuple[float | None, float | None],
 ) -> tuple[Logs, bool, list[str]]:
     if isinstance(what, Logs):
         return what, same_clock, []
     if isinstance(what, xr.Dataset):
         return logs_of_recording(what), bool(what.attrs.get("airflock_comparable", 1)), []
-    tracks, _ = read_tracks(what, options, findings, same_clock=True)
+    tracks, _ = read_tracks(what, options, findings, same_clock=True, begin=window[0], end=window[1])
     sources = sorted({track.source for track in tracks})
     comparable = same_clock or len(sources) == 1 or all(track.clock == "utc" for track in tracks)
     return logs_of(tracks, standing), comparable, sources

@@ -211,7 +211,7 @@ def _read(path: Path) -> xr.Dataset:
     try:
         return load_tracks(path)
     except RecordingError as fault:
-        if not path.is_file():
+        if not path.is_file() or " --" not in str(fault):  # it is nothing that an option would mend
             raise
         raise RecordingError(
             f"{fault}\n{path}: infer takes no options of import: airflock import {path.name} ... --save tracks.nc, "

@@ -31,12 +31,12 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
         period = _round(period)
     first = float(min(track.time[0] for track in tracks))
     if begin is not None:
-        early = np.floor((first - begin + _slack(period, first, begin)) / period)
+        early = np.floor((first - begin + slack(period, first, begin)) / period)
         first = begin if rate else first - float(early) * period
     last = max(track.time[-1] for track in tracks) if end is None else end
     if last < first:
         raise RecordingError(f"no rows between {first:g} and {last:g} s")
-    count = int(np.floor((last - first + _slack(period, first, last)) / period)) + 1
+    count = int(np.floor((last - first + slack(period, first, last)) / period)) + 1
     if count * len(tracks) * 6 > MOST:
         raise RecordingError(
             f"{count} times of {len(tracks)} individuals do not fit; write --rate or --begin and --end"
@@ -44,7 +44,7 @@ def grid_of(tracks: list[Track], rate: float | None, begin: float | None, end: f
     return first + np.arange(count) * period, period
 
 
-def _slack(period: float, *instants: float) -> float:
+def slack(period: float, *instants: float) -> float:
     """Time (s) by which rows may miss the grid: 1e-6 of a period, and what doubles of these instants do not tell.
 
     Seconds since 1970 are told to 2.4e-7 s.
@@ -121,9 +121,9 @@ def _fill(
     axes = place.shape[1]
     own, usual = track.time, period_of(track) or period
     rows = track.stack(POSITION, axes)
-    slack = _slack(period, times[0], times[-1])
-    at = np.searchsorted(own, times + slack, side="right") - 1
-    inside = (at >= 0) & (times <= own[-1] + slack)
+    late = slack(period, times[0], times[-1])
+    at = np.searchsorted(own, times + late, side="right") - 1
+    inside = (at >= 0) & (times <= own[-1] + late)
     before = np.clip(at, 0, max(len(own) - 2, 0))
     after = np.minimum(before + 1, len(own) - 1)
     step = own[after] - own[before]

@@ -133,9 +133,9 @@ def load_tracks(
     findings = Findings()
     _sound(options, findings, numbers, precision, accept, origin)
     findings.accept = frozenset([accept] if isinstance(accept, str) else accept)
-    tracks, comparable = read_tracks(what, options, findings, origin=origin, same_clock=same_clock)
-    if begin is not None or end is not None:
-        tracks = cut(tracks, begin, end)
+    tracks, comparable = read_tracks(
+        what, options, findings, origin=origin, same_clock=same_clock, begin=begin, end=end
+    )
     checks.check_presence(tracks, findings)
     findings.refuse()
     if not all(track.has(VELOCITY) for track in tracks):
@@ -174,25 +174,31 @@ def read_tracks(
     *,
     origin: tuple[float, float, float] | None = None,
     same_clock: bool = False,
+    begin: float | None = None,
+    end: float | None = None,
 ) -> tuple[list[Track], bool]:
-    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault."""
+    """Checked tracks at their own times, and whether their clocks agree; raises RecordingError with every fault.
+
+    begin, end : window of time, s; what lies outside is not checked for jumps
+    """
     tracks = _read(what, options, findings)
     findings.refuse()
     tracks = absent.leave_out(tracks, findings)
     checks.check_columns(tracks, findings)
     absent.tell_speeds(tracks, findings)
-    for track in tracks:
-        checks.check_time(track, findings)
+    checks.check_times(tracks, findings)
     checks.check_names(tracks, findings)
     checks.check_heights(tracks, options.axes, findings)
     _to_metres(tracks, origin, findings)
     findings.refuse()
     motion.check_axes(tracks, findings)
     findings.refuse()
+    comparable = clocks.align(tracks, same_clock, findings)
+    if begin is not None or end is not None:
+        tracks = cut(tracks, begin, end)
     for track in tracks:
         motion.check_jumps(track, findings)
         checks.note_steps(track, findings)
-    comparable = clocks.align(tracks, same_clock, findings)
     findings.refuse()
     return tracks, comparable
 
@@ -201,7 +207,8 @@ def cut(tracks: list[Track], begin: float | None, end: float | None) -> list[Tra
     """Tracks between two times, s; those that have none of it are left out."""
     low, high = -np.inf if begin is None else begin, np.inf if end is None else end
     for track in tracks:
-        track.keep((track.time >= low) & (track.time <= high))
+        late = grid.slack(checks.period_of(track), *track.time[[0, -1]])
+        track.keep((track.time >= low - late) & (track.time <= high + late))
     there = [track for track in tracks if len(track.time)]
     if not there:
         raise RecordingError(f"no rows between {low:g} and {high:g} s")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from airflock.recordings.imports.checks import period_of
 from airflock.recordings.imports.expressions import quoted
-from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, split
+from airflock.recordings.imports.headers import LENGTHS, SPEEDS, TIMES, meaning, split
 from airflock.recordings.imports.track import POSITION, VELOCITY, Findings, Track
 
 Array = NDArray[np.float64]
@@ -143,7 +143,11 @@ def _scale_reason(track: Track, slope: float) -> str:
 def _unswapped(track: Track, i: int, j: int) -> str:
     """What to write where axis i of the positions is axis j of the velocities."""
     own = [quoted(track.label(POSITION[k])) for k in (i, j)]
-    if own == [POSITION[j], POSITION[i]]:  # they have been exchanged already, by --axes or --map
+    told = [meaning(track.label(POSITION[k])) for k in (i, j)]
+    if [None if one is None else one.target for one in told] == [
+        POSITION[j],
+        POSITION[i],
+    ]:  # they have been exchanged already, by --axes or --map
         return (
             "positions and velocities have different axes; write, without --axes, "
             f'--map "{POSITION[i]}:={own[0]}" --map "{POSITION[j]}:={own[1]}"'

@@ -86,10 +86,6 @@ def _sniff(path: Path, options: Options) -> tuple[str, str, list[str]]:
     """Encoding, delimiter and names of the columns of a text table."""
     with path.open("rb") as file:
         start = file.read(1 << 20)
-    if start[:2] == b"PK":
-        raise RecordingError(f"{path}: is a zip archive; unpack it first: unzip {path.name}")
-    if start[:2] == b"\x1f\x8b":
-        raise RecordingError(f"{path}: is compressed; unpack it first: gunzip {path.name}")
     if not start.strip():
         raise RecordingError(f"{path}: is empty")
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):

@@ -122,7 +122,8 @@ class Findings:
         if kind in self.accept:
             self.notes.append(f"accepted ({kind}): {line}")
             return True
-        way = f"; or keep it so: --accept {kind}" if kind else ""
+        kept = "the first of each" if kind == "duplicates" else "it so"
+        way = f"; or keep {kept}: --accept {kind}" if kind else ""
         self.faults.append(line + way)
         return False
 
