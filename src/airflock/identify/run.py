@@ -21,6 +21,7 @@ from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors import langevin
+from airflock.untrusted import own_path
 
 # key → whether a larger number makes a flight harder
 HARDER = {
@@ -313,6 +314,6 @@ def _short(value: float) -> float:
 def read_heard(path: Any) -> pd.DataFrame:
     """Read a table of packets (CSV); raises RecordingError for what is none."""
     try:
-        return packets.checked(pd.read_csv(path, skipinitialspace=True))
+        return packets.checked(pd.read_csv(own_path(path), skipinitialspace=True))
     except (OSError, ValueError, pd.errors.ParserError) as fault:
         raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault

@@ -165,7 +165,8 @@ def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
-    known = reports(scenario.measures)
+    of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
+    known = of_courses | reports(scenario.measures)
     table.attrs["units"] = {name: known[name][0] for name in table.columns if name in known}
     table.attrs["meanings"] = {name: known[name][1] for name in table.columns if name in known}
     return table
@@ -187,8 +188,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     -------
     pandas.DataFrame
         One row per frame that is measured, with the time in s as index, and one column per order parameter;
-        `attrs["units"]` and `attrs["meanings"]` say what they are. `outside` counts who is outside of the arena or in
-        an obstacle, `out` adds up how far (m).
+        `attrs["units"]` and `attrs["meanings"]` say what they are (a set of your own says it in REPORTS and COURSES).
 
     Raises
     ------

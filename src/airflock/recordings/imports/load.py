@@ -36,6 +36,7 @@ from airflock.recordings.imports.track import (
     Track,
     nothing,
 )
+from airflock.untrusted import own_path
 
 
 def load_tracks(
@@ -227,7 +228,7 @@ def _read(what: Any, options: Options, findings: Findings) -> list[Track]:
     if isinstance(what, (str, os.PathLike)):
         what = [what]
     try:
-        files = [Path(name) for name in what]
+        files = [own_path(name) for name in what]
     except TypeError as fault:
         raise RecordingError(
             f"{type(what).__name__} holds no tracks; give files, a DataFrame, a Dataset or an array"
