@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 import airflock
 from airflock.errors import RecordingError
-from airflock.recordings.imports import expressions, geodesy
+from airflock.recordings.imports import expressions, geodesy, motion
+from airflock.recordings.imports.track import Track
 
 RATE = 20.0
 
@@ -606,6 +607,15 @@ def test_a_window_holds_the_frames_that_lie_in_it(begin, end):
     inside = own[(own["t"] >= begin - 1e-9) & (own["t"] <= (end or 1e9) + 1e-9)]
     np.testing.assert_array_equal(values(found)[there, :, 0], inside[["x", "y"]].to_numpy())
     np.testing.assert_allclose(times[there], inside["t"], atol=1e-9)
+
+
+def test_the_comparison_of_axes_keeps_no_long_log_in_memory():
+    """Of an hour of thirty drones it kept 0.28 GB: each twentieth row as a view of all."""
+    table = circle(seconds=10_000.0)
+    columns = {name: table[name].to_numpy() for name in ("x", "y", "vx", "vy")}
+    long = Track("drone", "log", table["t"].to_numpy(), columns, np.arange(len(table)))
+    for found in motion._displacements(long, 2):
+        assert found.base is None and 20_000 <= len(found) < 30_000
 
 
 def test_two_individuals_of_one_name_in_a_dataset_are_told():

@@ -56,9 +56,10 @@ def _displacements(track: Track, axes: int) -> tuple[NDArray[np.float64], NDArra
     path = np.concatenate([np.zeros((1, axes)), path])
     broken = np.concatenate([[0], np.cumsum(~whole)])
     k = max(1, round(LAG / step)) if step < LAG else 1
-    sound = broken[k:] == broken[:-k]
-    thin = max(1, len(sound) // 20_000)
-    return (place[k:] - place[:-k])[sound][::thin], (path[k:] - path[:-k])[sound][::thin]
+    sound = np.flatnonzero(broken[k:] == broken[:-k])
+    # rows by number: a stride over all of them would keep them all in memory
+    rows = sound[:: max(1, (len(broken) - k) // 20_000)]
+    return place[rows + k] - place[rows], path[rows + k] - path[rows]
 
 
 class Likeness(NamedTuple):
