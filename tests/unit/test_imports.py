@@ -2,7 +2,10 @@
 
 import json
 import re
+import subprocess
+import sys
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -616,6 +619,34 @@ def test_the_comparison_of_axes_keeps_no_long_log_in_memory():
     long = Track("drone", "log", table["t"].to_numpy(), columns, np.arange(len(table)))
     for found in motion._displacements(long, 2):
         assert found.base is None and 20_000 <= len(found) < 30_000
+
+
+GIVEN_BACK = """
+import numpy as np
+from airflock.recordings.imports import grid
+from airflock.recordings.imports.track import COMMAND, POSITION, VELOCITY, Track
+
+def told(word):
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith(word))
+
+def one(number, rows):
+    columns = {name: np.linspace(0.0, 100.0, rows) for name in (*POSITION, *VELOCITY, *COMMAND)}
+    return Track(str(number), "log", np.linspace(0.0, 0.02 * (rows - 1), rows), columns, np.arange(rows))
+
+grid.recording([one(0, 100)], np.arange(10) * 0.02, 0.02, 1.0, 32)
+tracks = [one(number, 60_000) for number in range(30)]
+times, period = grid.grid_of(tracks, None, None, None)
+before = told("VmRSS")
+found, _ = grid.recording(tracks, times, period, 1.0, 32)
+print((told("VmHWM") - before) * 1024 / found.nbytes)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell how much memory is used")
+def test_rows_are_given_back_as_the_recording_fills():
+    """Rows and recording were in memory together: 1.17 GB of an hour of thirty drones with commands."""
+    ran = subprocess.run([sys.executable, "-c", GIVEN_BACK], capture_output=True, text=True, check=True, timeout=120)
+    assert float(ran.stdout) < 0.5
 
 
 def test_two_individuals_of_one_name_in_a_dataset_are_told():

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from airflock.errors import RecordingError
+from airflock.memory import give_back_memory
 from airflock.recordings.imports import headers, px4
 from airflock.recordings.imports.absent import PLACES
 from airflock.recordings.imports.columns import MOST_COLUMNS, Layout, layout
@@ -162,6 +163,7 @@ def from_parts(
     tracks = []
     for name in list(gathered):
         tracks.append(_track(name, where, gathered.pop(name), how, findings))
+    give_back_memory()
     return tracks
 
 
