@@ -248,6 +248,21 @@ def test_the_curve_of_reception_comes_back():
     assert {"far", "received_far"} <= set(packets.fit_links(near, 0.2, k).refused)  # both lie beyond what was flown
 
 
+@pytest.mark.parametrize("error", [0.0, 3.0])
+def test_the_end_of_the_range_is_not_taken_for_the_curve(error):
+    """Nothing is heard beyond 80 m: `far` came out at 82 ± 1 m instead of 50, without a word."""
+    k = links.Parameters(kind="links", near=20.0, far=50.0, received_near=0.95, received_far=0.4)
+    heard = heard_by(k)[0]
+    heard.loc[heard["distance"] > 80.0, "got"] = 0
+    heard["distance"] = np.abs(heard["distance"] + np.random.default_rng(1).normal(0.0, error, len(heard)))
+    found = packets.fit_links(heard, 0.2, k)
+    assert found.notes[0].startswith("no packet from beyond")
+    for name in set(LINKS) - set(found.refused):
+        assert found.value[name] == pytest.approx(getattr(k, name), rel=0.12), name
+    assert not packets.fit_links(heard_by(k)[0], 0.2, k).notes  # no range, and none is made up
+    assert not packets.fit_links(heard[heard["distance"] < 70.0], 0.2, k).notes
+
+
 def test_entries_of_a_table_come_back_within_their_intervals():
     """Of 40 tables' 320 entries about one in twenty lies outside; an entry without packets has no error."""
     rng, outside = np.random.default_rng(4), 0

@@ -231,6 +231,8 @@ def identify(
     period, interval, reason = periods.decision_period(logs)
     numbers.add("sensors.period", period, interval, "changes of commands", reason)
     links = _radio(heard, numbers)
+    if links is not None and links.notes:
+        notes += [f"{note}; {numbers.known('radio.range'):g} m in --like, which is kept" for note in links.notes]
     most, reason = periods.largest_command(logs, numbers.known("model.v_flock"))
     if hasattr(scenario.parameters, "v_max"):
         numbers.add("model.v_max", most, (0.995 * most, most), "largest command", reason)
