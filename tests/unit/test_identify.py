@@ -1,6 +1,7 @@
 """Identify: truths that come back, and what logs cannot say is refused with the reason."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ import pytest
 
 import airflock
 from airflock.core import random
+from airflock.core.parameters import Quantity, declarations
 from airflock.errors import RecordingError, ScenarioError
 from airflock.identify import body, hills, packets, periods, synthetic
 from airflock.identify import sensors as standing
@@ -344,6 +346,24 @@ def test_the_file_that_identify_writes_flies_with_those_numbers(fleet, tmp_path)
     (tmp_path / "odd.toml").write_text(text)
     with pytest.raises(ScenarioError, match=r"body.tau: interval = \[99.0, .*\] is not \[low, high\]"):
         airflock.load(str(tmp_path / "odd.toml"))
+
+
+def test_every_number_that_identify_tells_has_the_unit_of_the_scenario(fleet, tmp_path):
+    """A file with `sensors.scale`, in m, could be written and not flown."""
+    import tomlkit
+
+    truth, found, _ = fleet
+    for key, unit in UNITS.items():
+        section, name = key.split(".")
+        record = truth.parameters if section == "model" else getattr(truth, section)
+        declared = {name: one.unit for name, one, _ in declarations(record) if isinstance(one, Quantity)}
+        assert unit == declared.get(name, unit), key
+    numbers = {key: replace(one, reason="", value=known) for key, one in found.numbers.items() if (known := one.like)}
+    numbers = {key: replace(one, low=0.9 * one.value, high=1.1 * one.value) for key, one in numbers.items()}
+    whole = replace(found, numbers=numbers)
+    (tmp_path / "whole.toml").write_text(tomlkit.dumps(whole.document(uncertain=True)))
+    back = airflock.load(str(tmp_path / "whole.toml"))
+    assert "sensors.scale" in numbers and back.sensors.scale == pytest.approx(truth.sensors.scale)
 
 
 def test_conservative_numbers_make_a_flight_harder(fleet):

@@ -31,7 +31,7 @@ HARDER = {
 }  # fmt: skip
 UNITS = {
     "body.tau": "s", "body.a_max": "m/s^2", "body.noise": "m^2/s^3", "sensors.period": "s", "sensors.noise": "m^2/s^2",
-    "sensors.damping": "1/s", "sensors.scale": "m", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
+    "sensors.damping": "1/s", "sensors.scale": "m s^(1/2)", "radio.delay": "s", "radio.near": "m", "radio.far": "m",
     "radio.received_near": "1", "radio.received_far": "1", "model.v_max": "m/s",
 }  # fmt: skip
 HARDER |= dict.fromkeys(packets.OF_TABLE, False)
