@@ -414,6 +414,14 @@ def test_clocks_of_several_files_need_a_reason(tmp_path):
     )  # 20 s are too few for a drift
 
 
+def test_a_flock_around_the_origin_is_not_taken_for_one_that_points_down(tmp_path):
+    """One fish below the others was enough to refuse what `airflock export` had written."""
+    table = pd.concat([circle(i).assign(id=f"fish_{i}", z=2.0 * i - 3.0) for i in range(4)])
+    assert airflock.load_tracks(written(tmp_path, table)).sizes["space"] == 3
+    line = refused(written(tmp_path, table.assign(z=table["z"] - 8.0)))
+    assert "z of fish_0 lies below -1 m, first row 2: it points down" in line and line.count("\n") == 0
+
+
 def test_one_that_is_hardly_there_is_told(tmp_path):
     table = pd.concat([circle().assign(id="a"), circle(1).iloc[:30].assign(id="b")])
     assert "b is there for 8% of 19.95 s" in refused(written(tmp_path, table))

@@ -147,24 +147,24 @@ def check_heights(tracks: list[Track], axes: str, findings: Findings) -> None:
     if len(levels) > 1:
         told = ", ".join(f"{t.name}: {level or 'not said'}" for level, t in levels.items())
         findings.fault(f"heights are above different levels ({told}); convert them to one", "height")
-    for track in tracks:
-        z = track.columns.get("z")
-        if z is None or not len(z):
+    for source, own in by_source(tracks).items():
+        heights = [(track, track.columns["z"]) for track in own if "z" in track.columns]
+        rows = sum(len(z) for _, z in heights)
+        deep = [(track, np.flatnonzero(z < -1.0)) for track, z in heights]
+        if not rows or sum(len(low) for _, low in deep) <= 0.9 * rows:  # around 0 some are always below
             continue
-        low = np.flatnonzero(z < -1.0)
-        if len(low) > 0.9 * len(z):
-            name = track.label("z")
-            turn = f'--map "z:=-{quoted(name)}"'
-            if axes == "ned":
-                told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
-            else:
-                told = f"it points down; write {turn}, or --axes ned if x is north"
-            findings.fault(
-                f"{track.source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: "
-                + told,
-                "down",
-            )
-            return
+        track, low = next((track, low) for track, low in deep if len(low))
+        name = track.label("z")
+        turn = f'--map "z:=-{quoted(name)}"'
+        if axes == "ned":
+            told = f"it points up, where --axes ned has it down; leave --axes ned out, or add {turn} if x is north"
+        else:
+            told = f"it points down; write {turn}, or --axes ned if x is north"
+        findings.fault(
+            f"{source}: column {name}: z of {track.name} lies below -1 m, first row {track.rows[low[0]]}: {told}",
+            "down",
+        )
+        return
 
 
 def note_steps(track: Track, findings: Findings) -> None:
