@@ -16,7 +16,7 @@ from airflock.identify import sensors as standing
 from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of_recording
 from airflock.identify.plan import flight_card
-from airflock.identify.run import HARDER, UNITS, Number, identify
+from airflock.identify.run import HARDER, UNITS, Number, identify, read_heard
 from airflock.radios import links
 from airflock.sensors import langevin
 from processes import called
@@ -236,6 +236,33 @@ def test_delay_and_clocks_come_back_from_packets_of_both_directions():
         assert offset == pytest.approx(ahead[int(name)] - ahead.mean(), abs=0.005)
     one_way = heard[heard["receiver"] < heard["sender"]]
     assert "one direction only" in packets.fit_delay(one_way).reason
+
+
+def test_what_is_wrong_with_a_table_of_packets_is_told_by_column_and_row(tmp_path):
+    """Words, nan and inf ended in a fault of the program; microseconds were taken for seconds."""
+    heard = heard_by(links.Parameters(kind="links"), count=3000)[0]
+    wrong = heard.astype({"t": object, "got": int})
+    wrong.loc[10, "t"] = "soon"
+    wrong.loc[11, "distance"] = np.inf
+    wrong.loc[12, "got"] = 3
+    wrong.loc[10, "got"] = 1
+    wrong.to_csv(tmp_path / "heard.csv", index=False)
+    with pytest.raises(RecordingError) as fault:
+        read_heard(tmp_path / "heard.csv")
+    assert str(fault.value).splitlines() == [
+        f"{tmp_path}/heard.csv: column t, row 12: soon is not a number",
+        f"{tmp_path}/heard.csv: column distance, row 13: inf is not a number",
+        f"{tmp_path}/heard.csv: column got, row 14: 3 is not 0 or 1",
+    ]
+    with pytest.raises(RecordingError, match="give t and stamp in s: divide them by 1e6"):
+        packets.checked(heard.assign(t=1e6 * heard["t"], stamp=1e6 * heard["stamp"]))
+    unheard = heard.assign(stamp=heard["stamp"].where(heard["got"] > 0))  # what never came has no stamp
+    assert len(packets.checked(unheard)) == len(heard)
+    heard.to_csv(tmp_path / "comma.csv", index=False, sep=";", decimal=",")
+    with pytest.raises(RecordingError, match="has ; between its columns"):
+        read_heard(tmp_path / "comma.csv")
+    with pytest.raises(RecordingError, match="none.csv: no such file"):
+        read_heard(tmp_path / "none.csv")
 
 
 def test_the_curve_of_reception_comes_back():

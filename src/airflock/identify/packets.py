@@ -16,6 +16,8 @@ from airflock.radios import links, table
 
 OF_TABLE = tuple(f"radio.received_{n}" for n in range(table.ENTRIES))
 COLUMNS = ("receiver", "sender", "t", "stamp")
+NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
+OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
 # half of an interval, relative, beyond which a number is not told
 WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
@@ -74,15 +76,37 @@ def _kernel() -> Any:
     return kernel
 
 
-def checked(heard: pd.DataFrame) -> pd.DataFrame:
-    """A table of packets with the columns that are needed; raises RecordingError otherwise."""
+def checked(heard: pd.DataFrame, where: str = "heard") -> pd.DataFrame:
+    """A table of packets with the columns that are needed; raises RecordingError otherwise, with every fault.
+
+    where : its name in faults; rows are counted as an editor does, the header being the first
+    """
     lacking = [name for name in COLUMNS if name not in heard]
     if lacking:
         raise RecordingError(
-            f"heard: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
+            f"{where}: no column {', '.join(lacking)}; give receiver, sender, t (receiver's clock, s), "
             "stamp (sender's clock, s), and for reception distance (m) and got (0 or 1, one row per decision and pair)"
         )
-    return heard
+    numbers = {name: pd.to_numeric(heard[name], errors="coerce") for name in NUMBERS if name in heard}
+    came = numbers["got"] > 0 if "got" in numbers else pd.Series(True, heard.index)
+    faults = []
+    for name, values in numbers.items():
+        needed = came if name in ("t", "stamp") else pd.Series(True, heard.index)  # what never came has no stamp
+        bad = needed & ~np.isfinite(values.astype(float))
+        odd, what = (~values.isin([0, 1]), "0 or 1") if name == "got" else (bad, "a number")
+        if odd.any():
+            row = int(np.flatnonzero(odd)[0])
+            faults.append(f"{where}: column {name}, row {row + 2}: {heard[name].iloc[row]} is not {what}")
+    if faults:
+        raise RecordingError("\n".join(faults))
+    found = heard.assign(**numbers)
+    late = fit_delay(found)
+    if not late.reason and late.value > OLDEST:
+        raise RecordingError(
+            f"{where}: packets are {late.value:.3g} s old when they come; give t and stamp in s: divide them by 1e6 "
+            "if they count microseconds, by 1e3 if milliseconds"
+        )
+    return found
 
 
 @dataclass

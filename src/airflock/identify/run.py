@@ -17,11 +17,12 @@ from airflock.identify.hills import LINKS
 from airflock.identify.logs import Logs, logs_of, logs_of_recording
 from airflock.recordings.imports.load import read_tracks
 from airflock.recordings.imports.track import Findings, Options
+from airflock.recordings.packed import refuse_packed
 from airflock.scenarios.files import loaded
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
 from airflock.sensors import langevin
-from airflock.untrusted import own_path
+from airflock.untrusted import is_file, own_path
 
 # key → whether a larger number makes a flight harder
 HARDER = {
@@ -315,7 +316,14 @@ def _short(value: float) -> float:
 
 def read_heard(path: Any) -> pd.DataFrame:
     """Read a table of packets (CSV); raises RecordingError for what is none."""
+    place = own_path(path)
+    if not is_file(place):
+        raise RecordingError(f"{path}: no such file")
+    refuse_packed(place)
     try:
-        return packets.checked(pd.read_csv(own_path(path), skipinitialspace=True))
+        table = pd.read_csv(place, skipinitialspace=True)
     except (OSError, ValueError, pd.errors.ParserError) as fault:
         raise RecordingError(f"{path}: is not a table of packets: {str(fault).splitlines()[0]}") from fault
+    if len(table.columns) == 1 and ";" in str(table.columns[0]):
+        raise RecordingError(f"{path}: has ; between its columns; write it with commas, and points in its numbers")
+    return packets.checked(table, str(path))
