@@ -1,6 +1,7 @@
 """The compiler of drivers: Numba's machine code, with less work."""
 
 import gc
+import platform
 import re
 import subprocess
 import sys
@@ -46,13 +47,48 @@ def instructions(function):
     return [re.sub(r"\.L\w+", ".L", line) for line in lines]
 
 
-def test_machine_code_is_that_of_numba():
+def test_machine_code_is_that_of_numba(monkeypatch):
+    usual = JITCodeLibrary.add_ir_module
+
+    def with_whole_lines(library, module):
+        for function in module.functions:
+            if function.blocks:
+                function.attributes.alignstack = 64
+        usual(library, module)
+
+    monkeypatch.setattr(JITCodeLibrary, "add_ir_module", with_whole_lines)
     xs, ys = np.linspace(-2.0, 2.0, 101, dtype=np.float32), np.ones(101, np.float32)
     (_, ours), (_, theirs) = pair_of_functions(OPTIONS | INNER, OPTIONS | CALLED), pair_of_functions(OPTIONS, OPTIONS)
     found = [loop(xs.copy(), ys) for loop in (ours, theirs)]
     assert found[0] == found[1] != 0.0
     assert len(instructions(ours)) > 10
     assert instructions(ours) == instructions(theirs)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names a register of x86-64")
+@pytest.mark.parametrize("spread", [False, True], ids=["one thread", "all cores"])
+def test_vectors_on_the_stack_lie_whole_in_lines_of_the_cache(spread):
+    options = OPTIONS | {"_nrt": spread}
+
+    @njit(**options | INNER | {"parallel": spread})
+    def pairs(xs, out):  # more sums than there are registers
+        for i in prange(xs.shape[0]):
+            a = b = c = d = e = f = g = h = k = m = np.float32(0.0)
+            for j in range(xs.shape[0]):
+                x = xs[j] - xs[i]
+                y, z = x * x + np.float32(1.0), np.sqrt(abs(x))
+                a, b, c, d, e = a + x * y, b + y / z, c + z * x, d + x / y, e + y * y
+                f, g, h, k, m = f + z / y, g + x / z, h + y * z, k + z * z * z, m + x * x * y
+            out[i] = a * b + c * d + e * f + g * h + k * m
+
+    @njit(**options | CALLED)
+    def loop(xs, out):
+        pairs(xs, out)
+        return 0
+
+    xs = np.linspace(0.0, 1.0, 200, dtype=np.float32)
+    loop(xs, np.zeros_like(xs))
+    assert re.search(r"and[lq]\s+\$-64, %[er]sp", loop.inspect_asm(loop.signatures[0]))
 
 
 def test_a_function_that_only_others_call_refuses_python():

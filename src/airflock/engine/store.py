@@ -1,13 +1,14 @@
 """Drivers on disk: one folder per content hash, so that no cache can ever serve stale physics.
 
-The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler and the
-processor. What runs is always the text that was generated, never a file's; compiled code is loaded only under a seal
-(`engine.checksums`), from a folder that belongs to the user alone (`airflock.cache`).
+The hash covers the whole driver text (all rules, ours and the user's, are inside), the versions of the compiler, our
+own passes of it and the processor. What runs is always the text that was generated, never a file's; compiled code is
+loaded only under a seal (`engine.checksums`), from a folder that belongs to the user alone (`airflock.cache`).
 """
 
 import hashlib
 import os
 import sys
+from functools import cache
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
@@ -18,12 +19,21 @@ from airflock.machine import toolchain
 
 SWEPT = 1 / 64  # share of new drivers, by their hash, at which the whole cache is looked through for old ones
 
+PASSES = ("compiler.py", "compile_shortcuts.py", "libraries.py")  # what makes machine code of a driver's text
+
 _loading = Lock()
+
+
+@cache
+def compiled_by() -> str:
+    """What makes machine code of a text here: versions, processor, and our own passes."""
+    passes = hashlib.sha256(b"".join((Path(__file__).parent / name).read_bytes() for name in PASSES))
+    return f"{toolchain()}|{passes.hexdigest()}"
 
 
 def load_driver(text: str, label: str) -> ModuleType:
     """Import a driver from its text; compiled code of an earlier process is reused."""
-    digest = hashlib.sha256(f"{toolchain()}\n{text}".encode()).hexdigest()[:20]
+    digest = hashlib.sha256(f"{compiled_by()}\n{text}".encode()).hexdigest()[:20]
     name = f"airflock_driver_{label}_{digest}"
     with _loading:  # a thread must not get a module that another one is still executing
         return sys.modules[name] if name in sys.modules else _import(name, digest, text, label)

@@ -19,7 +19,7 @@ COLUMNS = ("receiver", "sender", "t", "stamp")
 NUMBERS = ("t", "stamp", "distance", "got", "fast", "slow")
 OLDEST = 60.0  # s; no radio brings packets so late (radio.delay ends at 30 s)
 # half of an interval, relative, beyond which a number is not told
-WIDEST = {"near": 0.2, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
+WIDEST = {"near": 0.15, "far": 0.1, "received_near": 0.1, "received_far": 0.15}
 FEW = 500  # rows below which no curve is fitted
 EXPECTED = 20.0  # packets that a curve would still bring; where none came, the radio's range ends before
 INSIDE = 0.9  # share of that end within which a curve is fitted, for distances are measured with errors

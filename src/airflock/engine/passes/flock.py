@@ -1,9 +1,11 @@
 """Flock: rules that see all agents at once, a model's `flock` and a metric's `survey`, and the scratch they work in."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from airflock.core.contract import Metric
@@ -93,15 +95,24 @@ def _parameters(plan: Plan, owner: Owner, row: NDArray[Any] | None) -> dict[str,
     return found
 
 
-def scratch_of(plan: Plan, row: NDArray[Any], agents: int) -> list[list[tuple[str, tuple[int, int], bool]]]:
+Named = tuple[tuple[tuple[str, tuple[int, int], bool], ...], ...]
+
+
+def scratch_of(plan: Plan, row: NDArray[Any], agents: int) -> Named:
     """Scratch of every rule of the whole flock: a name, rows and columns, and whether nothing in it outlasts a call."""
+    return _scratch(plan, row.dtype, row.tobytes(), agents) if owners(plan) else ()
+
+
+@lru_cache(maxsize=64)
+def _scratch(plan: Plan, real: Any, numbers: bytes, agents: int) -> Named:
     made = []
-    for owner, sizes in zip(owners(plan), scratch_sizes(plan, row, agents), strict=True):
+    sizes_of = scratch_sizes(plan, np.frombuffer(numbers, real), agents)
+    for owner, sizes in zip(owners(plan), sizes_of, strict=True):
         record = _record(owner, plan)
         within = getattr(record, "WITHIN", ())
         fields = zip(record._fields, sizes, strict=True)
-        made.append([(f"{owner.name}.{name}", size, name in within) for name, size in fields])
-    return made
+        made.append(tuple((f"{owner.name}.{name}", size, name in within) for name, size in fields))
+    return tuple(made)
 
 
 def scratch_sizes(plan: Plan, row: NDArray[Any] | None, agents: int) -> list[list[tuple[int, int]]]:
