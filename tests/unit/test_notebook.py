@@ -16,6 +16,7 @@ from airflock.evolve.store import Store
 from airflock.evolve.study import load_study
 from airflock.evolve.winner import conclude
 from airflock.executors.in_process import InProcess
+from airflock.metrics import registry
 from airflock.recordings.measures import milling
 from processes import called
 
@@ -150,6 +151,14 @@ def test_scores_show_units_and_meanings_in_their_heads_and_stay_a_dataframe(shor
 def test_courses_say_their_units(short):
     course = airflock.over_time(airflock.simulate(short, device="python"))
     assert course.attrs["units"]["phi_vel"] == "m/s" and "speed" in course.attrs["meanings"]["phi_vel"]
+
+
+@pytest.mark.parametrize("kind", sorted(registry.SETS))
+def test_every_column_over_time_says_its_unit_and_meaning(short, kind):
+    """Sums that make up an order parameter, such as those of Eq. 15, had none."""
+    course = airflock.over_time(airflock.simulate(short, device="python"), {"metrics.kind": kind})
+    assert set(course.attrs["units"]) == set(course.attrs["meanings"]) == set(course.columns)
+    assert all(course.attrs["meanings"].values())
 
 
 def test_measures_of_groups_are_found_by_tab():

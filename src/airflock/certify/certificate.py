@@ -15,6 +15,7 @@ from airflock.certify.hazard import Hazard
 from airflock.certify.seeds import COUNT, seed
 from airflock.evolve.folder import plain, write
 from airflock.limits.bounds import per_hour
+from airflock.untrusted import own_path
 
 FORMAT = 1
 LOOK = ("flights", "events", "above", "below", "low", "high")
@@ -135,8 +136,9 @@ class Certificate:
         >>> airflock.certify(short, "n_coll<1 at 90%", flights=100).save("certificate.toml").name
         'certificate.toml'
         """
-        write(Path(path), self.document(), "A certificate of Airflock; check it with: airflock certify FILE --check")
-        return Path(path)
+        target = own_path(path)
+        write(target, self.document(), "A certificate of Airflock; check it with: airflock certify FILE --check")
+        return target
 
     def check(self, threads: int | None = None) -> Any:
         """Fly one flight in a hundred again and compare the bits; see `airflock.certify.check.checked`.

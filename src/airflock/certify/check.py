@@ -17,7 +17,7 @@ from airflock.limits.bounds import look
 from airflock.limits.limit import read_all
 from airflock.scenarios.making import make
 from airflock.scenarios.scenario import Scenario
-from airflock.untrusted import from_outside, read_toml
+from airflock.untrusted import from_outside, own_path, read_toml
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def check(
     True
     """
     with from_outside(path, StudyError):
-        document = read_toml(Path(path))
+        document = read_toml(own_path(path))
     return checked(document, str(path), threads=threads, trust=trust, done=done)
 
 

@@ -25,6 +25,7 @@ from airflock.executors.cluster import Cluster, fly_on_their_cpu
 from airflock.executors.in_process import InProcess
 from airflock.scenarios.change import variant
 from airflock.scenarios.scenario import Scenario
+from airflock.untrusted import own_path
 
 
 class Interrupted(StudyError):
@@ -124,7 +125,7 @@ def evolve(
     study = study_of(
         what, settings, space, objective, fitness, search_keys, over_scenarios, limit, trust=trust, fast=fast
     )
-    folder = Path(out)
+    folder = own_path(out)
     if sensitivity and sensitivity not in METHODS:
         raise StudyError(f"sensitivity = {sensitivity!r} is none of {', '.join(METHODS)}")
     check_timeout(timeout)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from airflock.atomic import atomic
 from airflock.errors import AirflockError, RecordingError
 from airflock.suffixes import PICTURES, suffix_fault
+from airflock.untrusted import own_path
 
 # no dates: the same figure gives the same file
 DATES: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -42,13 +43,13 @@ def save_figure(figure: Figure, path: str | os.PathLike[str], *, resolution: flo
             facecolor=figure.get_facecolor(), bbox_inches="tight", pad_inches=0.08,
         )  # fmt: skip
         temporary.write_bytes(content.getvalue())  # no buffer of it: Python 3.12 crashes where an error holds one
-    return Path(path)
+    return own_path(path)
 
 
 @contextmanager
 def complete_or_absent(path: str | os.PathLike[str], endings: tuple[str, ...]) -> Iterator[Path]:
     """Yield a temporary path to write to, renamed at the end; every fault on the way is one line."""
-    target = Path(path)
+    target = own_path(path)
     fault = suffix_fault(target, endings)
     if fault:
         raise PictureError(fault)

@@ -166,7 +166,8 @@ def between_frames(recording: xr.Dataset, scenario: Scenario) -> str:
 
 def _about(table: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
     """A table with units and meanings of its columns among its attributes."""
-    return described(table, dict(reports(scenario.measures)))
+    of_courses = {name: about for each in scenario.measures.metrics for name, about in each.courses.items()}
+    return described(table, of_courses | dict(reports(scenario.measures)))
 
 
 def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, *, trust: bool = False) -> pd.DataFrame:
@@ -185,8 +186,7 @@ def over_time(recording: xr.Dataset, settings: Mapping[str, Any] | None = None, 
     -------
     pandas.DataFrame
         One row per frame that is measured, with the time in s as index, and one column per order parameter;
-        `attrs["units"]` and `attrs["meanings"]` say what they are. `outside` counts who is outside of the arena or in
-        an obstacle, `out` adds up how far (m).
+        `attrs["units"]` and `attrs["meanings"]` say what they are (a set of your own says it in REPORTS and COURSES).
 
     Raises
     ------
