@@ -299,6 +299,11 @@ VOCABULARY: dict[str, dict[str, str]] = {
         "start": "speed at the start, m/s",
         "wing": "parameters of the wing (aero.wing)",
     },
+    "endures": {
+        "memory": "the body's Memory of this agent",
+        "b": "the body's parameters",
+        "wing": "parameters of the wing (aero.wing)",
+    },
     "faults": {
         "q": "metric parameters",
         "largest": "largest extension, m; 0.0 without an arena",
