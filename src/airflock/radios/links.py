@@ -1,6 +1,7 @@
 """Links: two unreliable radio links; data are carried forward (Vásárhelyi et al. 2018, Drone setup)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from airflock.core.parameters import choice, quantity
 from airflock.core.radio import Packets, forward
@@ -9,6 +10,28 @@ SETUP = "Vásárhelyi et al. 2018, Drone setup and Fig. 8"
 FIG8 = "our choice in the spirit of Fig. 8"
 KINDS = ("constant", "links", "table", "congestion", "shadow", "bursts", "jitter", "vision")
 RATES = ("fast_rate", "slow_rate")
+
+
+def near_distance() -> Any:
+    """Parameter `near`, m."""
+    return quantity(
+        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
+    )
+
+
+def far_distance() -> Any:
+    """Parameter `far`, m."""
+    return quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
+
+
+def near_share() -> Any:
+    """Parameter `received_near`."""
+    return quantity(0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near")
+
+
+def far_share() -> Any:
+    """Parameter `received_far`."""
+    return quantity(0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,16 +48,10 @@ class Parameters(Packets):
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")
-    near: float = quantity(
-        20.0, "m", low=0.0, high=1e6, source=SETUP, meaning="distance below which reception is near-perfect"
-    )
-    far: float = quantity(50.0, "m", low=0.1, high=1e6, source=SETUP, meaning="distance beyond which outages begin")
-    received_near: float = quantity(
-        0.98, "1", low=0.0, high=1.0, source=FIG8, meaning="share of packets received below near"
-    )
-    received_far: float = quantity(
-        0.4, "1", low=0.0, high=1.0, source=SETUP, meaning="share of packets received at far"
-    )
+    near: float = near_distance()
+    far: float = far_distance()
+    received_near: float = near_share()
+    received_far: float = far_share()
 
 
 def share(distance, near, far, received_near, received_far):
