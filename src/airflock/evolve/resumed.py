@@ -6,6 +6,7 @@ from typing import Any
 
 from airflock.evolve.folder import STUDY, plain, read
 from airflock.evolve.study import Study
+from airflock.scenarios.schema import value_of
 
 OWN = ("layout", "airflock")  # of the version that made the folder: nothing that can be asked for
 
@@ -41,7 +42,7 @@ def resumed(
     taken = flown | searched | held_to
     if not taken:
         return study, ""
-    told = ", ".join(f"{key} = {_number(value)}" for key, value in taken.items())
+    told = ", ".join(f"{key} = {value_of(value)}" for key, value in taken.items())
     said = f"goes on with what {folder} holds: {told}"
     return ask({**settings, **flown}, {**keys, **search}, limits if held_to or limit else []), said
 
@@ -53,11 +54,6 @@ def _changed(held: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> l
         other = now.get(key)
         if isinstance(value, Mapping) and isinstance(other, Mapping) and "value" not in value:
             found += _changed(value, other, f"{at}{key}.")
-        elif _number(value) != _number(other):
+        elif value_of(value) != value_of(other):
             found.append((f"{at}{key}", value))
     return found
-
-
-def _number(value: Any) -> Any:
-    """A value, without its unit and source."""
-    return value.get("value", value) if isinstance(value, Mapping) else value
