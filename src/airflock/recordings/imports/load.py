@@ -105,8 +105,9 @@ def load_tracks(
     Returns
     -------
     xarray.Dataset
-        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; where it is not logged, by
-        central differences, one-sided at both ends of each stretch without a gap), command (m/s) where logged, confidence.
+        (time, space, keypoint, individual): position (m, east-north-up), velocity (m/s; differentiated where it is
+        not logged: central differences, one-sided at both ends of a track and of gaps), command (m/s) where
+        logged, confidence.
 
     Raises
     ------
