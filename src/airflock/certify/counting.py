@@ -1,4 +1,4 @@
-"""Counting: fly until a limit is shown, is refuted, or time is over; every flight is stored, every look is paid for."""
+"""Counting: fly until a limit is shown, is refuted, or time is over; each look spends part of the error."""
 
 import math
 import time
@@ -55,7 +55,7 @@ class Verdict:
 
     @property
     def refuted(self) -> bool:
-        """Whether the contrary is shown: the event happens more often."""
+        """Whether the opposite is shown: the event happens more often."""
         return self.probability is not None and not self.shown and self.low > self.probability
 
     @property
@@ -127,7 +127,7 @@ class _Counting:
         self.aims: list[int] = []
 
     def goes_on(self) -> bool:
-        """Take in what has landed; whether more flights can decide anything, and there is time for them."""
+        """Count the flights that have landed; whether more can decide anything, and there is time for them."""
         rows, verdicts = self.told.rows, self.told.verdicts
         while len(rows) in self.found:
             rows.append(self.found[len(rows)])
@@ -154,7 +154,7 @@ class _Counting:
         return not all(verdict.needs for verdict in still)
 
     def _first(self, verdict: Verdict) -> int:
-        """Flights without an event that would show a limit; 0 where an upper bound is there already."""
+        """Flights without an event that would show a limit; 0 where there is an upper bound already."""
         return 0 if verdict.high < 1.0 else least(self.campaign, verdict.limit)
 
     def fly(self) -> None:
@@ -186,7 +186,7 @@ def _open(campaign: Campaign, verdict: Verdict) -> bool:
 
 
 def _next(campaign: Campaign, verdict: Verdict) -> tuple[int, float, float] | None:
-    """Flights at the coming look, and what its upper and its lower bound pay."""
+    """Flights at the next look, and the error probabilities spent on its upper and on its lower bound."""
     if campaign.flights:
         return None if verdict.looks else (campaign.flights, campaign.alpha, campaign.alpha)
     if verdict.probability is None:  # `run` gives every campaign without a rate a number of flights
