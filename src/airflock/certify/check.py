@@ -193,7 +193,7 @@ def _flown_again(
     flown = in_threads([job(number) for number in numbers], 1 if campaign.device != "cpu" else threads, done)
     other = [number for number, now, then in zip(numbers, flown, wanted, strict=True) if now != then]
     return [f"flight {number}, seed {seed(campaign.hash, COUNT, number)}: other bits" for number in other[:5]] + (
-        [f"and {len(other) - 5} further flights with other bits"] if len(other) > 5 else []
+        [f"and {len(other) - 5} more flights with other bits"] if len(other) > 5 else []
     )
 
 

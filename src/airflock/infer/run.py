@@ -71,7 +71,7 @@ def infer(
     >>> import airflock
     >>> airflock.infer("fish.nc", models=[])
     Traceback (most recent call last):
-    airflock.errors.AirflockError: infer: no laws to choose from; give models, such as couzin_2002
+    airflock.errors.AirflockError: infer: no laws to choose from; name models, such as couzin_2002
     >>> found = airflock.infer("fish.nc")  # doctest: +SKIP
     >>> found.verdict  # doctest: +SKIP
     'couzin_2002 explains the tracks best'
@@ -80,7 +80,7 @@ def infer(
     if not isinstance(models, Iterable):
         raise AirflockError(f"infer: models = {models!r}: give a list of laws, such as ['couzin_2002']")
     if not models:
-        raise AirflockError("infer: no laws to choose from; give models, such as couzin_2002")
+        raise AirflockError("infer: no laws to choose from; name models, such as couzin_2002")
     say = done or (lambda _: None)
     settings = dict(settings or {})
     scenarios, box = scenarios_of(models, settings, trust=trust)

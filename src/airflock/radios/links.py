@@ -42,9 +42,10 @@ class Parameters(Packets):
         "constant",
         KINDS,
         source=SETUP,
-        meaning="constant: every packet in range arrives after delay; links: two lossy links, data extrapolated; "
-        "table: a measured table of reception; congestion: more talkers, more loss; shadow: buildings weaken signals; "
-        "bursts: losses in rows; jitter: delays differ; vision: seen instead of heard; or a file that ends in .py",
+        meaning="which packets are lost, and how late the others come. constant: one delay, radio.loss; links: two "
+        "lossy links; table: reception as measured; congestion: more senders, more loss; shadow: buildings weaken "
+        "signals; bursts: losses in a row; jitter: delays differ; vision: agents see each other; or a file of your own "
+        "that ends in .py",
     )
     fast_rate: float = quantity(10.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the short link")
     slow_rate: float = quantity(1.0, "1/s", low=0.01, high=1000.0, source=SETUP, meaning="packets on the long link")
