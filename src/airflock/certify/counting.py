@@ -110,18 +110,18 @@ def count(flyer: Flyer, watch: Watch | None = None) -> Count:
 class _Counting:
     """Counting under way.
 
-    found : scores by number of the flight, in whatever order they landed; only a prefix without holes counts
+    scores : of flights by number, in whatever order they landed; only a prefix without holes counts
     """
 
     def __init__(self, flyer: Flyer, watch: Watch | None):
         self.flyer, self.watch = flyer, watch
         self.campaign = campaign = flyer.campaign
         self.began, self.fresh, self.chunk = time.monotonic(), 0, FIRST
-        self.found: dict[int, Mapping[str, Any]] = {}
+        self.scores: dict[int, Mapping[str, Any]] = {}
         for (_, number), values in flyer.store.flown(BATCH).items():
             if values is None:
                 raise StudyError(f"{flyer.store.path}: {_failure(campaign, number, _reason(flyer.store, number))}")
-            self.found[number] = values
+            self.scores[number] = values
         self.events = [0] * len(campaign.limits)
         self.told = Count([Verdict(limit, campaign.probability(limit)) for limit in campaign.limits], [])
         self.aims: list[int] = []
@@ -129,8 +129,8 @@ class _Counting:
     def goes_on(self) -> bool:
         """Count the flights that have landed; whether more can decide anything, and there is time for them."""
         rows, verdicts = self.told.rows, self.told.verdicts
-        while len(rows) in self.found:
-            rows.append(self.found[len(rows)])
+        while len(rows) in self.scores:
+            rows.append(self.scores[len(rows)])
             for i, verdict in enumerate(verdicts):
                 self.events[i] += verdict.limit.happened(rows[-1])
                 due = _next(self.campaign, verdict)
@@ -162,20 +162,20 @@ class _Counting:
         done = len(self.told.rows)
         flights = []
         for number in range(done, min(max(self.aims), done + self.chunk)):
-            if number not in self.found:
+            if number not in self.scores:
                 own = seed(self.campaign.hash, COUNT, number)
                 flights.append(Flight(0, number, self.campaign.parameters(own), own))
         for landed in self.flyer.fly(BATCH, flights):
             if landed.values is None:
                 raise StudyError(_failure(self.campaign, landed.flight.repeat, landed.reason))
-            self.found[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
+            self.scores[landed.flight.repeat], self.fresh = landed.values, self.fresh + 1
             self.told.rate = self.fresh / max(time.monotonic() - self.began, 1e-9)
             self._note()
 
     def _note(self) -> None:
         if self.watch:
-            total = max([*self.aims, len(self.found)])
-            self.watch(Progress(len(self.found), total, tuple(self.events), self.told.rate))
+            total = max([*self.aims, len(self.scores)])
+            self.watch(Progress(len(self.scores), total, tuple(self.events), self.told.rate))
 
 
 def _open(campaign: Campaign, verdict: Verdict) -> bool:
@@ -206,8 +206,8 @@ def smallest(flights: float, alpha: float) -> float:
 
 
 def _reason(store: Store, number: int) -> str:
-    found = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
-    return str(found[0][0]) if found else ""
+    reasons = store.rows("SELECT reason FROM flight WHERE stage=? AND repeat=?", (BATCH.stage, number))
+    return str(reasons[0][0]) if reasons else ""
 
 
 def _failure(campaign: Campaign, number: int, reason: str) -> str:
